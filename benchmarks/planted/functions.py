@@ -23,7 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # this checkout
 
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.search.itinerary import Itinerary, key
+from dodo_dsl.search.sampling_order import SamplingOrder, key
 from dodo_dsl.search.space import Space, texts
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.instances.vary import Range
@@ -81,7 +81,7 @@ def space_of(bug: Bug) -> Space:
 def searched(bug: Bug, seed: int) -> Iterator[float]:
     """The margins of the drives of a search."""
     margins: dict[tuple[str, ...], float | None] = {}
-    for batch in Itinerary(space_of(bug), 1 << 10, seed).generations(margins):
+    for batch in SamplingOrder(space_of(bug), 1 << 10, seed).generations(margins):
         for one in batch:
             margin = bug.margin([float(text) for text in texts(one.values).values()])
             margins[key(one.values)] = margin

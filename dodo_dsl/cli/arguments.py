@@ -17,7 +17,7 @@ class Arguments(argparse.ArgumentParser):
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        from dodo_dsl.search.address import masked
+        from dodo_dsl.search.postgres import masked
 
         super().error(masked(message))
 

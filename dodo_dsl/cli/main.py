@@ -28,8 +28,8 @@ class Subcommand(NamedTuple):
 COMMANDS = {
     "compile": Subcommand("compile.command", "check tests and write their compose files and child pipeline"),
     "run": Subcommand("run.command", "run tests and judge the application"),
-    "search": Subcommand("search.command", "look for the conditions under which the application fails a test"),
-    "tune": Subcommand("tune.command", "find values of the application's parameters with which it passes by more"),
+    "search": Subcommand("search", "look for the conditions under which the application fails a test"),
+    "tune": Subcommand("tune", "find values of the application's parameters with which it passes by more"),
     "list": Subcommand("list", "list the tests and services"),
     "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
     "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),
@@ -104,7 +104,7 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.OK
     except Exception as error:
-        from dodo_dsl.search.address import masked
+        from dodo_dsl.search.postgres import masked
 
         code = exit_code(error)
         if code is not None:

@@ -9,17 +9,20 @@ Source: https://www.postgresql.org/docs/current/explicit-locking.html#ADVISORY-L
 import contextlib
 import hashlib
 import os
+import re
 import socket
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.search.address import SCHEMES, masked
 from dodo_dsl.search.store import Drive, OtherSearch, point_text
 
 if TYPE_CHECKING:
     import psycopg
 
+SCHEMES = ("postgresql://", "postgres://")
+_PASSWORD = re.compile(r"(postgres(?:ql)?:/+[^/@:\s]*):.*@", re.DOTALL)
+_PARAMETER = re.compile(r"([?&](?:ssl)?password=)[^&\s'\"]*")
 MAIN = "main"
 """The name of a study where none is given."""
 SECRETS = ("PGPASSWORD", "DODO_SEARCH_STORAGE")
@@ -45,6 +48,11 @@ _HAS_LATER = (
     "select count(*) from pg_attribute where attrelid = to_regclass('dodo_drive') and attname = 'checks' "
     "and not attisdropped"
 )
+
+
+def masked(text: str) -> str:
+    """The text with ``***`` for each password of an address in it, also where it is written with wrong characters."""
+    return _PARAMETER.sub(r"\1***", _PASSWORD.sub(r"\1:***@", text))
 
 
 class StorageProblem(Exception):

@@ -3,23 +3,19 @@
 import os
 import threading
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
 
 from dodo_dsl.search import postgres
-from dodo_dsl.search.postgres import AddressProblem, StorageProblem, opened
+from dodo_dsl.search.postgres import AddressProblem, StorageProblem, masked, opened
 from dodo_dsl.search.store import Drive, OtherSearch
-from tests.search.database import Database, served
+from tests.search.database import Database
 
 DRIVE = Drive(3, {"x": "1 m", "m": "ä"}, "failed", -0.1, "hit wall", "wall-margin")
 PARTS = ("name", "test", "key")
 
-
-@pytest.fixture(scope="module")
-def database() -> Iterator[Database]:
-    yield from served()
+pytestmark = pytest.mark.xdist_group("postgres")
 
 
 @pytest.fixture
@@ -187,3 +183,21 @@ def test_an_address_that_cannot_be_read_is_not_repeated(address: str) -> None:
     with pytest.raises(AddressProblem, match="expected postgresql://USER@HOST/DATABASE") as problem:
         postgres.SharedStore(address, *PARTS)
     assert "heim" not in str(problem.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("postgresql://u:geheim@host/db", "postgresql://u:***@host/db"),
+        ("postgres://u:ge@/:heim@host/db", "postgres://u:***@host/db"),
+        ("'postgresql://u:ge heim@host/db' is", "'postgresql://u:***@host/db' is"),
+        ("postgresql://:geheim@host", "postgresql://:***@host"),
+        ("postgresql:/u:geheim@host", "postgresql:/u:***@host"),
+        ("postgresql://u@host/db?password=geheim&x=1", "postgresql://u@host/db?password=***&x=1"),
+        ("postgresql:///db?x=1&sslpassword=geheim", "postgresql:///db?x=1&sslpassword=***"),
+        ("postgresql://u@host:5432/db", "postgresql://u@host:5432/db"),
+        ("https://host:80/a@b", "https://host:80/a@b"),
+    ],
+)
+def test_passwords_are_masked(text: str, shown: str) -> None:
+    assert masked(text) == shown

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.search.study import refuse
 from dodo_dsl.diagnostics import format_text, has_errors, ordered
 from dodo_dsl.emit.pipeline import SearchJobs
+from dodo_dsl.search.study import refuse_search
 from dodo_dsl.spec.settings import Settings
 
 MOST_WORKERS = 200
@@ -24,7 +24,7 @@ def search_jobs(words: Sequence[str], workers: int, application: Sequence[Path])
         checked = selection.select([word], (), application, Settings("lockstep"))
         if has_errors(checked.diagnostics):
             raise UsageError(f"'{word}' cannot be searched:\n{format_text(ordered(checked.diagnostics))}")
-        refuse(word, checked.tests)
+        refuse_search(word, checked.tests)
         slug = checked.tests[0].spec.slug
         found.setdefault(slug, SearchJobs(word, slug, workers, files))
     return tuple(found.values())

@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 from tests.check import examples
-from tests.cli.search.drives import SPEC
 from tests.emit.readers import run
+from tests.search.scripted_drives import SPEC
 
 
 @pytest.fixture(autouse=True)

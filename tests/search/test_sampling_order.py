@@ -1,8 +1,11 @@
 """The order of a search, with margins that follow from the values."""
 
+import itertools
+
 import pytest
 
-from dodo_dsl.search.itinerary import FIRST, PATIENCE, PROPOSED, SWEPT, Candidate, Itinerary, key
+from dodo_dsl.search import sampling_order
+from dodo_dsl.search.sampling_order import FIRST, PATIENCE, PROPOSED, SWEPT, Candidate, SamplingOrder, key
 from dodo_dsl.search.space import Space, sweep, texts
 from tests.search.test_space import space
 
@@ -19,7 +22,7 @@ def margin(one: Candidate) -> float:
 def driven(runs: int, seed: int, of: Space = SPACE, proposes: bool = True) -> list[tuple[Candidate, float]]:
     margins: dict[tuple[str, ...], float | None] = {}
     found = []
-    for batch in Itinerary(of, runs, seed, proposes).generations(margins):
+    for batch in SamplingOrder(of, runs, seed, proposes).generations(margins):
         found += [(one, margin(one)) for one in batch]
         margins.update({key(one.values): found_margin for one, found_margin in found[-len(batch) :]})
     return found
@@ -44,7 +47,7 @@ def test_a_crash_does_not_hide_by_how_little_good_values_differ() -> None:
         return -0.10 + 0.04 * off if off < 0.5 else 0.65
 
     margins: dict[tuple[str, ...], float | None] = {}
-    for batch in Itinerary(SPACE, 48, 0, seeks_best=True, swept=1).generations(margins):
+    for batch in SamplingOrder(SPACE, 48, 0, seeks_best=True, swept=1).generations(margins):
         margins.update({key(one.values): objective(one) for one in batch})
     assert min(found for found in margins.values() if found is not None) < -0.0995
 
@@ -65,14 +68,16 @@ def of_each(failing: bool) -> list[list[bool]]:
     """Whether the candidates of each generation are of the sweep, where one of the first fails, or none ever."""
     margins: dict[tuple[str, ...], float | None] = {}
     found = []
-    for batch in Itinerary(SPACE, FIRST + 8 * (PATIENCE + 3), 0).generations(margins):
+    for batch in SamplingOrder(SPACE, FIRST + 8 * (PATIENCE + 3), 0).generations(margins):
         found.append([one.swept for one in batch])
         margins.update({key(one.values): -0.5 if failing and not margins else 0.5 for one in batch})
     return found
 
 
-@pytest.mark.thorough
-def test_the_sweep_gets_more_where_proposals_find_nothing() -> None:
+def test_the_sweep_gets_more_where_proposals_find_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever is proposed: here further points of a sweep."""
+    others = sweep(SPACE, 256, 7)
+    monkeypatch.setattr(sampling_order, "propose", lambda *words: list(itertools.islice(others, words[3])))
     patient, impatient = [True] * SWEPT + [False] * PROPOSED, [True] * 7 + [False]
     _, *generations = of_each(failing=False)
     assert generations == [patient] * PATIENCE + [impatient] * 3
@@ -83,7 +88,7 @@ def test_the_sweep_gets_more_where_proposals_find_nothing() -> None:
 def test_a_space_that_is_exhausted_ends_the_search() -> None:
     small = space("{m: {among: [a, b], nominal: b}, n: {from: 0, to: 2, nominal: 1}}", "n")
     margins: dict[tuple[str, ...], float | None] = {}
-    batches = Itinerary(small, 1000, 0).generations(margins)
+    batches = SamplingOrder(small, 1000, 0).generations(margins)
     number = 0
     for batch in batches:
         number += 1
@@ -93,6 +98,6 @@ def test_a_space_that_is_exhausted_ends_the_search() -> None:
 
 def test_drives_in_error_say_nothing() -> None:
     margins: dict[tuple[str, ...], float | None] = {}
-    for batch in Itinerary(SPACE, 20, 0).generations(margins):
+    for batch in SamplingOrder(SPACE, 20, 0).generations(margins):
         margins.update({key(one.values): None for one in batch})
     assert len(margins) == 20

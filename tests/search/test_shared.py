@@ -1,32 +1,31 @@
 """One search by several workers, each a process, in a PostgreSQL database."""
 
 import json
+import multiprocessing
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.check import examples
-from tests.cli.search.drives import SPEC
-from tests.search.database import Database, served
+from dodo_dsl.cli.main import main
+from dodo_dsl.plan.model import Plan
+from tests.run.scripted import ScriptedBackend
+from tests.search.database import Database
+from tests.search.scripted_drives import SPEC, repository, stages, stub
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("postgres")]
 
-ROOT = Path(__file__).parents[3]
-_BEGUN: list[subprocess.Popen[str]] = []
-RUNS = ("--runs", "20", "-j", "1")
-
-
-@pytest.fixture(scope="module")
-def database() -> Iterator[Database]:
-    yield from served()
+_FORKS = multiprocessing.get_context("fork")
+_BEGUN: list[ForkProcess] = []
+RUNS = ("--runs", "16", "-j", "1")
+NOMINAL = "example--run-0"
 
 
 @pytest.fixture
@@ -39,12 +38,7 @@ def storage(database: Database) -> tuple[str, str]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The repository of the test that is searched."""
     folder = tmp_path_factory.mktemp("repository")
-    examples.write(SPEC, folder)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.setenv("DODO_LEASES", str(folder / "leases"))
-        patch.setenv("DODO_HISTORY", str(folder / "history.jsonl"))
-        patch.setenv("PYTHONPATH", str(ROOT))
+    with repository(folder, SPEC):
         yield folder
 
 
@@ -52,8 +46,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def no_worker_is_left() -> Iterator[None]:
     yield
     for process in _BEGUN:
-        with process:
-            process.kill()
+        process.kill()
+        process.join()
     _BEGUN.clear()
 
 
@@ -64,24 +58,56 @@ def alone(folder: Path, database: Database) -> str:
     return "alone"
 
 
-def worker(name: str, *words: str, killed_at: int = 0) -> subprocess.Popen[str]:
-    """Begins to search, with a report and a list of drives called ``name``."""
-    command = [sys.executable, "-m", "tests.cli.search.worker", f"{name}.txt", str(killed_at), "example"]
-    command += ["--isolation", "host", "--report", name, *words]
-    _BEGUN.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True))
+def worker(
+    name: str,
+    *words: str,
+    signals: Mapping[int, int] = {},
+    together: Sequence[str] = (),
+    password: str = "",
+) -> ForkProcess:
+    """Begins to search, with a report, a list of drives and an output called ``name``.
+
+    The process, a fork of this one, which has loaded everything, sends itself ``signals`` in drives by their numbers,
+    from 1 on. It goes on with none but the nominal one before workers called ``together`` have one, too.
+    """
+    _BEGUN.append(
+        multiprocessing.get_context("fork").Process(
+            target=_work, name=name, args=(name, words, signals, together, password)
+        )
+    )
+    _BEGUN[-1].start()
     return _BEGUN[-1]
 
 
-def end(process: subprocess.Popen[str]) -> tuple[int, str]:
-    out, _ = process.communicate(timeout=300)
-    return process.returncode, out
+def _work(name: str, words: Sequence[str], signals: Mapping[int, int], together: Sequence[str], password: str) -> None:
+    def backend(plan: Plan, attempt: int) -> ScriptedBackend:
+        with Path(f"{name}.txt").open("a") as written:
+            written.write(f"{plan.slug}\n")
+        if plan.slug != NOMINAL:
+            wait_until(lambda: all(set(begun(other)) - {NOMINAL} for other in together))
+        if number := signals.get(len(begun(name))):
+            os.kill(os.getpid(), number)
+        return ScriptedBackend(plan, stages(plan))
+
+    stub(pytest.MonkeyPatch(), backend)
+    if password:
+        os.environ["PGPASSWORD"] = password
+    with Path(f"{name}.log").open("w") as log:
+        code = main(["search", "example", "--isolation", "host", "--report", name, *words], log, log)
+    sys.exit(code)
+
+
+def end(process: ForkProcess) -> tuple[int | None, str]:
+    """The exit code of a worker, and what it has printed."""
+    process.join(300)
+    return process.exitcode, Path(f"{process.name}.log").read_text()
 
 
 def wait_until(is_so: Callable[[], bool]) -> None:
     deadline = time.monotonic() + 60
     while not is_so():
         assert time.monotonic() < deadline
-        time.sleep(0.1)
+        time.sleep(0.02)
 
 
 def result(name: str) -> dict[str, Any]:
@@ -89,14 +115,17 @@ def result(name: str) -> dict[str, Any]:
 
 
 def begun(name: str) -> list[str]:
-    return Path(f"{name}.txt").read_text().split()
+    """The drives of a worker, which have begun."""
+    path = Path(f"{name}.txt")
+    return path.read_text().split() if path.exists() else []
 
 
 def test_four_workers_of_which_one_is_killed_search_like_one(
     alone: str, database: Database, storage: tuple[str, str]
 ) -> None:
     names = ("a", "b", "c", "d")
-    workers = [worker(name, *RUNS, *storage, killed_at=3 * (name == "a")) for name in names]
+    killed = {"a": dict.fromkeys((1, 2), signal.SIGKILL)}
+    workers = [worker(name, *RUNS, *storage, signals=killed.get(name, {}), together=names) for name in names]
     ends = [end(each) for each in workers]
     assert [code for code, _ in ends] == [-signal.SIGKILL, 1, 1, 1], ends
     assert not Path("a", "search", "example", "search.json").exists()
@@ -115,7 +144,7 @@ def test_four_workers_of_which_one_is_killed_search_like_one(
 
 
 def test_an_interrupted_worker_goes_on_to_the_result_without_a_database(alone: str, storage: tuple[str, str]) -> None:
-    assert end(worker("first", *RUNS, *storage, killed_at=11))[0] == -signal.SIGKILL
+    assert end(worker("first", *RUNS, *storage, signals={11: signal.SIGKILL}))[0] == -signal.SIGKILL
     code, out = end(worker("other", *RUNS, *storage, "--seed", "1"))
     assert code == 2 and "the study 'main' of example at postgresql://" in out and "another one with --study" in out
     assert end(worker("second", *RUNS, *storage))[0] == 1
@@ -130,13 +159,12 @@ def test_a_worker_that_waits_for_another_can_be_interrupted(
     database: Database, storage: tuple[str, str], number: signal.Signals
 ) -> None:
     name = f"stopped-{number.name}"
-    stopped = worker(name, *RUNS, *storage)
-    wait_until(Path(f"{name}.txt").exists)
-    stopped.send_signal(signal.SIGSTOP)
+    worker(name, *RUNS, *storage, signals={1: signal.SIGSTOP})
+    wait_until(lambda: bool(begun(name)))
     waiting = worker("waiting", *RUNS, *storage)
     tries = "select count(*) from pg_stat_activity where query like '%pg_try_advisory_lock%' and state = 'idle'"
     wait_until(lambda: database.sql(tries) != [["0"]])
-    waiting.send_signal(number)
+    os.kill(waiting.pid or 0, number)
     code, out = end(waiting)
     assert (code, "the same command goes on from here" in out) == (130, True), out
     assert not Path("waiting.txt").exists()
@@ -147,11 +175,9 @@ def test_nothing_that_is_printed_or_kept_has_the_password(database: Database, st
     words = ("--runs", "8", "--sweep", "--storage")
     code, out = end(worker("in", *words, database.address_of("locked:se%2Fc%40ret")))
     assert code == 1, out
-    environment = {**os.environ, "PGPASSWORD": "wrong"}
-    command = [sys.executable, "-m", "dodo_dsl", "search", "example", *words, database.address_of("locked")]
-    refused = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert refused.returncode == 3 and "password authentication failed" in refused.stderr
+    code, refused = end(worker("refused", *words, database.address_of("locked"), password="wrong"))
+    assert code == 3 and "password authentication failed" in refused
     kept = [path.read_bytes() for path in Path().rglob("*") if path.is_file()]
     for secret in ("se%2Fc", "se/c"):
         assert secret not in out and not any(secret.encode() in content for content in kept)
-    assert "wrong" not in refused.stdout + refused.stderr
+    assert "wrong" not in refused

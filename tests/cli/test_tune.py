@@ -1,6 +1,5 @@
 """``dodo tune`` with drives whose margin follows from the application's variables."""
 
-import asyncio
 import json
 import os
 import shutil
@@ -15,13 +14,12 @@ from typing import Any
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.tune import command
 from dodo_dsl.margins import with_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
 from tests.check import examples
-from tests.run import scripted
-from tests.run.scripted import Events, ScriptedBackend, ScriptedBackends
+from tests.run.scripted import Events, ScriptedBackend
+from tests.search.scripted_drives import scripted_commands
 
 SPEC = """\
 vary:
@@ -108,18 +106,10 @@ def result(report: str = "report") -> dict[str, Any]:
 
 
 @pytest.fixture
-def tune(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Tune]:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    monkeypatch.setenv("DODO_HISTORY", str(tmp_path / "history.jsonl"))
-    examples.write(SPEC, tmp_path)
+def tune(tmp_path: Path) -> Iterator[Tune]:
     made = Tune()
-    monkeypatch.setattr(asyncio, "run", scripted.run)
-    monkeypatch.setattr(command, "Processes", lambda *_: ScriptedBackends(made.backend))
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield made
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    with scripted_commands(tmp_path, SPEC, made.backend):
+        yield made
 
 
 @pytest.mark.thorough

@@ -1,6 +1,5 @@
 """``dodo search`` with drives whose end follows from their values."""
 
-import asyncio
 import json
 import os
 import re
@@ -18,15 +17,13 @@ import pytest
 from dodo_dsl import advice, compiler
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.search import command
-from dodo_dsl.cli.search.drives import Drives
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.search import itinerary
-from dodo_dsl.search.itinerary import FIRST
+from dodo_dsl.search import sampling_order
+from dodo_dsl.search.drives import Limits
+from dodo_dsl.search.sampling_order import FIRST
 from tests.check import examples
-from tests.cli.search.drives import LIMIT, SPEC, stages, start_of
-from tests.run import scripted
-from tests.run.scripted import ScriptedBackend, ScriptedBackends
+from tests.run.scripted import ScriptedBackend
+from tests.search.scripted_drives import LIMIT, SPEC, scripted_commands, stages, start_of
 
 
 @dataclass
@@ -62,18 +59,10 @@ def result(report: str = "report") -> dict[str, Any]:
 
 
 @pytest.fixture
-def search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Search]:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    monkeypatch.setenv("DODO_HISTORY", str(tmp_path / "history.jsonl"))
-    examples.write(SPEC, tmp_path)
+def search(tmp_path: Path) -> Iterator[Search]:
     made = Search()
-    monkeypatch.setattr(asyncio, "run", scripted.run)
-    monkeypatch.setattr(command, "Processes", lambda *_: ScriptedBackends(made.backend))
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield made
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    with scripted_commands(tmp_path, SPEC, made.backend):
+        yield made
 
 
 def test_the_result_is_that_of_the_values_driven(search: Search) -> None:
@@ -170,17 +159,20 @@ def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
     assert len(search.driven) == 17 + len(twice)
 
 
-@pytest.mark.parametrize("ends_at", [7, 15], ids=["while it sweeps", "while it proposes"])
-def test_an_interrupted_search_goes_on_to_the_same_result(search: Search, ends_at: int) -> None:
-    search("example", "--runs", "18", "-j", "1", report="whole")
-    whole = set(search.driven)
-    search.ends_at = ends_at
-    code, out = search("example", "--runs", "18", "-j", "1")
-    assert code == 130
-    assert "the same command goes on" in out
-    before = set(search.driven)
+def test_an_interrupted_search_goes_on_to_the_same_result(search: Search) -> None:
+    """It is interrupted while it sweeps, and again while it drives what the optimiser proposed."""
+    words = ("example", "--runs", "16", "-j", "1")
+    search(*words, report="whole")
+    whole, before = set(search.driven), set[str]()
+    for ends_at in (7, 11):
+        search.ends_at = ends_at
+        code, out = search(*words)
+        assert (code, "the same command goes on" in out) == (130, True)
+        assert len(before & set(search.driven)) <= 1
+        before |= set(search.driven)
+    assert "example--run-14" in before
     search.ends_at = None
-    assert search("example", "--runs", "18", "-j", "1")[0] == 1
+    assert search(*words)[0] == 1
     assert result() == result("whole")
     assert before | set(search.driven) == whole
     assert len(before & set(search.driven)) <= 1
@@ -201,7 +193,7 @@ def test_what_a_killed_search_left_of_a_drive_is_gone_when_it_drives_again(searc
 def test_a_search_is_interrupted_between_drives_too(
     search: Search, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
-    monkeypatch.setattr(itinerary, "propose", lambda *_: os.kill(os.getpid(), number))
+    monkeypatch.setattr(sampling_order, "propose", lambda *_: os.kill(os.getpid(), number))
     code, out = search("example", "--runs", "18")
     assert (code, "the same command goes on" in out, len(set(search.driven))) == (130, True, FIRST + 1)
 
@@ -226,6 +218,13 @@ def test_more_runs_continue_the_sweep(search: Search) -> None:
     assert len(set(search.driven)) == 5
     search("example", "--runs", "9", "--sweep", report="whole")
     assert result() == result("whole")
+
+
+def test_a_round_on_the_host_has_no_more_drives_than_there_are_cids(search: Search) -> None:
+    with Path("dodo.yml").open("a") as deployment:
+        deployment.write("cids: 130-132\n")
+    code, out = search("example", "--runs", "5", "--sweep", "-j", "1")
+    assert (code in (0, 1), len(set(search.driven))) == (True, 6), out
 
 
 def test_another_seed_is_another_search(search: Search) -> None:
@@ -253,7 +252,7 @@ def test_a_search_goes_on_in_another_folder(search: Search, tmp_path: Path, monk
 
 
 def test_a_search_by_time_begins_no_drive_after_it(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Drives, "is_over", property(lambda _: len(search.driven) >= 5))
+    monkeypatch.setattr(Limits, "are_reached", property(lambda _: len(search.driven) >= 5))
     code, _ = search("example", "--minutes", "60", "-j", "1")
     assert (code in (0, 1), len(search.driven)) == (True, 5)
     assert result()["nominal"]["outcome"] == "passed"

@@ -5,13 +5,15 @@ depends on nothing but the seed and what earlier drives said, so that it is the 
 """
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dodo_dsl.search.optimiser import Tried, propose
 from dodo_dsl.search.space import Space, sweep, texts
 from dodo_dsl.spec.instances.vary import Values
 
+Margins = dict[tuple[str, ...], float | None]
+"""The margin of drives by the texts of their values, None for one in error."""
 FIRST, SWEPT, PROPOSED = 8, 4, 4
 """Drives of the sweep before the first proposals, and those of each later generation."""
 PATIENCE = 12
@@ -29,8 +31,12 @@ class Candidate:
     swept: bool
 
 
+Judge = Callable[[Sequence[Candidate], Margins], Awaitable[bool]]
+"""Drives candidates and adds their margins; says whether to go on."""
+
+
 @dataclass(frozen=True)
-class Itinerary:
+class SamplingOrder:
     """``runs`` drives in a space; ``proposes`` is whether the optimiser takes part.
 
     With ``seeks_best`` it looks for the least margin alone, as a tuning does with negative ones, and not for failures
@@ -44,11 +50,19 @@ class Itinerary:
     seeks_best: bool = False
     swept: int = SWEPT
 
+    async def follow(self, judge: Judge, most: int | None = None) -> None:
+        """Has all candidates judged, up to ``most`` of a generation at once, or as far as ``judge`` goes on."""
+        margins: Margins = {}
+        for generation in self.generations(margins):
+            size = most or len(generation)
+            for begin in range(0, len(generation), size):
+                if not await judge(generation[begin : begin + size], margins):
+                    return
+
     def generations(self, margins: Mapping[tuple[str, ...], float | None]) -> Iterator[list[Candidate]]:
         """Candidates to be driven before the next ones are asked for; ``margins`` grows meanwhile.
 
-        It has the margin of drives by the texts of their values, None for one in error. Raises KeyError for values
-        that were not driven.
+        Raises KeyError for values that were not driven.
         """
         points = sweep(self.space, self.runs, self.seed)
         done: list[Candidate] = []

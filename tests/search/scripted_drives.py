@@ -1,9 +1,21 @@
 """A test whose drives end as their values say, without processes."""
 
+import asyncio
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.cli import search_session
 from dodo_dsl.margins import with_margin
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.load import shortage
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
-from tests.run.scripted import Events
+from tests.check import examples
+from tests.run import scripted
+from tests.run.scripted import Events, ScriptedBackend, ScriptedBackends
 
 SPEC = """\
 vary:
@@ -48,3 +60,31 @@ def stages(plan: Plan, limit: float = LIMIT) -> dict[str, Events]:
     check = with_margin({"name": "start", "value": start, "limit": {"max": limit}, "unit": "m", "ok": ok})
     reason = "it drove" if ok else f"hit wall {wall_of(plan)} after {start:.3f} m"
     return {**ready, "begin": [(0.0, VerdictEvent("track", ok, reason, (check,))), (0.0, Exited("track", 0))]}
+
+
+@contextmanager
+def repository(folder: Path, spec: str) -> Iterator[pytest.MonkeyPatch]:
+    """A folder with a test, from which commands are called."""
+    examples.write(spec, folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setenv("DODO_LEASES", str(folder / "leases"))
+        patch.setenv("DODO_HISTORY", str(folder / "history.jsonl"))
+        yield patch
+
+
+@contextmanager
+def scripted_commands(folder: Path, spec: str, make: Callable[[Plan, int], ScriptedBackend]) -> Iterator[None]:
+    """In a repository, ``dodo search`` and ``dodo tune`` drive by backends that ``make`` makes."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    with repository(folder, spec) as patch:
+        stub(patch, make)
+        yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def stub(patch: pytest.MonkeyPatch, make: Callable[[Plan, int], ScriptedBackend]) -> None:
+    patch.setattr(asyncio, "run", scripted.run)
+    patch.setattr(search_session, "Processes", lambda *_: ScriptedBackends(make))
+    patch.setattr(shortage, "used_up", lambda *_: shortage.Shortage())  # it looks at all processes of the machine

@@ -1,13 +1,11 @@
 """dodo search: look for the conditions under which the application fails a test."""
 
 import argparse
-import asyncio
 import time
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
-from typing import TextIO, cast
+from typing import TextIO
 
 from dodo_dsl import atomic, package_data
 from dodo_dsl.cli import selection
@@ -15,24 +13,17 @@ from dodo_dsl.cli.errors import UsageError, require_extra
 from dodo_dsl.cli.exits import Exit
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.run.forecast import expectation
-from dodo_dsl.cli.run.loading import Loading, loading
-from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors, undisturbed
-from dodo_dsl.cli.search.course import Course
-from dodo_dsl.cli.search.drives import Drives, Interrupted, Kept, end_like_interrupt
-from dodo_dsl.cli.search.progress import SearchProgress
-from dodo_dsl.cli.search.shrinking import Shrinker
-from dodo_dsl.cli.search.study import Study, study_of
-from dodo_dsl.cli.search.text import lines
-from dodo_dsl.run.backends import Processes
-from dodo_dsl.run.schedule import schedule
-from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.cli.run.uninterrupted import undisturbed
+from dodo_dsl.cli.search_session import INTERRUPTED, Session, session
 from dodo_dsl.search import postgres
-from dodo_dsl.search.findings import Findings, document, failures_of, find
-from dodo_dsl.search.itinerary import Itinerary
+from dodo_dsl.search.drives import Limits
+from dodo_dsl.search.findings import Findings, document, failures_of, lines
 from dodo_dsl.search.postgres import MAIN
-from dodo_dsl.search.space import nominal, texts
+from dodo_dsl.search.sampling_order import SamplingOrder
+from dodo_dsl.search.search_loop import SearchLoop
+from dodo_dsl.search.shrinking import Shrinker
 from dodo_dsl.search.store import Store, opened
+from dodo_dsl.search.study import Study, refuse_search, search_study
 from dodo_dsl.terminal import json_text
 
 EXAMPLES = """examples:
@@ -98,27 +89,30 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         raise UsageError("--study names a search in a database: name that with --storage")
     if options.storage is not None:
         require_extra("--storage", "storage")
-    end_like_interrupt()
-    more_descriptors()
-    stdout = cast(TextIO, UninterruptedStream(stdout))
-    reap_folders()
-    options.backend = "process"
-    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
-        study = study_of(options, folder.path, stdout)
+    with session(options, stdout) as own:
+        study = _study(own)
         report = options.report.resolve() / "search" / study.test.spec.slug
         with _store(options, study, report) as store:
-            findings, interrupted = _search(options, study, store, folder.path, report, load, stdout)
+            findings, interrupted = _search(own, study, store, report)
     with undisturbed():
         atomic.write_text(report / FILE_NAME, json_text(document(findings)))
-    stdout.writelines(f"{line}\n" for line in lines(findings))
-    stdout.write(f"search: {options.report / 'search' / study.test.spec.slug / FILE_NAME}\n")
+    own.stdout.writelines(f"{line}\n" for line in lines(findings))
+    own.stdout.write(f"search: {options.report / 'search' / study.test.spec.slug / FILE_NAME}\n")
     if interrupted:
-        stdout.write("interrupted: the same command goes on from here\n")
+        own.stdout.write(INTERRUPTED)
         return Exit.INTERRUPTED
     if not findings.judged:
         return Exit.ERROR
     fails_at_nominal = findings.nominal is not None and findings.nominal.outcome == "failed"
     return Exit.PROBLEMS if findings.failures or fails_at_nominal else Exit.OK
+
+
+def _study(own: Session) -> Study:
+    """The study of the options; raises UsageError and NotSearchable where the test cannot be searched."""
+    checked = own.selected([own.options.test])
+    if checked.ok:
+        refuse_search(own.options.test, checked.tests)
+    return search_study(checked, own.compiled(checked), own.work, own.options.seed)
 
 
 def _store(options: argparse.Namespace, study: Study, report: Path) -> AbstractContextManager[Store]:
@@ -127,24 +121,17 @@ def _store(options: argparse.Namespace, study: Study, report: Path) -> AbstractC
     return postgres.opened(options.storage, options.study or MAIN, study.test.spec.slug, study.key)
 
 
-def _search(
-    options: argparse.Namespace, study: Study, store: Store, work: Path, report: Path, load: Loading, stdout: TextIO
-) -> tuple[Findings, bool]:
+def _search(own: Session, study: Study, store: Store, report: Path) -> tuple[Findings, bool]:
     """What was found, and whether an interrupt ended it."""
+    options, deadline = own.options, _deadline(own.options)
     runs = min(options.runs or (_MOST_BY_TIME if options.minutes else _RUNS), _MOST_RUNS)
-    course = Course(Itinerary(study.space, runs, options.seed, not options.sweep), store, options.until_failure)
-    deployment = study.checked.deployment
-    backends = Kept(Processes(deployment.cids, options.isolation, (load.descriptor,), [deployment.root], load.take))
-    order = schedule(options.jobs, expectation(backends.name))
-    deadline = _deadline(options)
-    with _shown(stdout, runs + 1 if options.runs or not deadline else None, deadline) as progress:
-        drives = Drives(study.checked, study.test.spec, store, backends, order, progress, work, report, deadline)
-        shrinker = Shrinker(drives, study.space, runs + 1, _registry(study) if options.save else None)
-        interrupted = asyncio.run(_follow(course, shrinker, backends))
-    at_nominal = store.get(texts(nominal(study.space)))
-    swept, proposed = course.known(True), course.known(False)
-    findings = find(study.test.spec.title, options.seed, study.space, at_nominal, swept, proposed)
-    return replace(findings, ended_early=course.ended_early, shrunk=tuple(shrinker.found)), interrupted
+    order = SamplingOrder(study.space, runs, options.seed, not options.sweep)
+    total = runs + 1 if options.runs or not deadline else None
+    with own.drives(study, store, report / "drives", Limits(deadline), total) as drives:
+        loop = SearchLoop(study.test.spec, order, drives, options.until_failure)
+        shrinker = Shrinker(study, drives, report, runs + 1, _registry(study) if options.save else None)
+        end = drives.run(_follow(loop, shrinker))
+    return replace(loop.findings(), shrunk=tuple(shrinker.found)), end is not None
 
 
 def _deadline(options: argparse.Namespace) -> float | None:
@@ -161,23 +148,7 @@ def _registry(study: Study) -> Path:
     return root
 
 
-async def _follow(course: Course, shrinker: Shrinker, backends: Kept) -> bool:
-    """Whether it was interrupted."""
-    try:
-        await course.follow(shrinker.drives)
-        failed = course.failed() if course.itinerary.proposes else []
-        await shrinker.shrink(failures_of([drive for _, drive in failed]), failed)
-    except (Interrupted, KeyboardInterrupt):
-        return True
-    finally:
-        backends.end()
-    return False
-
-
-@contextmanager
-def _shown(stream: TextIO, total: int | None, deadline: float | None) -> Iterator[SearchProgress]:
-    progress = SearchProgress(stream, total, deadline)
-    try:
-        yield progress
-    finally:
-        progress.close()
+async def _follow(loop: SearchLoop, shrinker: Shrinker) -> None:
+    await loop.follow()
+    failed = loop.failed() if loop.order.proposes else []
+    await shrinker.shrink(failures_of([drive for _, drive in failed]), failed)

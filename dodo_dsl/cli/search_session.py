@@ -1,0 +1,189 @@
+"""What ``dodo search`` and ``dodo tune`` share: how they begin, what their drives need, and live progress."""
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self, TextIO, cast
+
+from dodo_dsl import compiler
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.display.colours import write_diagnostics
+from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
+from dodo_dsl.cli.run.forecast import expectation
+from dodo_dsl.cli.run.loading import Loading, loading
+from dodo_dsl.cli.run.progress import about, count
+from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors
+from dodo_dsl.diagnostics import has_errors, ordered, told_once
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.run.backends import Processes
+from dodo_dsl.run.rigs.attendance import RigSession
+from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.standing import Standing
+from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.search.drives import Drives, KeptBackends, Limits, Machine, end_like_interrupt
+from dodo_dsl.search.store import Drive, Store
+from dodo_dsl.search.study import Study
+from dodo_dsl.spec.registry import SUFFIX
+from dodo_dsl.spec.settings import Settings
+from dodo_dsl.terminal import printable, unescaped
+
+INTERRUPTED = "interrupted: the same command goes on from here\n"
+
+
+@dataclass(frozen=True)
+class Session:
+    """One command; ``work`` takes what it compiles, and ``stdout`` may lose its reader."""
+
+    options: argparse.Namespace
+    stdout: TextIO
+    work: Path
+    load: Loading
+
+    def selected(self, words: Sequence[str]) -> compiler.Checked:
+        """The tests that the words mean."""
+        options = self.options
+        return selection.select(words, (), options.application, Settings("lockstep", options.isolation))
+
+    def compiled(self, checked: compiler.Checked) -> compiler.Compilation:
+        """The tests at their nominal values, with their problems shown; raises UsageError where some are errors."""
+        try:
+            made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
+        except compiler.NoApplication:
+            raise UsageError(NO_APPLICATION) from None
+        problems = ordered([*checked.diagnostics, *(made.problems if made else ())])
+        write_diagnostics(self.stdout, told_once(problems, SUFFIX))
+        if made is None or has_errors(problems):
+            raise UsageError("the above cannot be compiled")
+        return made
+
+    @contextmanager
+    def drives(self, study: Study, store: Store, folder: Path, limits: Limits, total: int | None) -> Iterator[Drives]:
+        """Drives by processes, with progress of ``total`` of them, None where time ends them."""
+        progress = SearchProgress(self.stdout, total, limits.deadline)
+        try:
+            yield Drives(study.checked, store, self._machine(study), progress, folder, limits)
+        finally:
+            progress.close()
+
+    def _machine(self, study: Study) -> Machine:
+        deployment, options, rigs = study.checked.deployment, self.options, RigSession()
+        descriptors, roots = (self.load.descriptor,), [deployment.root]
+        processes = Processes(deployment.cids, options.isolation, descriptors, roots, self.load.take, rigs)
+        return Machine(KeptBackends(processes), schedule(options.jobs, expectation(processes.name)), self.work, rigs)
+
+
+@contextmanager
+def session(options: argparse.Namespace, stdout: TextIO) -> Iterator[Session]:
+    end_like_interrupt()
+    more_descriptors()
+    reap_folders()
+    options.backend = "process"
+    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
+        yield Session(options, cast(TextIO, UninterruptedStream(stdout)), folder.path, load)
+
+
+class SearchProgress:
+    """Shows each drive in a line, or in one that moves on a terminal.
+
+    ``total`` drives are wanted; without it the search ends by time, at ``deadline`` of the monotonic clock.
+    """
+
+    def __init__(self, stream: TextIO, total: int | None, deadline: float | None) -> None:
+        self._stream, self._total, self._deadline = stream, total, deadline
+        self._start = time.monotonic()
+        self._done = self._driven = self._failed = 0
+        self._shrinks = False
+        self._worst: float | None = None
+        self._status = _status(stream) if stream.isatty() else None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Goes on with the next round."""
+
+    def close(self) -> None:
+        if self._status is not None:
+            self._status.stop()
+        self._stream.flush()
+
+    def note(self, text: str) -> None:
+        self._stream.write(f"{printable(text)}\n")
+        self._stream.flush()
+
+    def phase(self, slug: str, text: str) -> None:
+        """Phases of single drives are not shown."""
+
+    def standing(self, slug: str, standing: Standing) -> None:
+        """How far a drive is is not shown."""
+
+    def rest(self, seconds: float, tests: int) -> None:
+        """The rest of a round is not shown."""
+
+    def done(self, outcome: Outcome) -> None:
+        """What becomes a drive is shown as one."""
+
+    def driven(self, drive: Drive, repeat: int) -> None:
+        """Counts and shows a drive of this command."""
+        self._driven += 1
+        self.count(drive, repeat)
+        self._show(drive)
+
+    def count(self, drive: Drive, repeat: int = 1) -> None:
+        """Counts a drive, also one of an earlier command; one that repeats another is no further failure."""
+        if repeat > 1 and not self._shrinks:
+            self._total = self._total and self._total + 1
+        self._done += 1
+        self._failed += drive.outcome == "failed" and repeat == 1
+        if drive.margin is not None:
+            self._worst = drive.margin if self._worst is None else min(self._worst, drive.margin)
+
+    def count_other(self, drive: Drive) -> None:
+        """Counts a drive that another worker made meanwhile."""
+        self._driven += 1
+        self.count(drive)
+
+    def begin_shrinking(self, failures: int, most: int) -> None:
+        """From now on, ``most`` drives at most shrink failures."""
+        self._done, self._total, self._deadline, self._shrinks = 0, most, None, True
+        time = f", {about(self._left())}" if self._driven else ""
+        self.note(f"shrinking {count(failures, 'failure')}: up to {most} drives{time}; --sweep leaves it out")
+
+    def expect(self, most: int) -> None:
+        """``most`` further drives at most are left."""
+        self._total = self._done + most
+
+    def _show(self, drive: Drive) -> None:
+        of = "" if not self._total else f" of up to {self._total}" if self._shrinks else f" of {self._total}"
+        left = f", {about(self._left())} to go" if self._total or self._deadline else ""
+        if self._shrinks:
+            line = f"{self._done}{of} drives of shrinking{left.replace('about', 'up to')}"
+        else:
+            worst = "" if self._worst is None else f", worst margin {self._worst:.3f}"
+            line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}{left}"
+        if self._status is not None:
+            self._status.update(line)
+        else:
+            now = time.monotonic() - self._start
+            shown = "" if drive.margin is None else f", margin {drive.margin:.3f}"
+            self.note(f"[{now:6.1f} s] {drive.outcome}{shown}; {line}")
+
+    def _left(self) -> float:
+        now = time.monotonic()
+        by_time = None if self._deadline is None else max(self._deadline - now, 0.0)
+        if self._total is None:
+            return by_time or 0.0
+        by_number = (now - self._start) / max(self._driven, 1) * max(self._total - self._done, 0)
+        return by_number if by_time is None else min(by_number, by_time)
+
+
+def _status(stream: TextIO) -> Any:
+    from rich.console import Console
+    from rich.status import Status
+
+    status = Status("starting", console=Console(file=unescaped(stream)))
+    status.start()
+    return status

@@ -1,0 +1,122 @@
+"""dodo tune: find values of the application's parameters with which it passes by more."""
+
+import argparse
+import math
+import time
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl import atomic
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.errors import require_extra
+from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.numbers import minutes, positive, seed
+from dodo_dsl.cli.report import REPORT
+from dodo_dsl.cli.run.uninterrupted import undisturbed
+from dodo_dsl.cli.search_session import INTERRUPTED, Session, session
+from dodo_dsl.search.drives import Limits, RigFailure
+from dodo_dsl.search.store import Store, opened
+from dodo_dsl.search.study import Study, tune_study
+from dodo_dsl.search.tuning import Scenarios, Tuning, document, env, scenarios, table, tuning_order
+from dodo_dsl.terminal import json_text, printable
+
+EXAMPLES = """examples:
+  dodo tune sil-my-drive                        50 choices of the application's parameters
+  dodo tune 'sil-*' --mean --minutes 30         the best mean over several tests, in half an hour
+  dodo tune sil-my-drive --samples 8            also at 8 samples of the test's ranges, 'vary'
+  dodo tune hil-my-drive --minutes 20 --metres 50    on its rig, which drives 50 m at most
+
+The same command again goes on where an earlier one was interrupted, or with more runs.
+
+exit codes: 0 the best values pass, 1 they fail, 2 wrong usage or spec, 3 not even the defaults were driven, or a rig
+failed, 130 interrupted
+"""
+
+FOLDER, STORE, RESULT, VALUES = "tune", "tune.sqlite", "tune.json", "best.env"
+_RUNS = 50
+_MOST_RUNS = 1 << 14
+_RIG_MINUTES, _RIG_METRES = 30.0, 100.0
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tests", metavar="TEST", nargs="+", help="name, pattern or path of tests")
+    parser.add_argument(
+        "--runs", type=positive, metavar="N",
+        help=f"choices of values, each driven in all tests and samples (default: {_RUNS}, unless --minutes is given)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--minutes", type=minutes, metavar="M",
+        help=f"tune no longer than that; held-out samples follow (default on a rig: {_RIG_MINUTES:g})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--metres", type=positive, metavar="M",
+        help=f"a rig drives no longer way than that, with 2.4 m for each way to its start (default: {_RIG_METRES:g})",
+    )  # fmt: skip
+    parser.add_argument("--mean", action="store_true", help="the mean margin counts, not the worst one")
+    parser.add_argument(
+        "--samples", type=positive, default=0, metavar="N",
+        help="drive each test at N samples of its ranges, too; N others decide among the best, N more judge the result",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of values and samples (default: 0)")
+    parser.add_argument(
+        "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
+    )
+    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the specs' isolation")
+    parser.add_argument(
+        "--report", type=Path, default=REPORT, metavar="DIR",
+        help="the result is kept in DIR/tune (default: dodo-report)",
+    )  # fmt: skip
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    require_extra("this", "search")
+    report = options.report.resolve() / FOLDER
+    with session(options, stdout) as own:
+        checked = own.selected(options.tests)
+        study = tune_study(checked, own.compiled(checked), own.work, options.samples)
+        with opened(report, study.key, STORE) as store:
+            tuning, end = _tune(own, study, store, report)
+            if tuning.done:
+                _write(tuning, report, own.stdout)
+    if tuning.done:
+        own.stdout.write(f"values: {options.report / FOLDER / VALUES}\n")
+    if isinstance(end, RigFailure):
+        own.stdout.write(printable(f"the rig failed: {end}; the same command goes on from here") + "\n")
+        return Exit.ERROR
+    if end is not None:
+        own.stdout.write(INTERRUPTED)
+        return Exit.INTERRUPTED
+    if not tuning.done:
+        return Exit.ERROR
+    return Exit.PROBLEMS if tuning.best.margin < 0 else Exit.OK
+
+
+def _tune(own: Session, study: Study, store: Store, report: Path) -> tuple[Tuning, BaseException | None]:
+    """The tuning, and what ended it early: an interrupt, or a rig."""
+    options = own.options
+    runs = min(options.runs or (_MOST_RUNS if options.minutes else _RUNS), _MOST_RUNS)
+    driven = scenarios(study.checked.tests, options.samples, options.seed)
+    limits = _limits(own, driven)
+    total = driven.most_drives(runs) if options.runs or not limits.deadline else None
+    with own.drives(study, store, report / "drives", limits, total) as drives:
+        tuning = Tuning(driven, tuning_order(study.space, runs, options.seed), drives, options.mean)
+        return tuning, drives.run(tuning.follow())
+
+
+def _limits(own: Session, driven: Scenarios) -> Limits:
+    options = own.options
+    if driven.rigs:
+        options.minutes = options.minutes or _RIG_MINUTES
+        options.metres = options.metres or _RIG_METRES
+        said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of way"
+        own.stdout.write(printable(said) + "\n")
+    deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
+    return Limits(deadline, options.metres or math.inf)
+
+
+def _write(tuning: Tuning, report: Path, stdout: TextIO) -> None:
+    with undisturbed():
+        atomic.write_text(report / RESULT, json_text(document(tuning)))
+        atomic.write_text(report / VALUES, env(tuning))
+    stdout.writelines(f"{line}\n" for line in table(tuning))

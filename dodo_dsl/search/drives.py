@@ -1,0 +1,301 @@
+"""Drives of a search or a tuning: points compiled as tests and run in rounds, those of the store only once."""
+
+import asyncio
+import itertools
+import math
+import re
+import shutil
+import signal
+import time
+from collections.abc import Coroutine, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from dodo_dsl import compiler
+from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.diagnostics import format_text, has_errors
+from dodo_dsl.emit.output_folder import write
+from dodo_dsl.margins import failed_checks, worst_margin
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.backends import Backends, Job, Say
+from dodo_dsl.run.protocol import Backend
+from dodo_dsl.run.rigs.attendance import RigSession
+from dodo_dsl.run.runner import Policy, Progress, Runner
+from dodo_dsl.run.schedule import Schedule
+from dodo_dsl.search.space import texts
+from dodo_dsl.search.store import Drive, Store, point_text
+from dodo_dsl.search.study import NotSearchable
+from dodo_dsl.source import Entry
+from dodo_dsl.spec.instances.vary import Values
+from dodo_dsl.spec.model import Spec
+
+_ROUND = 8
+"""Drives a core in a round, so that cores hardly wait for its last one; one where time or workers share the drives."""
+_WINDOW = 256
+"""Points that are looked at for the next round, more than workers could drive at once."""
+_REPEAT = "#"
+"""No name of a range."""
+_RETRIES = 1
+"""A drive that ended in error is driven once more, and left out when it does so again."""
+_DISTANCE, _FASTEST, _TO_START = ("distance", "m"), 1.0, 2.4
+"""The check of how far a vehicle drove, the highest speed of a rig, in m/s, and the way across its table, in m."""
+_NUMBERED = re.compile(rf"--{compiler.RUN}-([0-9]{{1,9}})$")
+
+
+class Interrupted(Exception):
+    """Ctrl-C or a signal ended the drives; everything until then is kept."""
+
+
+class RigFailure(Exception):
+    """A test on a rig ended in error, which says nothing of the values; one sentence."""
+
+
+class DriveProgress(Progress, Protocol):
+    """Shows how drives go on; ``repeat`` is 1 for the first one at its values."""
+
+    def driven(self, drive: Drive, repeat: int) -> None:
+        """One has ended."""
+
+    def count(self, drive: Drive, repeat: int = 1) -> None:
+        """One is known from an earlier command."""
+
+    def count_other(self, drive: Drive) -> None:
+        """Another worker made one meanwhile."""
+
+    def begin_shrinking(self, failures: int, most: int) -> None:
+        """From now on, ``most`` drives at most shrink failures."""
+
+    def expect(self, most: int) -> None:
+        """``most`` further drives at most are left."""
+
+
+class KeptBackends:
+    """Backends for several rounds: prepared before the first one, and closed by ``end``."""
+
+    def __init__(self, backends: Backends) -> None:
+        self._backends = backends
+        self.name = backends.name
+        self._is_prepared = False
+        self.opened = 0
+        """How many attempts at tests began."""
+
+    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
+        if not self._is_prepared:
+            self._is_prepared = True
+            await self._backends.prepare(plans, note)
+
+    def close(self) -> None:
+        """The next round needs them."""
+
+    def end(self) -> None:
+        self._backends.close()
+
+    def open(self, job: Job, say: Say, keep: bool) -> AbstractAsyncContextManager[Backend]:
+        self.opened += 1
+        return self._backends.open(job, say, keep)
+
+
+def end_like_interrupt() -> None:
+    """SIGTERM and SIGHUP end the drives as Ctrl-C does, and that at once: asyncio would only cancel its task."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A test at values of its ranges, none for one without ranges, with ``variables`` for its application.
+
+    ``name`` names its drive in the store; with ``repeat`` it is driven again at the same values.
+    """
+
+    spec: Spec
+    values: Values
+    name: Mapping[str, str]
+    variables: Values = field(default_factory=dict)
+    repeat: int = 1
+
+
+def point_at(spec: Spec, values: Values, repeat: int = 1) -> Point:
+    """The point of a search."""
+    return Point(spec, values, drive_name(values, repeat), repeat=repeat)
+
+
+def drive_name(values: Values, repeat: int = 1) -> dict[str, str]:
+    """What names a drive of a search: its values, and from the second one on its number among those at them."""
+    return texts(values) | ({_REPEAT: str(repeat)} if repeat > 1 else {})
+
+
+@dataclass
+class Machine:
+    """Where drives run: ``work`` takes compiled tests, and ``session`` spares rigs that stay fit their checks."""
+
+    backends: KeptBackends
+    order: Schedule
+    work: Path
+    session: RigSession = field(default_factory=RigSession)
+
+
+@dataclass
+class Limits:
+    """No drive begins after ``deadline`` of the monotonic clock, or when rigs drove ``metres`` of ``way``."""
+
+    deadline: float | None = None
+    metres: float = math.inf
+    way: float = 0.0
+
+    @property
+    def are_reached(self) -> bool:
+        return self.way >= self.metres or (self.deadline is not None and time.monotonic() >= self.deadline)
+
+
+@dataclass
+class Drives:
+    """Drives points, on rigs one after the other. ``folder`` takes what drives that did not pass say."""
+
+    checked: compiler.Checked
+    store: Store
+    machine: Machine
+    progress: DriveProgress
+    folder: Path
+    limits: Limits
+    _counted: set[str] = field(default_factory=set)
+    _free: int = 0
+
+    def run(self, work: Coroutine[Any, Any, None]) -> BaseException | None:
+        """Does work that drives, and closes the backends. What ended it early, an interrupt or a rig; else None."""
+        return asyncio.run(self._ended_by(work))
+
+    async def _ended_by(self, work: Coroutine[Any, Any, None]) -> BaseException | None:
+        try:
+            await work
+        except (Interrupted, KeyboardInterrupt, RigFailure) as end:
+            return end
+        finally:
+            self.machine.backends.end()
+        return None
+
+    async def drive(self, points: Sequence[Point], first: int | None = None) -> None:
+        """Drives the points, as far as the limits allow; those with the same name share a drive.
+
+        They are numbered from ``first`` on, else those that are not known by numbers that are free in the folder.
+        Raises Interrupted and RigFailure.
+        """
+        missing: dict[int, Point] = {}
+        known = self.store.known([point.name for point in points])
+        for number, (point, drive) in enumerate(zip(points, known, strict=True), first or 0):
+            name = point_text(point.name)
+            if name in self._counted:
+                continue
+            self._counted.add(name)
+            if drive:
+                self.progress.count(drive, point.repeat)
+            else:
+                missing[number] = point
+        if first is None:
+            missing = self._renumbered(missing)
+        size = self._size(points)
+        while missing and not self.limits.are_reached:
+            if claimed := self._claimed(missing, size):
+                await self._round(claimed)
+            elif missing:
+                end_like_interrupt()
+                self.store.wait()
+
+    def _renumbered(self, points: dict[int, Point]) -> dict[int, Point]:
+        """By the next free numbers: drives of an earlier call that did not pass, or that was killed, keep theirs."""
+        names = [path.name for path in self.folder.iterdir()] if self.folder.is_dir() else []
+        numbers = [int(found[1]) for name in names if (found := _NUMBERED.search(name))]
+        first = max(self._free, *(number + 1 for number in numbers)) if numbers else self._free
+        self._free = first + len(points)
+        return dict(enumerate(points.values(), first))
+
+    def _size(self, points: Sequence[Point]) -> int:
+        """How many drives a round has."""
+        if any(point.spec.rig for point in points):
+            return 1
+        is_long = self.limits.deadline is None and not self.store.is_shared
+        size = max(1, int(self.machine.order.capacity)) * (_ROUND if is_long else 1)
+        on_host = any(point.spec.isolation == "host" for point in points)
+        return min(size, len(self.checked.deployment.cids)) if on_host else size
+
+    def _claimed(self, missing: dict[int, Point], most: int) -> dict[int, Point]:
+        """Takes up to ``most`` of the first points out of ``missing``, and those that others have driven."""
+        first = dict(itertools.islice(missing.items(), max(most, _WINDOW)))
+        if self.store.is_shared:
+            known = self.store.known([point.name for point in first.values()])
+            for number, drive in zip(list(first), known, strict=True):
+                if drive:
+                    self.progress.count_other(drive)
+                    del missing[number], first[number]
+        claimed: dict[int, Point] = {}
+        for number, point in first.items():
+            if len(claimed) == most:
+                break
+            if self.store.claim(point.name):
+                claimed[number] = missing.pop(number)
+        return claimed
+
+    async def _round(self, points: dict[int, Point]) -> None:
+        folder = self.machine.work / f"round-{min(points)}"
+        jobs = self._jobs(points, folder)
+        for job in jobs.values():
+            shutil.rmtree(job.report, ignore_errors=True)  # what a killed command left of the same drive
+        by_slug = {job.plan.slug: number for number, job in jobs.items()}
+        runner = Runner(self.progress, self.machine.backends, self.machine.order, Policy(retries=_RETRIES))
+        failures: list[str] = []
+        before = self.machine.backends.opened
+
+        def take(job: Job, outcome: Outcome) -> None:
+            if runner.interrupted:
+                return
+            if job.plan.rig:
+                self.limits.way += (self.machine.backends.opened - before) * _way(outcome)
+                if outcome.outcome == "error":
+                    failures.append(outcome.reason)
+                    return
+                self.machine.session.fit.add(job.plan.rig)
+            number = by_slug[outcome.slug]
+            self._keep(number, points[number], outcome)
+            if outcome.outcome == "passed":
+                shutil.rmtree(job.report, ignore_errors=True)
+
+        await runner.run(list(jobs.values()), take)
+        end_like_interrupt()
+        shutil.rmtree(folder, ignore_errors=True)
+        if runner.interrupted:
+            raise Interrupted
+        if failures:
+            raise RigFailure(failures[0])
+
+    def _keep(self, number: int, point: Point, outcome: Outcome) -> None:
+        checks = ",".join(failed_checks(outcome))
+        drive = Drive(number, point.name, outcome.outcome, worst_margin(outcome), outcome.reason, checks)
+        self.store.add(drive)
+        self.progress.driven(drive, point.repeat)
+
+    def _jobs(self, points: dict[int, Point], folder: Path) -> dict[int, Job]:
+        tests = {number: self._test(number, point) for number, point in points.items()}
+        made = compiler.plan(replace(self.checked, tests=tuple(tests.values()), diagnostics=()), folder)
+        if has_errors(made.problems):
+            raise NotSearchable(f"these values cannot be driven:\n{format_text(made.problems)}")
+        write(made.compiled, made.pipeline, folder)
+        plans = {plan.slug: plan for plan in made.compiled.suite.plans}
+        slugs = {number: test.spec.slug for number, test in tests.items()}
+        return {
+            n: Job(plans[slug], folder / slug, self.folder / slug, points[n].spec.slug) for n, slug in slugs.items()
+        }
+
+    def _test(self, number: int, point: Point) -> ResolvedTest:
+        (test,) = compiler.at_values(self.checked, point.spec, {str(number): point.values}).tests
+        given = {name: Entry(value.span, value) for name, value in point.variables.items()}
+        return replace(test, spec=replace(test.spec, variables=test.spec.variables | given)) if given else test
+
+
+def _way(outcome: Outcome) -> float:
+    """What a rig drove at most in a test and to its start, in m; by the time where no check says it."""
+    said = [check["value"] for check in outcome.checks if (check["name"], check["unit"]) == _DISTANCE]
+    driven = [float(value) for value in said if value is not None]
+    return _TO_START + (max(driven) if driven else _FASTEST * (outcome.execution_s or 0.0))

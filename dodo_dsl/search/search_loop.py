@@ -1,0 +1,97 @@
+"""The loop of a search: generation after generation driven, until all are done, time is over or a failure ends it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+from dodo_dsl.search.drives import Drives, drive_name, point_at
+from dodo_dsl.search.findings import Findings, find, is_alike
+from dodo_dsl.search.sampling_order import FIRST, Candidate, Margins, SamplingOrder, key
+from dodo_dsl.search.space import nominal
+from dodo_dsl.search.store import Drive
+from dodo_dsl.spec.instances.vary import Values
+from dodo_dsl.spec.model import Spec
+
+
+@dataclass
+class SearchLoop:
+    """Follows an order; ``done`` are the candidates that were driven, in their order.
+
+    ``until_failure`` is whether it ends after the few drives of which one has failed, and fails again. A drive that
+    failed and did not when it was repeated has no outcome: its application may have got no processor.
+    """
+
+    spec: Spec
+    order: SamplingOrder
+    drives: Drives
+    until_failure: bool = False
+    done: list[Candidate] = field(default_factory=list)
+
+    async def follow(self) -> None:
+        """Drives the nominal values and the order, as far as time suffices. Raises Interrupted."""
+        await self._drive([nominal(self.order.space)], 0)
+        await self.order.follow(self._judge, FIRST if self.until_failure else None)
+
+    async def _judge(self, batch: Sequence[Candidate], margins: Margins) -> bool:
+        try:
+            await self._drive([one.values for one in batch], 1 + len(self.done))
+            if self.until_failure:
+                await self._repeat_failures(batch)
+        finally:
+            self._take(batch, margins)
+        return all(key(one.values) in margins for one in batch) and not self.ended_early
+
+    async def _drive(self, candidates: Sequence[Values], first: int, repeat: int = 1) -> None:
+        await self.drives.drive([point_at(self.spec, values, repeat) for values in candidates], first)
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether a failure ended it."""
+        return self.until_failure and bool(self.failed())
+
+    async def _repeat_failures(self, batch: Sequence[Candidate]) -> None:
+        for number, one in enumerate(batch, 1 + len(self.done)):
+            if (drive := self._known(one.values)) and drive.outcome == "failed":
+                await self._drive([one.values], number, 2)
+
+    def _known(self, values: Values) -> Drive | None:
+        """The drive at some values, in error where it failed once and not again."""
+        drive = self.drives.store.get(drive_name(values))
+        if drive is None or drive.outcome != "failed":
+            return drive
+        again = self.drives.store.get(drive_name(values, 2))
+        if again is None or is_alike(drive, again):
+            return drive
+        return replace(drive, outcome="error", margin=None, reason=f"failed once and not again: {drive.reason}")
+
+    def _take(self, batch: Sequence[Candidate], margins: Margins) -> None:
+        """What is known of the candidates, up to the first that was not driven.
+
+        Margins are those of their first drives, whatever is repeated later, so that each search at the same values
+        takes the same way.
+        """
+        for one in batch:
+            drive = self.drives.store.get(drive_name(one.values))
+            if drive is None:
+                return
+            margins[key(one.values)] = drive.margin
+            self.done.append(one)
+
+    def failed(self) -> list[tuple[Values, Drive]]:
+        """The drives that failed, with their values."""
+        drives = ((one.values, self._known(one.values)) for one in self.done)
+        return [(values, drive) for values, drive in drives if drive and drive.outcome == "failed"]
+
+    def findings(self) -> Findings:
+        """What the drives say."""
+        space, seed = self.order.space, self.order.seed
+        at_nominal = self.drives.store.get(drive_name(nominal(space)))
+        swept, proposed = ([*self._of(is_swept)] for is_swept in (True, False))
+        found = find(self.spec.title, seed, space, at_nominal, swept, proposed)
+        return replace(found, ended_early=self.ended_early)
+
+    def _of(self, swept: bool) -> Iterator[Drive]:
+        """The drives of the sweep, or those that were proposed, each of their values once."""
+        chosen = {key(one.values): one.values for one in self.done if one.swept is swept}
+        for values in chosen.values():
+            if drive := self._known(values):
+                yield drive

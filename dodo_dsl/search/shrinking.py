@@ -1,0 +1,243 @@
+"""Shrinks the failures of a search by further drives, and writes those that last as tests.
+
+As few values as possible stay away from nominal, and these are as near to it as possible. After A. Zeller and R.
+Hildebrandt, Simplifying and Isolating Failure-Inducing Input, 2002, with a search for the limit of each value left.
+"""
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from pathlib import Path
+
+from dodo_dsl import atomic
+from dodo_dsl.search.drives import Drives, drive_name, point_at
+from dodo_dsl.search.findings import Failure, Shrunk, is_alike, kind_of
+from dodo_dsl.search.space import Space, nominal, scalar, step_of, texts
+from dodo_dsl.search.store import Drive
+from dodo_dsl.search.study import Study
+from dodo_dsl.source import Scalar
+from dodo_dsl.spec.instances.vary import Range, Values
+from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.registry import SUFFIX
+
+_REPEATS = 3
+MOST_KINDS, MOST_TRIED = 5, 3
+"""Kinds of failures that are shrunk, and drives of a kind that are repeated to find one that fails again."""
+FOLDER, TESTS = "shrinking", "failures"
+_PARTS = 4
+_ROUNDS = 6
+"""Rounds in each of which a way becomes a quarter: less than a thousandth is left."""
+_NOT_WORD = re.compile(r"[^a-z0-9]+")
+_MOST_NAME, _LEAST_OF_TEST = 60, 20
+"""Characters of a name, as the schema has it, and those of the test's that it keeps at least."""
+
+Shrinking = Generator[list[Values], Sequence[bool], Values]
+"""Asks which of some values still fail for the same reason, and returns the last ones."""
+
+
+@dataclass
+class Shrinker:
+    """Numbers its drives from ``number`` on. ``report`` takes the tests, as does ``registry`` where there is one."""
+
+    study: Study
+    drives: Drives
+    report: Path
+    number: int
+    registry: Path | None = None
+    found: list[Shrunk] = field(default_factory=list)
+
+    async def shrink(self, failures: Sequence[Failure], failed: Sequence[tuple[Values, Drive]]) -> None:
+        """Shrinks the first failures of ``failed`` drives, however long it takes. Raises Interrupted."""
+        self.drives.folder, self.drives.limits.deadline = self.report / FOLDER, None
+        kinds = [
+            {drive.number: (values, drive) for values, drive in failed if kind_of(drive.reason) == failure.kind}
+            for failure in failures[:MOST_KINDS]
+        ]
+        if kinds:
+            self.drives.progress.begin_shrinking(len(kinds), sum(map(self._most, kinds)))
+        for number, (failure, of_kind) in enumerate(zip(failures, kinds, strict=False), 1):
+            self.drives.progress.note(f"shrinking: {failure.worst.reason}")
+            await self._shrink(of_kind)
+            self.drives.progress.expect(sum(map(self._most, kinds[number:])))
+        shutil.rmtree(self.report / FOLDER, ignore_errors=True)
+
+    def _most(self, failed: dict[int, tuple[Values, Drive]]) -> int:
+        """Drives that it takes at most to shrink failures of a kind."""
+        shrinking = max(most_drives(self.study.space, values) for values, _ in failed.values())
+        return min(MOST_TRIED, len(failed)) + shrinking + _REPEATS - 1
+
+    async def _shrink(self, of_kind: dict[int, tuple[Values, Drive]]) -> None:
+        first = await self._first(of_kind)
+        if first is None:
+            return
+        values = await self._shrunk(of_kind[first.number][0], first)
+        if texts(values) not in [one.values for one in self.found]:
+            self.found.append(await self._confirmed(values))
+
+    async def _first(self, failed: dict[int, tuple[Values, Drive]]) -> Drive | None:
+        """The drive nearest to the nominal values that fails again; None where none of the MOST_TRIED nearest does."""
+        left = {number: drive for number, (_, drive) in failed.items()}
+        for _ in range(min(MOST_TRIED, len(left))):
+            drive = nearest(self.study.space, list(left.values()))
+            values = failed[drive.number][0]
+            await self._drive([values], 2)
+            if self._fails(values, drive, 2):
+                return drive
+            del left[drive.number]
+        return None
+
+    async def _shrunk(self, values: Values, first: Drive) -> Values:
+        steps = shrink(self.study.space, values)
+        try:
+            asked = next(steps)
+            while True:
+                await self._drive(asked)
+                asked = steps.send([self._fails(one, first) for one in asked])
+        except StopIteration as end:
+            shrunk: Values = end.value
+            return shrunk
+
+    async def _drive(self, candidates: list[Values], repeat: int = 1) -> None:
+        points = [point_at(self.study.test.spec, values, repeat) for values in candidates]
+        await self.drives.drive(points, self.number)
+        self.number += len(candidates)
+
+    def _fails(self, values: Values, like: Drive, repeat: int = 1) -> bool:
+        drive = self.drives.store.get(drive_name(values, repeat))
+        return drive is not None and is_alike(like, drive)
+
+    async def _confirmed(self, values: Values) -> Shrunk:
+        for repeat in range(2, _REPEATS + 1):
+            await self._drive([values], repeat)
+        drive = self.drives.store.get(drive_name(values))
+        assert drive is not None, "it was driven"
+        failed = sum(self._fails(values, drive, repeat) for repeat in range(1, _REPEATS + 1))
+        names = changed(self.study.space, values)
+        spec = self._write(values, names, drive.reason) if failed == _REPEATS else ""
+        return Shrunk(kind_of(drive.reason), drive.reason, texts(values), tuple(names), failed, _REPEATS, spec)
+
+    def _write(self, values: Values, names: Sequence[str], reason: str) -> str:
+        """The name of the test that is written."""
+        spec = self.study.test.spec
+        name = name_of(spec, names, {one.spec for one in self.found})
+        text = text_of(spec, name, {one: values[one] for one in names}, reason)
+        for folder in filter(None, (self.report / TESTS, self.registry)):
+            path = folder / name / f"{name}{SUFFIX}"
+            if folder == self.registry and path.exists() and path.read_text() != text:
+                self.drives.progress.note(f"'{path}' is kept, as it holds another test")
+            else:
+                atomic.write_text(path, text)
+        return name
+
+
+def nearest(space: Space, failed: Sequence[Drive]) -> Drive:
+    """The drive that is nearest to the nominal values, by shares of the ranges."""
+    middle = space.point(texts(nominal(space)))
+
+    def way(drive: Drive) -> tuple[float, int]:
+        point = space.point(dict(drive.values))
+        return sum(abs(one - other) for one, other in zip(point, middle, strict=True)), drive.number
+
+    return min(failed, key=way)
+
+
+def changed(space: Space, values: Values) -> list[str]:
+    """The ranges whose values are not nominal."""
+    return [one.name for one in space.ranges if values[one.name].text != one.nominal.text]
+
+
+def most_drives(space: Space, values: Values) -> int:
+    """How many drives ``shrink`` takes at most; most often, values go back to nominal, and it takes far fewer."""
+    away = changed(space, values)
+    numbers = sum(one.name in away and not one.is_list for one in space.ranges)
+    return len(away) * (len(away) + 1) + numbers * _ROUNDS * (_PARTS - 1)
+
+
+def shrink(space: Space, values: Values) -> Shrinking:
+    """Values that fail, from others that do."""
+    values = yield from _fewer(space, values)
+    for one in space.ranges:
+        if not one.is_list and one.name in changed(space, values):
+            values = yield from _nearer(space, values, one)
+    return values
+
+
+def _fewer(space: Space, values: Values) -> Shrinking:
+    """Puts values back to nominal, one after the other, until none of them can be."""
+    plain = nominal(space)
+    while names := changed(space, values):
+        single = [values | {name: plain[name]} for name in names]
+        fails = yield single
+        free = [name for name, still in zip(names, fails, strict=True) if still]
+        if not free:
+            return values
+        more = [values | {name: plain[name] for name in free[: n + 1]} for n in range(len(free))]
+        fails = yield more
+        values = next((one for one, still in zip(reversed(more), reversed(fails), strict=True) if still), more[0])
+    return values
+
+
+def _nearer(space: Space, values: Values, one: Range) -> Shrinking:
+    """Moves a number towards its nominal value, as far as it still fails."""
+    passes, fails_at = one.number(one.nominal.text), one.number(values[one.name].text)
+    step = Decimal(1) if one.name in space.whole else step_of(one)
+    for _ in range(_ROUNDS):
+        parts = [passes + (fails_at - passes) * n / _PARTS for n in range(1, _PARTS)]
+        rounded = dict.fromkeys((part / step).to_integral_value() * step for part in parts)
+        between = [number for number in rounded if min(passes, fails_at) < number < max(passes, fails_at)]
+        if not between:
+            break
+        tried = [values | {one.name: scalar(one, number)} for number in between]
+        fails = yield tried
+        first = next((n for n, still in enumerate(fails) if still), None)
+        if first is None:
+            passes = between[-1]
+            continue
+        values, fails_at = tried[first], between[first]
+        passes = between[first - 1] if first else passes
+    return values
+
+
+def name_of(spec: Spec, changed: Sequence[str], taken: set[str]) -> str:
+    """A name that is not ``taken``: the test's and the ranges whose values are not nominal."""
+    names = "-".join(word for name in changed for word in _NOT_WORD.split(name.lower()) if word)
+    end = f"-fails-at-{names or 'nominal'}"
+    for number in range(1, len(taken) + 2):
+        last = end if number == 1 else f"{end[: _MOST_NAME - _LEAST_OF_TEST - len(taken)].rstrip('-')}-{number}"
+        kept = spec.location.stem[: max(_MOST_NAME - len(last), _LEAST_OF_TEST)].rstrip("-")
+        name = f"{kept}{last}"[:_MOST_NAME].rstrip("-")
+        if name not in taken:
+            return name
+    raise AssertionError("there are more names than are taken")
+
+
+def text_of(spec: Spec, name: str, values: Values, reason: str) -> str:
+    """The file ``NAME/NAME.dodo.yml`` of the test's registry, where ``values`` are those that are not nominal."""
+    base = os.path.relpath(spec.location.path, spec.location.root / name)
+    lines = [
+        "dodo: 1",
+        f"name: {name}",
+        f"extends: {_quoted(base)}",
+        f"description: {_quoted(f'Found by dodo search: {reason}')}",
+        "clock: lockstep",
+    ]
+    if spec.choice.values:
+        chosen = ", ".join(f"{key}: [{_written(value)}]" for key, value in spec.choice.values)
+        lines.append(f"matrix: {{{chosen}}}")
+    if values:
+        lines.append("vary:")
+        lines += [f"  {key}: {{nominal: {_written(value)}}}" for key, value in values.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _written(value: Scalar) -> str:
+    return _quoted(value.text) if isinstance(value.value, str) else value.text
+
+
+def _quoted(text: str) -> str:
+    """A string of JSON, which is one of YAML too."""
+    return json.dumps(text, ensure_ascii=False)
