@@ -130,7 +130,7 @@ class Processes:
             host_isolation.host_slot(
                 plan, () if is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
             ) as leased,
-            attended(plan, leased.cid, leased.descriptors, say, leased.key, self._roots, self._session) as descriptors,
+            attended(plan, leased, say, self._roots, self._session) as descriptors,
         ):
             slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)

@@ -9,7 +9,7 @@ from services.base.identity.senders import SenderTable
 from services.base.lockstep.channel import ClockChannel
 from services.base.service import period_of
 from services.clock.answers import Answers, filters
-from services.clock.participants import Patience, Roles
+from services.clock.participants import Patience, Roles, Timing
 from services.clock.service import CONSUMED, ClockService
 
 
@@ -27,8 +27,8 @@ def build(context: Context) -> Service:
     context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])
-    period, limit = period_of(flags["freq"]), flags["max-response"]
-    return ClockService(context.session, channel, roles, answers, period, timeout, patience, limit, senders)
+    timing = Timing(period_of(flags["freq"]), timeout, patience, flags["max-response"])
+    return ClockService(context.session, channel, roles, answers, timing, senders)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Protocol
 
 from services.base.lockstep.datagrams import EncodedEnvelope
@@ -79,3 +80,13 @@ class Patience:
 
     first: float
     others: float
+
+
+@dataclass(frozen=True)
+class Timing:
+    """``period`` and ``timeout`` in us of test time; answers are counted that take longer than ``max_response`` s."""
+
+    period: Fraction | int
+    timeout: int
+    patience: Patience
+    max_response: float | None = None

@@ -5,7 +5,6 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from fractions import Fraction
 from typing import Any
 
 from dodo_dsl.opendlv.bus.address import Address
@@ -21,7 +20,7 @@ from services.clock.answers import Answers
 from services.clock.application import SteppedApplication
 from services.clock.exchange import Exchange
 from services.clock.model import Stepper
-from services.clock.participants import Patience, Roles, TestEnded
+from services.clock.participants import Roles, TestEnded, Timing
 from services.clock.processor_time import ApplicationProcesses
 from services.clock.response import ResponseTimes
 
@@ -39,10 +38,7 @@ _log = logging.getLogger(__name__)
 
 
 class ClockService(Service):
-    """Drives a test by its Stepper; ``period`` and ``timeout`` in us of test time.
-
-    ``max_response`` is the time in s beyond which answers are counted.
-    """
+    """Drives a test by its Stepper."""
 
     def __init__(
         self,
@@ -50,10 +46,7 @@ class ClockService(Service):
         channel: ClockChannel,
         roles: Roles,
         answers: Answers,
-        period: Fraction | int,
-        timeout: int,
-        patience: Patience,
-        max_response: float | None = None,
+        timing: Timing,
         senders: SenderTable | None = None,
     ) -> None:
         self._session, self._channel = session, channel
@@ -63,9 +56,11 @@ class ClockService(Service):
         self._guarded = self._senders.ids | {session.messages.id(name) for name in CONSUMED}
         self._early: list[tuple[Envelope, Address]] = []
         self._exchange = exchange = Exchange(session, channel, answers.take, self._senders)
-        self._response = ResponseTimes(float(period) / MICROSECONDS, max_response)
-        self._application = SteppedApplication(answers, patience, exchange, self._over, self._response, session.cid)
-        self._stepper = Stepper(roles, period, timeout, self._application, exchange, self._over)
+        self._response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
+        self._application = SteppedApplication(
+            answers, timing.patience, exchange, self._over, self._response, session.cid
+        )
+        self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
         self._reported = self._begun = 0.0
         self._reached = 0
         """The time that was reported at last."""

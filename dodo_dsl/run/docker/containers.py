@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import secrets
 from collections.abc import AsyncIterator, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -61,7 +62,7 @@ class Containers:
             else:
                 async with (
                     host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
-                    attended(plan, slot.cid, slot.descriptors, say, key, self._roots),
+                    attended(plan, replace(slot, key=key), say, self._roots),
                 ):
                     yield backend
 

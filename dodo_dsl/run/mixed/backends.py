@@ -71,7 +71,7 @@ class Mixed:
                 return
             async with (
                 host_isolation.host_slot(plan, (plan.cid,), say, keep, alone=True) as leased,
-                attended(plan, leased.cid, leased.descriptors, say, leased.key, self._roots) as descriptors,
+                attended(plan, leased, say, self._roots) as descriptors,
             ):
                 slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
                 yield self._backend(job, containers, slot)

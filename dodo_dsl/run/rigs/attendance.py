@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
+from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.health_check import examine, refuse_quarantined
 from dodo_dsl.run.rigs.permission import refuse_test, refuse_unattended
@@ -57,22 +58,19 @@ def refuse_hardware(plan: Plan) -> None:
 @contextlib.asynccontextmanager
 async def attended(
     plan: Plan,
-    cid: int,
-    descriptors: tuple[int, ...],
+    slot: Slot,
     say: Callable[[str], None],
-    key: bytes,
     roots: Sequence[Path] = (),
     session: RigSession | None = None,
 ) -> AsyncIterator[tuple[int, ...]]:
     """Leases and checks a real rig's devices, and sends a heartbeat within the block; does nothing for other tests.
 
-    ``descriptors`` are those of the lease of its CID, ``key`` is the test's; gives all descriptors by which a program
-    holds the rig. ``roots`` are the folders of the test's repository, whose tests the machine's operator may not let
-    use it. A rig that is fit in the ``session`` is not checked. Raises BackendError then, and when the rig is in use,
-    in quarantine, or fails its health check.
+    Gives all descriptors by which a program holds the rig, with those of the ``slot``. ``roots`` are the folders of the
+    test's repository, whose tests the machine's operator may not let use it. A rig that is fit in the ``session`` is
+    not checked. Raises BackendError then, and when the rig is in use, in quarantine, or fails its health check.
     """
     if not is_real(plan):
-        yield descriptors
+        yield slot.descriptors
         return
     devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
     async with contextlib.AsyncExitStack() as stack:
@@ -88,6 +86,6 @@ async def attended(
             session.fit.discard(plan.rig)
             refuse_quarantined(plan)
         else:
-            await examine(plan, say, (*descriptors, *more))
-        await stack.enter_async_context(heartbeat(cid, key))
-        yield (*descriptors, *more)
+            await examine(plan, say, (*slot.descriptors, *more))
+        await stack.enter_async_context(heartbeat(slot.cid, slot.key))
+        yield (*slot.descriptors, *more)

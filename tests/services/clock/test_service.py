@@ -13,7 +13,7 @@ from services.base.lockstep.datagrams import encode
 from services.clock import model
 from services.clock.answers import Answers
 from services.clock.exchange import Exchange
-from services.clock.participants import Patience, Roles
+from services.clock.participants import Patience, Roles, Timing
 from services.clock.service import ClockService
 
 STEP = Fraction(100_000)
@@ -21,7 +21,7 @@ STEP = Fraction(100_000)
 
 def driven(session: Session, roles: Roles, stopped: bool = False) -> None:
     channel = ClockChannel(session.cid, session.messages)
-    service = ClockService(session, channel, roles, Answers(()), STEP, 1_000_000, Patience(1.0, 1.0))
+    service = ClockService(session, channel, roles, Answers(()), Timing(STEP, 1_000_000, Patience(1.0, 1.0)))
     assert service.drive is not None
     service.drive(lambda: stopped)
     channel.close()
