@@ -23,6 +23,7 @@ from tests.search.scripted_drives import SPEC, repository, stages, stub
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("postgres")]
 
 _FORKS = multiprocessing.get_context("fork")
+_FORKS = multiprocessing.get_context("fork")
 _BEGUN: list[ForkProcess] = []
 RUNS = ("--runs", "16", "-j", "1")
 NOMINAL = "example--run-0"
@@ -67,26 +68,25 @@ def worker(
 ) -> ForkProcess:
     """Begins to search, with a report, a list of drives and an output called ``name``.
 
-    The process, a fork of this one, which has loaded everything, sends itself ``signals`` in drives by their numbers,
-    from 1 on. It goes on with none but the nominal one before workers called ``together`` have one, too.
+    The process, a fork of this one, which has loaded everything, sends itself ``signals`` in its drives by their
+    numbers, 0 in the nominal one. It ends its first one only when workers called ``together`` have begun theirs.
     """
-    _BEGUN.append(
-        multiprocessing.get_context("fork").Process(
-            target=_work, name=name, args=(name, words, signals, together, password)
-        )
-    )
-    _BEGUN[-1].start()
-    return _BEGUN[-1]
+    own = (name, words, signals, together, password)
+    process = _FORKS.Process(target=_work, name=name, args=own, daemon=True)
+    _BEGUN.append(process)
+    process.start()
+    return process
 
 
 def _work(name: str, words: Sequence[str], signals: Mapping[int, int], together: Sequence[str], password: str) -> None:
     def backend(plan: Plan, attempt: int) -> ScriptedBackend:
         with Path(f"{name}.txt").open("a") as written:
             written.write(f"{plan.slug}\n")
-        if plan.slug != NOMINAL:
-            wait_until(lambda: all(set(begun(other)) - {NOMINAL} for other in together))
-        if number := signals.get(len(begun(name))):
-            os.kill(os.getpid(), number)
+        number = 0 if plan.slug == NOMINAL else len(others_than_nominal(name))
+        while number and not all(map(others_than_nominal, together)):
+            time.sleep(0.02)
+        if number in signals:
+            os.kill(os.getpid(), signals[number])
         return ScriptedBackend(plan, stages(plan))
 
     stub(pytest.MonkeyPatch(), backend)
@@ -99,7 +99,7 @@ def _work(name: str, words: Sequence[str], signals: Mapping[int, int], together:
 
 def end(process: ForkProcess) -> tuple[int | None, str]:
     """The exit code of a worker, and what it has printed."""
-    process.join(300)
+    process.join(120)
     return process.exitcode, Path(f"{process.name}.log").read_text()
 
 
@@ -118,6 +118,10 @@ def begun(name: str) -> list[str]:
     """The drives of a worker, which have begun."""
     path = Path(f"{name}.txt")
     return path.read_text().split() if path.exists() else []
+
+
+def others_than_nominal(name: str) -> list[str]:
+    return [slug for slug in begun(name) if slug != NOMINAL]
 
 
 def test_four_workers_of_which_one_is_killed_search_like_one(
@@ -144,7 +148,7 @@ def test_four_workers_of_which_one_is_killed_search_like_one(
 
 
 def test_an_interrupted_worker_goes_on_to_the_result_without_a_database(alone: str, storage: tuple[str, str]) -> None:
-    assert end(worker("first", *RUNS, *storage, signals={11: signal.SIGKILL}))[0] == -signal.SIGKILL
+    assert end(worker("first", *RUNS, *storage, signals={10: signal.SIGKILL}))[0] == -signal.SIGKILL
     code, out = end(worker("other", *RUNS, *storage, "--seed", "1"))
     assert code == 2 and "the study 'main' of example at postgresql://" in out and "another one with --study" in out
     assert end(worker("second", *RUNS, *storage))[0] == 1
@@ -159,7 +163,7 @@ def test_a_worker_that_waits_for_another_can_be_interrupted(
     database: Database, storage: tuple[str, str], number: signal.Signals
 ) -> None:
     name = f"stopped-{number.name}"
-    worker(name, *RUNS, *storage, signals={1: signal.SIGSTOP})
+    worker(name, *RUNS, *storage, signals={0: signal.SIGSTOP})
     wait_until(lambda: bool(begun(name)))
     waiting = worker("waiting", *RUNS, *storage)
     tries = "select count(*) from pg_stat_activity where query like '%pg_try_advisory_lock%' and state = 'idle'"
