@@ -14,8 +14,7 @@ from typing import Any
 import yaml
 
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest
-from dodo_dsl.slips import slip
-from dodo_dsl.slips.failure import Failure
+from dodo_dsl.slips import Failure, slip
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
@@ -281,7 +280,7 @@ def _unreadable(file: str, text: str, error: Exception, problem: str) -> Diagnos
     position = max(text.find(chr(code)), 0)
     before = text[:position]
     span = Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
-    if "control characters" not in problem:
+    if not isinstance(error, yaml.reader.ReaderError):
         return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}")
     message = f"a control character is not allowed here: {_CONTROL.get(code, 'unnamed')} (U+{code:04X})"
     return Diagnostic(span, "yaml-syntax", message, "remove it")

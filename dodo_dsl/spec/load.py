@@ -5,13 +5,12 @@ from dataclasses import replace
 
 from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.source import Mapping, Node, Reader, Scalar, read
-from dodo_dsl.spec import extends
+from dodo_dsl.spec import extends, slips
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.instances.matrix import Choice
 from dodo_dsl.spec.instances.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, Spec, spec_of
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.schema import decimal_commas
 from dodo_dsl.spec.schema.validation import validate
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
@@ -28,7 +27,7 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         if not found:
             found = [extends.nothing_in(location.path)]
         return [Spec(location)], found
-    node, problems = extends.resolve(decimal_commas.joined(node), location.path, location.root, reader)
+    node, problems = extends.resolve(slips.joined(node), location.path, location.root, reader)
     is_whole = not has_errors(problems)
     found = [*found, *problems]
     if extends.is_open(node):

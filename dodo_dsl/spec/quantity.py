@@ -4,7 +4,7 @@ import re
 from decimal import Decimal, InvalidOperation, localcontext
 
 from dodo_dsl.diagnostics import Fix, did_you_mean, only_fix
-from dodo_dsl.spec.quantity_slips import repaired, unit_meant
+from dodo_dsl.spec.slips import repaired, unit_meant
 
 SHARE = "1"
 """The unit of shares, which need none: 0.5 is 50 %."""

@@ -11,7 +11,7 @@ from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Mapping, Node, Scalar, Sequence, path_of, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Parameter
-from dodo_dsl.spec.quantity_slips import boolean_meant, repaired
+from dodo_dsl.spec.slips import boolean_meant, repaired
 
 Kind = Literal["text", "path", "memory"]
 

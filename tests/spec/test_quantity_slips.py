@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.spec.quantity import UNITS, QuantityError, convert
-from dodo_dsl.spec.quantity_slips import boolean_meant
+from dodo_dsl.spec.slips import boolean_meant
 
 MENDED = [
     ("0.8 m/s# as on the car", "m/s", "0.8 m/s # as on the car"),

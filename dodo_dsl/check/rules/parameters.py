@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean, only_fix
-from dodo_dsl.slips.keys import meant, slip_in_key
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.arguments import ResolvedService
+from dodo_dsl.spec.slips import meant, slip_in_key
 
 
 def check(context: RuleContext) -> Iterator[Diagnostic]:

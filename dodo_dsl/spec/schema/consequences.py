@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from dodo_dsl.slips.keys import meant
+from dodo_dsl.spec.slips import meant
 
 Path = tuple[str | int, ...]
 _BOUNDS = ("minimum", "maximum")

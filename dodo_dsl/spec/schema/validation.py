@@ -13,14 +13,13 @@ import yaml
 
 from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix, shown_path
-from dodo_dsl.slips.keys import slip_in_key
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.names import as_file
-from dodo_dsl.spec.quantity_slips import boolean_meant
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.schema.consequences import unindented, without_consequences
 from dodo_dsl.spec.schema.validity import OF_COMPOSE, UNIT, WORDS, check_quantity, is_valid, is_whole, schema_of
+from dodo_dsl.spec.slips import boolean_meant, slip_in_key
 
 _HINT = "x-hint"
 _PAIRS = tuple(f" of '{key}'" for key in ("environment", "labels", "args", "sysctls"))

@@ -4,7 +4,7 @@ import pytest
 
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.schema.decimal_commas import joined
+from dodo_dsl.spec.slips import joined
 from tests.source.nodes import mapping
 
 

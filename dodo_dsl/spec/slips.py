@@ -1,0 +1,120 @@
+"""What keys and values of a spec mean that are almost right: units, minus signs, decimal commas, missing spaces."""
+
+import re
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+from dodo_dsl.diagnostics import Fix, Span, closest
+from dodo_dsl.source import Entry, Mapping, Node, Scalar
+
+_ALIASES = {
+    "°": "deg",
+    "°/s": "deg/s",
+    "µs": "us",
+    "sec": "s",
+    "m/s²": "m/s2",
+    "m/s^2": "m/s2",
+    "rad/s²": "rad/s2",
+    "rad/s^2": "rad/s2",
+    "deg/s²": "deg/s2",
+    "deg/s^2": "deg/s2",
+}
+_WORDS = {"yes": "true", "y": "true", "on": "true", "no": "false", "n": "false", "off": "false"}
+_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014"
+_WHOLE = re.compile(r"[-+]?[0-9]{1,20}")
+_REST = re.compile(r"[0-9]{1,20}( ?[A-Za-z%][^ ]{0,10})?")
+_CLOSING = {"{": "}", "[": "]"}
+
+
+def repaired(text: str, fits: Callable[[str], bool]) -> tuple[str, Fix | None]:
+    """A hint how to write a value so that it ``fits``, and the only fix; empty and None where nothing does."""
+    before = text.partition("#")[0]
+    if "#" in text and fits(before):
+        return "a comment begins with ' #', after a space", Fix("#", " #")
+    bare = text.rstrip(",; ")
+    if bare != text and fits(bare):
+        return f"write '{bare}', without '{text[len(bare) :].strip()}'", Fix(text, bare)
+    hyphen = f"-{text[1:]}"
+    if text[:1] in _MINUS and text and fits(hyphen):
+        return f"write '{hyphen}', with a hyphen for the minus sign", Fix(text, hyphen)
+    return "", None
+
+
+def unit_meant(written: str, text: str, units: Collection[str]) -> Fix | None:
+    """The only unit of some that one of a ``text`` means: in other letters, or as it is written elsewhere."""
+    meant = {unit for unit in units if unit.lower() == written.lower() or unit == _ALIASES.get(written)}
+    if len(meant) != 1:
+        return None
+    unit = meant.pop()
+    return Fix(written, unit if f" {written}" in text else f" {unit}")
+
+
+def boolean_meant(text: str) -> tuple[str, Fix | None]:
+    """A hint for a word that other readers of YAML take for true or false, and the fix; empty and None for others."""
+    meant = _WORDS.get(text.lower(), "")
+    return (f"write {meant}", Fix(text, meant)) if meant else ("", None)
+
+
+def joined(node: Node) -> Node:
+    """The node with decimal commas as they are meant: YAML reads ``{z: 9,5 cm}`` as ``z: 9`` and a key ``5 cm``."""
+    if not isinstance(node, Mapping):
+        return node
+    entries: dict[str, Entry] = {}
+    last = ""
+    for key, entry in node.entries.items():
+        before = entries[last].value if last else None
+        if isinstance(before, Scalar) and _continues(before, key, entry):
+            text = f"{before.text},{key}"
+            place = before.span
+            whole = Span(place.file, place.line, place.column, len(text))
+            entries[last] = Entry(entries[last].key, Scalar(whole, text, text))
+        else:
+            entries[key] = Entry(entry.key, joined(entry.value))
+            last = key
+    return Mapping(node.span, entries, node.tag)
+
+
+def _continues(before: Scalar, key: str, entry: Entry) -> bool:
+    """Whether a key without a value directly follows the comma of a number."""
+    empty = isinstance(entry.value, Scalar) and entry.value.value is None and not entry.value.text
+    place = (before.span.line, before.span.column + len(before.text) + 1)
+    adjacent = (entry.key.line, entry.key.column) == place
+    return empty and adjacent and bool(_WHOLE.fullmatch(before.text) and _REST.fullmatch(key))
+
+
+@dataclass(frozen=True)
+class KeySlip:
+    """An unknown key, in text that is YAML nonetheless: ``{uses:camera}``; ``key`` is the known one that is meant."""
+
+    key: str
+    message: str
+    hint: str
+    fix: Fix | None = None
+
+
+def slip_in_key(word: str, known: Collection[str], *, is_empty: bool) -> KeySlip | None:
+    """What is wrong with an unknown key, ``is_empty`` if it has no value; None when it is no slip of this kind."""
+    found = re.fullmatch(r"(?P<key>[^:\s]+):(?P<value>.*\S.*)", word, re.DOTALL)
+    if found and found["key"] in known:
+        key, value = found["key"], found["value"].strip()
+        message = f"a space is missing after the colon of '{key}'"
+        return KeySlip(key, message, _write(key, value), Fix(word, f"{key}: {value}"))
+    found = re.fullmatch(r"(?P<key>[^\s=]+)[\s=]+(?P<value>.+)", word, re.DOTALL) if is_empty else None
+    if found and found["key"] in known:
+        key = found["key"]
+        return KeySlip(key, f"a colon is missing after '{key}'", _write(key, found["value"]))
+    return None
+
+
+def _write(key: str, value: str) -> str:
+    closing = _CLOSING.get(value[0], "")
+    if closing not in value:  # the key ends at the first colon within the brackets
+        value = f"{value[0]}...{closing}"
+    return f"write '{key}: {value if len(value) <= 60 else f'{value[:57]}...'}'"
+
+
+def meant(word: str, known: Collection[str], *, is_empty: bool) -> str:
+    """The known key that an unknown one most likely means; empty when there is none."""
+    if found := slip_in_key(word, known, is_empty=is_empty):
+        return found.key
+    return next(iter(closest(word, known)), "")
