@@ -13,8 +13,7 @@ from dodo_dsl.application.mounted_folders import missing_folders
 from dodo_dsl.application.nested_mounts import nested_mounts
 from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.application.service_problems import Written, problems
-from dodo_dsl.application.slips.flags import cid_slips
-from dodo_dsl.application.slips.programs import missing_program
+from dodo_dsl.application.slips import cid_slips, missing_program
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 
 

@@ -23,7 +23,7 @@ from dodo_dsl.application.load import load
 from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
 from dodo_dsl.application.service_environment import cid_variables, env_files
 from dodo_dsl.application.service_problems import unknown_keys
-from dodo_dsl.application.slips.variables import variable_problems
+from dodo_dsl.application.slips import variable_problems
 from dodo_dsl.application.tunables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Reader

@@ -1,0 +1,182 @@
+"""What people hardly mean, though it is a compose file: variables, flags and programs that are almost right."""
+
+import os
+import re
+import shlex
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from dodo_dsl import source
+from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.interpolation import VARIABLE, end_of_variable
+from dodo_dsl.application.model import ComposeService, text
+from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
+from dodo_dsl.source import Scalar
+
+_FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
+_IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
+_LITERAL = re.compile(r"--cid=(?P<value>[\w.+-]+)")
+_HIGHEST = 254
+_SHORT = 3
+"""Letters of a flag that others differ from by one, such as ``--pid`` and ``--id``."""
+COMMANDS = ("x-dodo-process", "entrypoint", "command")
+
+Word = tuple[str, Scalar]
+INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
+_SCRIPTS = {".py": "python", ".sh": "sh", ".js": "node", ".pl": "perl", ".rb": "ruby"}
+_FILLED = ("services", "volumes", "networks", "secrets", "configs")
+"""The top-level keys below which compose fills in variables."""
+_WITHOUT_OPERATOR = re.compile(r"\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*):=?(?P<word>[^-?+}:=][^{}]*)\}")
+_SHOWN = 60
+
+
+def words(service: ComposeService) -> Iterator[Word]:
+    """The words of a service's commands, each with the value in which it is written."""
+    for key in COMMANDS:
+        node = service.node.get(key)
+        for item in node.items if isinstance(node, source.Sequence) else (node,):
+            if isinstance(item, Scalar):
+                yield from ((word, item) for word in ((text(item.value),) if item is not node else _split(item.text)))
+
+
+def _split(command: str) -> tuple[str, ...]:
+    try:
+        return opendlv_flags.split(command)
+    except ValueError:
+        return ()  # reported with the application
+
+
+def meant(word: str, flag: str) -> str:
+    """The flag with its value for a word that is almost it; empty for any other, and for the flag itself.
+
+    Almost is one letter too many, letters in another order or size, and hyphens or blanks; for a long flag also one
+    letter too few or another one.
+    """
+    match = _FLAG.fullmatch(word)
+    if match is None or match["flag"] == flag:
+        return ""
+    name, wanted = match["flag"].replace("-", "").strip(), flag.removeprefix("--")
+    return f"{flag}={match['value'].strip()}" if _is_near(name.lower(), wanted) else ""
+
+
+def _is_near(word: str, wanted: str) -> bool:
+    shorter, least = _shorter(word), _shorter(wanted) if len(wanted) > _SHORT else set()
+    return sorted(word) == sorted(wanted) or wanted in shorter or word in least or not least.isdisjoint(shorter)
+
+
+def _shorter(word: str) -> set[str]:
+    """The word without one of its letters."""
+    return {word[:at] + word[at + 1 :] for at in range(len(word))}
+
+
+def cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
+    """Words that are meant to give a CID, and give none; a service that ``takes_cid`` may have flags that are alike."""
+    for word, item in words(service):
+        one, literal = _IN_ONE_WORD.fullmatch(word), _LITERAL.fullmatch(word)
+        if one:
+            yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")
+        elif literal and not _is_cid(literal["value"]):
+            yield _warning(item, f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}", "write '--cid=111'")
+        elif not takes_cid and (flag := meant(word, "--cid")) and (_is_cid(flag[6:]) or "$" in flag):
+            yield _warning(item, f"'{word}' is not the flag '--cid'", f"did you mean '{flag}'?")
+
+
+def _is_cid(value: str) -> bool:
+    return value.isascii() and value.isdigit() and 1 <= int(value) <= _HIGHEST
+
+
+def _warning(item: Scalar, message: str, hint: str) -> Diagnostic:
+    return Diagnostic(item.span, "application-cid", message, hint, "warning")
+
+
+def missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
+    """Warnings of the program and its script, which are seen from the compose file's ``folder``."""
+    process = service.node.get("x-dodo-process")
+    items = process.items if isinstance(process, source.Sequence) else ()
+    words = [word for word in items if isinstance(word, Scalar)]
+    if not words or "$" in words[0].text:
+        return
+    program = words[0]
+    if program.text in INTERPRETERS:
+        yield from _missing_script(program.text, words[1:], folder)
+    elif " " in program.text.strip() and not (folder / program.text).exists():
+        parts = ", ".join(program.text.split())
+        yield _cannot_start(program, f"there is no program '{program.text}', which is one word", f"write [{parts}]")
+    elif "/" in program.text:
+        yield from _wrong_path(program, folder, is_built="build" in service.node.entries)
+    elif not shutil.which(program.text):
+        yield from _not_in_path(program, folder)
+
+
+def _wrong_path(program: Scalar, folder: Path, is_built: bool) -> Iterator[Diagnostic]:
+    """A service that ``is_built`` as an image has a program that a pipeline's check never sees."""
+    own = folder / program.text
+    if own.is_file() and not os.access(own, os.X_OK):
+        hint = f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
+        yield _cannot_start(program, f"'{program.text}' is not executable", hint)
+    elif not own.exists():
+        beside = own.parent.iterdir() if own.parent.is_dir() else ()
+        near = closest(own.name, [path.name for path in beside if os.access(path, os.X_OK)])
+        meant = f"did you mean '{program.text.removesuffix(own.name)}{near[0]}'?" if near else ""
+        if near or not is_built:
+            yield _cannot_start(program, f"there is no program '{program.text}'", meant or "build it first")
+
+
+def _not_in_path(program: Scalar, folder: Path) -> Iterator[Diagnostic]:
+    """A program in the PATH of another machine is none of the files here, and not spelt like an interpreter."""
+    suffix = Path(program.text).suffix
+    if (folder / program.text).is_file():
+        how = [f"[{_SCRIPTS[suffix]}, {program.text}]"] if suffix in _SCRIPTS else []
+        hint = " or ".join([*how, f"./{program.text}"])
+        yield _cannot_start(program, f"there is no program '{program.text}' in the PATH", f"write {hint}")
+    elif near := closest(program.text, INTERPRETERS):
+        yield _cannot_start(program, f"there is no program '{program.text}'", f"did you mean '{near[0]}'?")
+
+
+def _missing_script(interpreter: str, words: list[Scalar], folder: Path) -> Iterator[Diagnostic]:
+    name = words[0].text if words else ""
+    if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
+        beside = [path.name for path in folder.iterdir() if path.suffix == Path(name).suffix]
+        hint = did_you_mean(Path(name).name, beside) or "without it the application starts in containers only"
+        yield _cannot_start(words[0], f"there is no file '{name}' for {interpreter} to run", hint)
+
+
+def _cannot_start(word: Scalar, message: str, hint: str) -> Diagnostic:
+    return Diagnostic(word.span, "application-file", message, hint, "warning")
+
+
+def variable_problems(document: source.Mapping) -> Iterator[Diagnostic]:
+    """Errors at the values of a compose file."""
+    for key in _FILLED:
+        node = document.get(key)
+        for part in source.walk(node) if node else ():
+            if isinstance(part, Scalar) and isinstance(part.value, str) and (slip := slip_in(part.value)):
+                yield Diagnostic(part.span, "application-file", *slip)
+
+
+def slip_in(text: str) -> tuple[str, str] | None:
+    """What is wrong with the first such variable, and a hint; defaults are looked at, too."""
+    place = text.find("$")
+    while place >= 0:
+        end = end_of_variable(text, place)
+        match = VARIABLE.fullmatch(text, place, end)
+        if match is None and text[place + 1 : place + 2] == "{":
+            return _slip(text[place:end])
+        if match and (inner := slip_in(match["word"] or "")):
+            return inner
+        place = text.find("$", end)
+    return None
+
+
+def _slip(written: str) -> tuple[str, str]:
+    shown = written[:_SHOWN]
+    if written.count("{") != written.count("}"):
+        return "'${' is not closed", f"write '{written.split(maxsplit=1)[0][:_SHOWN]}}}'"
+    if written == "${}":
+        return "'${}' names no variable", "for example ${GAIN:-1}, or $${} for the text itself"
+    known = _WITHOUT_OPERATOR.fullmatch(written)
+    if known:
+        return f"'{shown}' is no variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
+    what = "the name of a variable has letters, digits and underscores"
+    return f"'{shown}' is no variable of compose", f"{what}; text that begins with ${{ is written $${{"
