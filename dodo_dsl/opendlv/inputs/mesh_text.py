@@ -16,7 +16,6 @@ _FACE, _VERTEX = (re.compile(rb"^[ \t]*%b[ \t]" % letter, re.MULTILINE) for lett
 _RELATIVE_FACE = re.compile(rb"^\s*f\s[^#\n]*-\d", re.MULTILINE)
 _CONTINUED = b"\\\n"
 _THREE = 3
-_CAPITALS = {b"V": "v", b"VT": "vt", b"VN": "vn", b"F": "f"}
 
 Vertex = tuple[float, ...]
 Problem = tuple[int, str, str]
@@ -60,10 +59,6 @@ def problem_of(data: bytes) -> Problem | None:
 
 def _read(data: bytes) -> None:
     lines = [(number, line.split()) for number, line in enumerate(data.split(b"\n"), 1) if line.strip()]
-    for number, words in lines:
-        if words[0] in _CAPITALS:
-            letter = _CAPITALS[words[0]]
-            raise _Wrong(number, f"'{_text(words)}' begins with a capital letter", f"write '{letter}'")
     vertices = [_vertex(number, words) for number, words in lines if words[0] == b"v"]
     faces = ((number, _face(number, words, len(vertices))) for number, words in lines if words[0] == b"f")
     count, has_area = 0, False

@@ -65,6 +65,11 @@ def json_position(text: str, where: str, is_of_key: bool = False) -> tuple[int, 
     return text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
 
 
+def place_of_key(text: str, begin: int, key: str) -> int:
+    """Where the last key of this name is in the object that begins at a place of a JSON document."""
+    return _member(text, begin, key, JSONDecoder())[0]
+
+
 def _skip(text: str, at: int) -> int:
     match = _BLANK.match(text, at)
     return match.end() if match else at

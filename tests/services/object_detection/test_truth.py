@@ -108,7 +108,7 @@ def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> Non
     [
         ("", ":1:1: the file is empty, expected JSON"),
         ("[1, 2", ":1:1: '[' is not closed"),
-        ("\x00", ":1:1: not JSON, which begins with { or [: '\x00'"),
+        ("\x00", ":1:1: not JSON: '\x00'"),
         ("[" * 100_000, ": cannot be read as COCO JSON: "),
     ],
 )
