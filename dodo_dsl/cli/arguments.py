@@ -1,11 +1,9 @@
 """The parser of a command line, which suggests what a mistyped word may mean below the usage of its command."""
 
 import argparse
-import re
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-_CHOICE = re.compile(r"argument (?P<what>.+?): invalid choice: (?P<word>.+?) \(choose from (?P<known>.*)\)", re.DOTALL)
 _NAMES = {"COMMAND": "command", "ACTION": "action"}
 
 
@@ -21,8 +19,12 @@ class Arguments(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         from dodo_dsl.search.address import masked
 
-        choice = _CHOICE.fullmatch(message)
-        super().error(masked(_wrong_choice(choice) if choice else message))
+        super().error(masked(message))
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Raises ArgumentError, without an argument of its own, for what is none of an action's choices."""
+        if action.choices is not None and value not in action.choices:
+            raise argparse.ArgumentError(None, _wrong_choice(action, str(value)))
 
     def _unknown(self, word: str) -> str:
         option = word.partition("=")[0]
@@ -32,9 +34,9 @@ class Arguments(argparse.ArgumentParser):
         return f"unknown option '{option}'" + _hint(option, options)
 
 
-def _wrong_choice(choice: re.Match[str]) -> str:
-    word, known = choice["word"].strip("'\""), [name.strip("' ") for name in choice["known"].split(",")]
-    what = choice["what"]
+def _wrong_choice(action: argparse.Action, word: str) -> str:
+    known = [str(choice) for choice in action.choices or ()]
+    what = "/".join(action.option_strings) or str(action.metavar or action.dest)
     if what in _NAMES:
         return f"unknown {_NAMES[what]} '{word}'" + _hint(word, known)
     return f"{what}: '{word}' is not one of {', '.join(known)}" + _hint(word, known, only_near=True)
