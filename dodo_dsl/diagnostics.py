@@ -52,7 +52,8 @@ class Fix:
 class Diagnostic:
     """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` where there is exactly one.
 
-    ``tests`` are those that it depends on, where its place does not say so.
+    ``tests`` are those that it depends on, where its place does not say so. ``about`` names what it says is missing, or
+    where something belongs, for problems that only follow from others.
     """
 
     span: Span
@@ -62,6 +63,7 @@ class Diagnostic:
     severity: Severity = "error"
     fix: Fix | None = field(default=None, compare=False)
     tests: tuple[str, ...] = field(default=(), compare=False)
+    about: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def sentence(self) -> str:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from dodo_dsl.diagnostics import Diagnostic, has_errors
-from dodo_dsl.source import Mapping, Node, Reader, Scalar, read
+from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
+from dodo_dsl.source import Mapping, Node, Reader, Scalar, read, walk
 from dodo_dsl.spec import extends, slips
 from dodo_dsl.spec.instances import matrix, vary
 from dodo_dsl.spec.instances.matrix import Choice
@@ -55,8 +55,15 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
             found.extend(d for d in problems if is_whole or not _is_missing(d, node))
         corners, problems = _corners(spec)
         found.extend(problems)
-        specs.append(replace(spec, corners=corners))
+        unfilled = _unfilled(instance) if has_errors(found) else frozenset[Span]()
+        specs.append(replace(spec, corners=corners, unfilled=unfilled))
     return specs, found
+
+
+def _unfilled(instance: Mapping) -> frozenset[Span]:
+    """Where placeholders are left, whose dimension or range has a problem."""
+    kinds = (matrix.PLACEHOLDERS, vary.PLACEHOLDERS)
+    return frozenset(one.span for one in walk(without(instance, MATRIX)) if any(kind.names(one) for kind in kinds))
 
 
 def _by_name(location: Location, node: Node) -> Spec:

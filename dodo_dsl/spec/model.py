@@ -87,6 +87,7 @@ class Spec:
     ranges: tuple[vary.Range, ...] = ()
     template: Mapping | None = field(default=None, repr=False)
     corners: tuple["Spec", ...] = field(default=(), repr=False)
+    unfilled: frozenset[Span] = field(default=frozenset(), repr=False)
 
     @property
     def path(self) -> Path:

@@ -11,4 +11,5 @@ def check(context: RuleContext) -> Iterator[Diagnostic]:
         use, manifest = service.use, service.manifest
         if use.layer not in manifest.layers:
             message = f"service '{manifest.name}' does not fit layer {use.layer}"
-            yield Diagnostic(use.uses.span, "wrong-layer", message, f"move it to {' or '.join(manifest.layers)}")
+            hint = f"move it to {' or '.join(manifest.layers)}"
+            yield Diagnostic(use.uses.span, "wrong-layer", message, hint, about=tuple(manifest.layers))

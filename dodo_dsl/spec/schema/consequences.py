@@ -34,9 +34,7 @@ def _of(error: Any) -> Iterator[tuple[str, Path]]:
 def _is(error: Any) -> Iterator[tuple[str, Path]]:
     path = tuple(error.absolute_path)
     if error.validator == "required":
-        for name in error.validator_value:
-            if name not in error.instance and f"'{name}'" in error.message:
-                yield "missing", (*path, name)
+        yield "missing", (*path, error.validator_value)
     elif error.validator == "type" and error.instance is None:
         yield "empty", path
 

@@ -61,8 +61,32 @@ def _validator(name: str) -> Any:
     checker = Draft202012Validator.TYPE_CHECKER
     if name != OF_COMPOSE:
         checker = checker.redefine("integer", is_whole)
-    keywords = {UNIT: is_quantity, "properties": properties}
+    keywords = {
+        UNIT: is_quantity,
+        "properties": properties,
+        "required": _required_keys,
+        "dependentRequired": _companions,
+    }
     return extend(Draft202012Validator, keywords, type_checker=checker)(schema_of(name))  # type: ignore[no-untyped-call]
+
+
+def _required_keys(_: Any, names: list[str], instance: Any, __: Any) -> Iterator[Any]:
+    """The keyword ``required``, with an error a key, whose ``validator_value`` is that key alone."""
+    from jsonschema import ValidationError
+
+    for name in names if isinstance(instance, dict) else ():
+        if name not in instance:
+            yield ValidationError(f"{name!r} is missing", validator_value=name)
+
+
+def _companions(_: Any, needed: dict[str, list[str]], instance: Any, __: Any) -> Iterator[Any]:
+    """The keyword ``dependentRequired``, with an error a key; its ``validator_value`` is what that stands without."""
+    from jsonschema import ValidationError
+
+    for name, others in needed.items() if isinstance(instance, dict) else ():
+        for other in others if name in instance else ():
+            if other not in instance:
+                yield ValidationError(f"{name!r} without {other!r}", validator_value=(name, other))
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
@@ -172,27 +196,25 @@ def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    # jsonschema reports each missing key by itself, in the order of the schema
-    missing = next(n for n in error.validator_value if n not in error.instance and f"'{n}'" in error.message)
+    missing = error.validator_value
     known = error.schema.get("properties") or place.about
     almost = next((key for key in error.instance if key not in known and only_fix(key, [missing])), None)
     if almost is not None:
         hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
         yield Diagnostic(place.key(almost), "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
         return
-    about = known.get(missing, {})
-    about = about if isinstance(about, dict) else {}
-    hint = f"write '{missing}: {about['const']}'" if "const" in about else about.get("description", "")
+    schema = known.get(missing, {})
+    schema = schema if isinstance(schema, dict) else {}
+    hint = f"write '{missing}: {schema['const']}'" if "const" in schema else schema.get("description", "")
     if near := closest(place.name.strip("'"), place.extended):
         hint = f"did you mean '{near[0]}' of {shown_path(place.extended[near[0]].key.file)}?"
-    yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
+    about = () if error.absolute_path else (missing,)
+    yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint, about=about)
 
 
 def _companion(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    for name, needed in error.validator_value.items():
-        missing = [other for other in needed if name in error.instance and other not in error.instance]
-        if missing and f"'{missing[0]}'" in error.message:
-            yield Diagnostic(place.span, "missing-key", f"{place.name} has '{name}' without '{missing[0]}'")
+    name, missing = error.validator_value
+    yield Diagnostic(place.span, "missing-key", f"{place.name} has '{name}' without '{missing}'")
 
 
 def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
