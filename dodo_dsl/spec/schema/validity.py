@@ -1,7 +1,8 @@
 """Whether a document fits a schema, and no more: of those that do not, ``validation`` says what is wrong.
 
-Most documents fit. To find that out with jsonschema-rs takes a few milliseconds a command; to load jsonschema and walk
-through schemas of this size in Python takes a third of a second.
+Most documents fit. jsonschema-rs finds that out in 25 ms of a processor a command; jsonschema needs 110 ms, with its
+import. Of ``dodo compile --check`` on the tests that ship that is a tenth: 0.87 s of a processor in place of 0.96 s, in
+other runs 0.76 s in place of 0.84 s (medians of 20 runs each in turns, on two busy cores).
 """
 
 import functools
