@@ -83,6 +83,12 @@ def test_its_fix_makes_it_yaml(name: str) -> None:
     assert parse("\n".join(lines), name)[1] == []
 
 
+def test_patterns_are_not_tried_on_lines_as_long_as_a_file() -> None:
+    """Some would take minutes for what strangers write."""
+    messages = [parse(f"a: {'x ' * words}y: z", "long.yml")[1][0].message for words in (100, 100_000)]
+    assert messages == ["a second colon in the value of 'a', which has to be one text", "':' is not expected here"]
+
+
 @pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
 def test_lines_of_any_system_are_fine(ends: str) -> None:
     node, problems = parse(GOOD.replace("\n", ends), "good.dodo.yml")
@@ -94,7 +100,6 @@ CHARACTERS = "\t \n:-{}[]'\",#&*!|>%@`=;\u00a0" + string.ascii_lowercase[:3]
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, len(GOOD) - 1), st.integers(0, 3), st.text(CHARACTERS, max_size=3))
-@pytest.mark.thorough
 def test_no_change_of_a_few_characters_is_more_than_a_sentence(place: int, gone: int, new: str) -> None:
     """Whatever is typed, there is a file or a place within it, and a message of one line."""
     text = GOOD[:place] + new + GOOD[place + gone :]
