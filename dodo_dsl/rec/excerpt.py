@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet, UnknownMessage
+from dodo_dsl.opendlv.messages.codec import MessageError
+from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.messages.varints import Numbers
 from dodo_dsl.opendlv.recordings.recording import Recording
 
@@ -45,7 +46,7 @@ class Excerpt:
     def _keys(self, known: MessageSet) -> list[tuple[int, int | None]]:
         try:
             return list(map(known.key, self.messages))
-        except UnknownMessage as error:
+        except MessageError as error:
             raise NothingSelected(str(error)) from None
 
     def __str__(self) -> str:

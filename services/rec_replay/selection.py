@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dodo_dsl.opendlv.messages.codec import MessageError
 from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet, UnknownMessage
 from dodo_dsl.opendlv.messages.varints import Marks, Numbers
 from dodo_dsl.opendlv.recordings import timing
@@ -92,8 +93,9 @@ def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:
     marks: Marks = np.zeros(len(index), np.bool_)
     try:
         keys = list(map(known.key, texts))
-    except UnknownMessage as error:
-        raise SelectionError(str(error)) from None
+    except MessageError as error:
+        hint = " (or give an id)" if isinstance(error, UnknownMessage) else ""
+        raise SelectionError(f"{error}{hint}") from None
     for id_, stamp in keys:
         marks |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
     return marks

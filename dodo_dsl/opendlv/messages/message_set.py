@@ -70,11 +70,11 @@ class MessageSet:
     def key(self, text: str) -> tuple[int, int | None]:
         """Id and sender stamp of a name or an id as people write them, with ``/senderStamp`` or for any stamp (None).
 
-        Raises UnknownMessage.
+        Raises MessageError, for a name that the set does not hold UnknownMessage.
         """
         name, slash, stamp = text.partition("/")
         if slash and not is_whole(stamp):
-            raise UnknownMessage(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
+            raise MessageError(f"'{text}' is not a message: expected a sender stamp, a number, after the slash")
         return whole(name) if is_whole(name) else self.id(name), whole(stamp) if slash else None
 
     def ids(self) -> frozenset[int]:
