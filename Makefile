@@ -6,8 +6,8 @@ PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
 # Words for `make bench`, as "rec bus", "--against FILE" or "--against-checkout DIR"
 BENCH ?=
-# `make test` has two parts. Tests in real time mostly wait, for two rigs at a time; so the quick tests run beside them,
-# and those in real time go first: by a priority that root may give, else by the quick ones standing back.
+# `make test` has two parts, each with tests that mostly wait beside others. Those in real time do, for two rigs at a
+# time, and go first: by a priority that root may give, else by the quick ones standing back. The engine's two do, too.
 RIGS ?= 2
 AHEAD := $(if $(filter -10,$(shell nice -n -10 nice 2>/dev/null)),nice -n -10)
 BEHIND := $(if $(AHEAD),,nice -n 10)
