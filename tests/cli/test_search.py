@@ -114,15 +114,15 @@ def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
 
 @pytest.mark.parametrize("sweep", [[], ["--sweep"]])
 def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) -> None:
-    code, out = search("example", "--runs", "32", "--until-failure", *sweep)
+    code, out = search("example", "--runs", "24", "--until-failure", *sweep)
     early = result()
     drives = early["judged"] + early["errors"] + early["proposed"]
-    assert (code, early["ended_early"], drives % 8, drives < 32) == (1, True, 0, True)
+    assert (code, early["ended_early"], drives % 8, drives < 24) == (1, True, 0, True)
     assert "a failure ended the search" in out and bool(early["shrunk"]) is not bool(sweep)
-    search("example", "--runs", "32", *sweep, report="whole")
+    search("example", "--runs", "24", *sweep, report="whole")
     first = min(one["worst"]["number"] for one in early["failures"])
     assert first > drives - 8 and not result("whole")["ended_early"]
-    search("example", "--runs", "32", *sweep)
+    search("example", "--runs", "24", *sweep)
     assert {**result(), "shrunk": []} == {**result("whole"), "shrunk": []}, "it goes on from there"
 
 
@@ -200,14 +200,14 @@ def test_a_search_is_interrupted_between_drives_too(
 
 def test_the_result_is_the_same_however_many_drive_at_once(search: Search) -> None:
     for jobs in ("1", "3"):
-        search("example", "--runs", "18", "-j", jobs, report=jobs)
+        search("example", "--runs", "16", "-j", jobs, report=jobs)
     assert result("1") == result("3")
 
 
 def test_further_drives_fail_more_often_than_the_sweep(search: Search) -> None:
-    search("example", "--runs", "48", "--seed", "2")
+    search("example", "--runs", "32", "--seed", "2")
     found = result()
-    assert found["judged"] + found["errors"] + found["proposed"] >= 48
+    assert found["judged"] + found["errors"] + found["proposed"] >= 32
     assert found["proposed_failed"] / found["proposed"] > 1.5 * found["rate"] > 0
     assert sum(one["drives"] for one in found["failures"]) == found["failed"] + found["proposed_failed"]
 

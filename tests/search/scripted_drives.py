@@ -2,6 +2,7 @@
 
 import asyncio
 import signal
+import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -88,3 +89,12 @@ def stub(patch: pytest.MonkeyPatch, make: Callable[[Plan, int], ScriptedBackend]
     patch.setattr(asyncio, "run", scripted.run)
     patch.setattr(search_session, "Processes", lambda *_: ScriptedBackends(make))
     patch.setattr(shortage, "used_up", lambda *_: shortage.Shortage())  # it looks at all processes of the machine
+    connect = sqlite3.connect
+
+    def connected(path: Path) -> sqlite3.Connection:
+        """What is kept survives the process, but no power cut, for which each drive would wait for the disk."""
+        connection = connect(path)
+        connection.execute("pragma synchronous = off")
+        return connection
+
+    patch.setattr(sqlite3, "connect", connected)
