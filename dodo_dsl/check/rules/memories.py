@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.access import filled
+from dodo_dsl.application.interpolation import interpolated
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.slips import flags
 from dodo_dsl.check.context import RuleContext
@@ -63,7 +63,7 @@ def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
 def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> Iterator[Diagnostic]:
     """Flags that are almost ``--name=``, with a memory of the test."""
     for word, item in flags.words(service):
-        flag = flags.meant(filled.text(word, known), "--name")
+        flag = flags.meant(interpolated(word, known), "--name")
         if flag.partition("=")[2].removeprefix("/") in made:
             message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
             yield Diagnostic(item.span, "application-memory", message, f"did you mean '{flag}'?", "warning")
@@ -72,6 +72,6 @@ def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> It
 def _asked(service: ComposeService, known: dict[str, str]) -> Asked:
     found: Asked = {}
     for word, item in flags.words(service):
-        names = opendlv_flags.memories([filled.text(word, known)])
+        names = opendlv_flags.memories([interpolated(word, known)])
         found.update((name, item.span) for name in names if "$" not in name)
     return found
