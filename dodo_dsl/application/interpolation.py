@@ -1,8 +1,14 @@
 """Variables in compose files, ``${NAME:-default}``: found, and filled in as compose does; and ``.env`` files."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+from dodo_dsl import source
+from dodo_dsl.application.access import secret_variables
+from dodo_dsl.source import Entry, Node
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LINE = re.compile(r"\s*(?:export\s+)?(?P<name>[A-Za-z_][A-Za-z0-9_.-]*)[ \t]*[=:][ \t]*")
@@ -74,11 +80,16 @@ def interpolate(text: str, known: Mapping[str, str], *, unset: bool = True) -> s
     Defaults may hold variables in turn. Without ``unset``, a variable that is neither known nor has a default raises
     EnvironmentProblem instead of being empty.
     """
+    return _replaced(text, lambda match: _filled(match, known, unset))
+
+
+def _replaced(text: str, change: Callable[[re.Match[str]], str]) -> str:
+    """The text with ``change`` applied to each of its variables."""
     parts, place = [], 0
     while (dollar := text.find("$", place)) >= 0:
         end = end_of_variable(text, dollar)
         match = VARIABLE.fullmatch(text, dollar, end)
-        parts += [text[place:dollar], _filled(match, known, unset) if match else text[dollar:end]]
+        parts += [text[place:dollar], change(match) if match else text[dollar:end]]
         place = end
     return "".join([*parts, text[place:]])
 
@@ -104,13 +115,7 @@ def _filled(match: re.Match[str], known: Mapping[str, str], unset: bool) -> str:
 
 def with_values(text: str, values: Mapping[str, str]) -> str:
     """The text with the variables of ``values`` filled in, and all others left for compose."""
-    parts, place = [], 0
-    while (dollar := text.find("$", place)) >= 0:
-        end = end_of_variable(text, dollar)
-        match = VARIABLE.fullmatch(text, dollar, end)
-        parts += [text[place:dollar], _with_value(match, values) if match else text[dollar:end]]
-        place = end
-    return "".join([*parts, text[place:]])
+    return _replaced(text, lambda match: _with_value(match, values))
 
 
 def _with_value(match: re.Match[str], values: Mapping[str, str]) -> str:
@@ -126,6 +131,52 @@ def _with_value(match: re.Match[str], values: Mapping[str, str]) -> str:
     if present:
         return value.replace("$", "$$")
     return match[0] if match["operator"] == "?" else with_values(word, values)
+
+
+def known_variables(
+    own: Mapping[str, str], outside: Mapping[str, str], folder: str, passed: Collection[str] = ()
+) -> dict[str, str]:
+    """The variables that compose would fill in: those ``outside`` first, then those of the application's ``.env``."""
+    found: dict[str, str] = {}
+    seen = {**secret_variables.allowed(outside, passed), "PWD": folder}
+    for name, value in own.items():
+        found[name] = interpolated(value, {**found, **seen})
+    return {**found, **seen}
+
+
+def interpolated(written: Any, known: Mapping[str, str]) -> Any:
+    """A plain value with the variables of its texts filled in.
+
+    A text stays as it is where one of them is neither known nor has a default.
+    """
+    if isinstance(written, dict):
+        return {key: interpolated(below, known) for key, below in written.items()}
+    if isinstance(written, list):
+        return [interpolated(item, known) for item in written]
+    if not isinstance(written, str) or "$" not in written:
+        return written
+    try:
+        return interpolate(written, known, unset=False)
+    except EnvironmentProblem:
+        return written
+
+
+def interpolated_node(written: Node, known: Mapping[str, str]) -> Node:
+    """The same for a node; every part keeps its place."""
+    return changed_node(written, lambda word: interpolated(word, known))
+
+
+def changed_node(written: Node, change: Callable[[str], str]) -> Node:
+    """A node with ``change`` applied to each text that has a variable; every part keeps its place."""
+    if isinstance(written, source.Mapping):
+        entries = {key: Entry(entry.key, changed_node(entry.value, change)) for key, entry in written.entries.items()}
+        return replace(written, entries=entries)
+    if isinstance(written, source.Sequence):
+        return replace(written, items=tuple(changed_node(item, change) for item in written.items))
+    if not isinstance(written.value, str) or "$" not in written.value:
+        return written
+    filled = change(written.value)
+    return replace(written, value=filled, text=filled)
 
 
 def dotenv(text: str) -> dict[str, str]:

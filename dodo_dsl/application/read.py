@@ -8,21 +8,17 @@ from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.access import filled, secret_problems
-from dodo_dsl.application.access.access_diagnostics import diagnostic
-from dodo_dsl.application.access.filled import known_variables
+from dodo_dsl.application.access import secret_problems
+from dodo_dsl.application.access.findings import shared_findings
 from dodo_dsl.application.access.host_paths import INSIDE, link_out, repository
-from dodo_dsl.application.access.limit_findings import volume_findings
-from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.access.shared_findings import shared_findings
-from dodo_dsl.application.application_problems import application_problems
+from dodo_dsl.application.access.model import Access, Look, diagnostic
+from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.discovery import unread
-from dodo_dsl.application.interpolation import names
+from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
 from dodo_dsl.application.load import load
 from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
 from dodo_dsl.application.service_environment import cid_variables, env_files
-from dodo_dsl.application.service_problems import unknown_keys
 from dodo_dsl.application.slips import variable_problems
 from dodo_dsl.application.tunables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
@@ -121,17 +117,16 @@ def _application(
 
 def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:
     """Problems of everything beside the services."""
-    seen = filled.node(document, application.known)
-    raw = plain(seen)
-    cut = volume_findings(raw.get("volumes") or {}, application.limits, compiled=False)
-    for finding in (*shared_findings(raw, application.paths, application.access.passed), *cut):
+    raw = plain(interpolated_node(document, application.known))
+    look = Look(application.paths, limits=application.limits, passed=application.access.passed)
+    for finding in shared_findings(raw, look):
         yield diagnostic(finding, document, document.span)
 
 
 def _own_files(application: ApplicationSource) -> list[Path]:
     """The files of ``env_file`` that the application may read, each once."""
     words = {file.path for service in application.services.values() for file in service.env_files}
-    texts = sorted(filled.text(word, application.known) for word in words)
+    texts = sorted(interpolated(word, application.known) for word in words)
     own = (text for text in texts if "$" not in text and application.paths.is_own(text))
     return list(dict.fromkeys(Path(application.paths.whole(text)) for text in own))
 

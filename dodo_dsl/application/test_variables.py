@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from dodo_dsl import source
 from dodo_dsl.application.access.secret_variables import is_steering
-from dodo_dsl.application.interpolation import names, with_values
+from dodo_dsl.application.interpolation import changed_node, names, with_values
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.source import Entry, Node, Scalar
@@ -75,9 +75,4 @@ def _scalar(service: ComposeService, text: str) -> Scalar:
 
 
 def _filled(node: Node, values: Mapping[str, str]) -> Node:
-    if isinstance(node, source.Sequence):
-        return replace(node, items=tuple(_filled(item, values) for item in node.items))
-    if not isinstance(node, Scalar) or not isinstance(node.value, str) or "$" not in node.value:
-        return node
-    text = with_values(node.value, values)
-    return replace(node, value=text, text=text)
+    return changed_node(node, lambda text: with_values(text, values))

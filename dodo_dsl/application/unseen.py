@@ -4,10 +4,10 @@ import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from dodo_dsl.application.access.access_diagnostics import place
-from dodo_dsl.application.access.build_findings import is_remote
+from dodo_dsl.application.access.model import place
+from dodo_dsl.application.access.value_findings import is_remote
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.application.nested_mounts import shown_paths
+from dodo_dsl.application.mounts import shown_paths
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Mapping, Scalar
 from dodo_dsl.spec.deployment.deployment import Deployment

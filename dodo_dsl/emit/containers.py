@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dodo_dsl.application.mounted_folders import WAY_OUT
+from dodo_dsl.application.mounts import WAY_OUT
 from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Application, Flag, Plan, PlannedService
 from dodo_dsl.plan.test_files import SHARED

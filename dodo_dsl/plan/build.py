@@ -10,7 +10,7 @@ from pathlib import Path
 from dodo_dsl import package_data, source
 from dodo_dsl.application import unseen
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.application.mounted_folders import large_folders
+from dodo_dsl.application.mounts import large_folders
 from dodo_dsl.check import world
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.replayed import WITHOUT
@@ -22,6 +22,7 @@ from dodo_dsl.plan.clock_service import lockstep
 from dodo_dsl.plan.emulated_rig import DRAWN, hardware
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 from dodo_dsl.plan.rewrite.volumes import too_long
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
 from dodo_dsl.source import Scalar
@@ -66,36 +67,17 @@ def build(
         span = Span(str(deployment.file)) if deployment.file else ordered[-1].spec.span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
-    tree = functools.cache(copies)  # tests share maps and recordings
-    imports = _import_paths(deployment, out / "test")
-    limits, hidden = _limits(application, deployment), unseen.below(application, deployment)
-
-    @functools.cache
-    def rewritten(
-        cid: int,
-        isolated: str,
-        evaluators: tuple[str, ...],
-        hardware: bool,
-        privileged: bool,
-        given: tuple[tuple[str, str], ...],
-    ) -> Application:
-        planned = plan_application(
-            application,
-            cid,
-            isolated,
-            out / "test",
-            evaluators,
-            hil=hardware,
-            privileged_allowed=privileged,
-            limits=limits,
-            given=dict(given),
-        )
-        return replace(planned, hidden=hidden)
-
-    builders = [
-        _Builder(test, manifests, deployment, application, settings, cid, index, tree, rewritten, imports)
-        for index, (test, cid) in enumerate(zip(ordered, cids, strict=True))
-    ]
+    hidden = unseen.below(application, deployment)
+    shared = _Shared(
+        manifests,
+        deployment,
+        application,
+        settings,
+        out / "test",
+        functools.cache(copies),  # tests share maps and recordings
+        functools.cache(lambda setting: replace(plan_application(application, setting), hidden=hidden)),
+    )
+    builders = [_Builder(test, cid, index, shared) for index, (test, cid) in enumerate(zip(ordered, cids, strict=True))]
     plans = []
     for builder in builders:
         before_each()
@@ -171,32 +153,36 @@ def isolation(spec: Spec, rig: Rig | None) -> str:
     return spec.isolation or (rig.isolation if rig else "network")
 
 
+@dataclass(frozen=True)
+class _Shared:
+    """What the tests of a suite share; ``folder`` stands for a compiled test's, as all lie side by side.
+
+    ``tree`` has the copies of a folder in a root, and ``rewritten`` the application in a setting.
+    """
+
+    manifests: Mapping[str, Manifest]
+    deployment: Deployment
+    application: ApplicationSource
+    settings: Settings
+    folder: Path
+    tree: Callable[[Path, Path], list[FileCopy]]
+    rewritten: Callable[[Setting], Application]
+
+    @functools.cached_property
+    def imports(self) -> tuple[str, ...]:
+        return _import_paths(self.deployment, self.folder)
+
+    @functools.cached_property
+    def limits(self) -> SandboxLimits:
+        return _limits(self.application, self.deployment)
+
+
 class _Builder:
-    def __init__(
-        self,
-        test: ResolvedTest,
-        manifests: Mapping[str, Manifest],
-        deployment: Deployment,
-        application: ApplicationSource,
-        settings: Settings,
-        cid: int,
-        index: int,
-        tree: Callable[[Path, Path], list[FileCopy]],
-        rewritten: Callable[[int, str, tuple[str, ...], bool, bool, tuple[tuple[str, str], ...]], Application],
-        imports: tuple[str, ...],
-    ) -> None:
-        self.test = test
-        self.spec = test.spec
-        self.rig = test.rig
-        self.manifests = manifests
-        self.deployment = deployment
-        self.application = application
-        self.settings = settings
-        self.cid = cid
-        self.index = index
-        self.tree = tree
-        self.rewritten = rewritten
-        self.imports = imports
+    def __init__(self, test: ResolvedTest, cid: int, index: int, shared: _Shared) -> None:
+        self.test, self.spec, self.rig = test, test.spec, test.rig
+        self.cid, self.index = cid, index
+        self.shared = shared
+        self.manifests, self.deployment, self.application = shared.manifests, shared.deployment, shared.application
         self.files: set[FileCopy] = set()
         self.named: set[Path] = set()
         """Files that the spec names, or a folder does that it names."""
@@ -231,8 +217,16 @@ class _Builder:
             if key in spec.spans:
                 self._place(key, spec.span(key))
         isolated = isolation(spec, rig)
-        hardware = rig is not None and not rig.is_emulated
-        privileged = rig is not None and rig.privileged
+        setting = Setting(
+            self.cid,
+            isolated,
+            self.shared.folder,
+            evaluators,
+            hil=rig is not None and not rig.is_emulated,
+            privileged_allowed=rig is not None and rig.privileged,
+            limits=self.shared.limits,
+            given=self._variables(),
+        )
         messages = self._messages()
         return Plan(
             name=spec.title,
@@ -250,8 +244,8 @@ class _Builder:
             tag=rig.tag if rig else "sil",
             sandbox_image=self._image("sandbox"),
             services=services,
-            application=self.rewritten(self.cid, isolated, evaluators, hardware, privileged, self._variables()),
-            lockstep=lockstep(spec, self.application.declared, self.settings.wall_timeout_s),
+            application=self.shared.rewritten(setting),
+            lockstep=lockstep(spec, self.application.declared, self.shared.settings.wall_timeout_s),
             resources=spec.resources,
             rig=rig.name if rig else "",
             more_tags=rig.more_tags if rig else (),
@@ -262,7 +256,7 @@ class _Builder:
             world=world.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in world.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
-            import_paths=self.imports,
+            import_paths=self.shared.imports,
             source_map=self.places,
         )
 
@@ -368,7 +362,7 @@ class _Builder:
         path = value.path or Path()
         root = self.spec.location.root.resolve()
         try:
-            found = self.tree(path, root)
+            found = self.shared.tree(path, root)
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         else:

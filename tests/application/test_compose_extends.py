@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.application.compose_extends import MAX_DEPTH, ExtendedService, extended, moved
 from dodo_dsl.application.compose_files import ComposeFiles
+from dodo_dsl.application.load import MAX_DEPTH, ExtendedService, extended, moved
 from dodo_dsl.source import Mapping, plain
 from tests.source.nodes import mapping
 

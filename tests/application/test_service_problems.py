@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.application.service_problems import unknown_keys
+from dodo_dsl.application.application_problems import unknown_keys
 from tests.application.applications import problems
 from tests.source.nodes import mapping
 

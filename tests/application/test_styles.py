@@ -16,6 +16,7 @@ from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Plan, PlannedService
 from dodo_dsl.plan.plan_json import from_json, to_json
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 from tests.emit.readers import compose
 
 FOLDER = Path(__file__).parent
@@ -36,7 +37,8 @@ def plan(folder: Path, way: str, out: Path) -> tuple[Plan, str]:
     assert source is not None, format_text(problems)
     hil = way == "hil"
     isolation = "network" if way == "network" else "host"
-    application = plan_application(source, 140, isolation, out, ("judge-of-test",), hil=hil, privileged_allowed=hil)
+    setting = Setting(140, isolation, out, ("judge-of-test",), hil=hil, privileged_allowed=hil)
+    application = plan_application(source, setting)
     judge = PlannedService("evaluation", "judge-of-test", "collision", "dodo/collision:1", (), (), True)
     subnet = "10.213.0.0/28" if way == "network" else ""
     common = (

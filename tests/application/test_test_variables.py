@@ -11,6 +11,7 @@ from dodo_dsl.application.read import read_application
 from dodo_dsl.application.test_variables import owner
 from dodo_dsl.plan.model import Application, Plan
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
 from tests.application.composed import config
@@ -46,7 +47,7 @@ def application(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Application:
     (tmp_path / "car.env").write_text("SPEED=9\n")
     source, problems = read_application(tmp_path / "compose.yml")
     assert source is not None, problems
-    return plan_application(source, 140, "host", tmp_path / "generated" / "t", (), given=GIVEN)
+    return plan_application(source, Setting(140, "host", tmp_path / "generated" / "t", given=tuple(GIVEN.items())))
 
 
 @pytest.mark.thorough

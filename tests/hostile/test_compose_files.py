@@ -15,6 +15,7 @@ from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Application, Plan, PlannedService
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.protocol import BackendError
 from tests.emit.readers import compose
@@ -52,7 +53,7 @@ def found(
     source, problems = read_application(written(attack, folder), Access(passed=tuple(passed)))
     if source is None:
         return None, problems
-    return plan_application(source, 140, "network", folder / "generated" / "t", (JUDGE.name,)), problems
+    return plan_application(source, Setting(140, "network", folder / "generated" / "t", (JUDGE.name,))), problems
 
 
 def plan(application: Application) -> Plan:

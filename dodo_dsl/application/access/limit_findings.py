@@ -7,10 +7,9 @@ only at run time is refused then.
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
-from dodo_dsl.application.access.model import AccessFinding, Steps
+from dodo_dsl.application.access.model import AccessFinding, Look, Steps, at, items
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
 Findings = Iterator[AccessFinding]
@@ -20,84 +19,57 @@ _MESSAGE_QUEUES = 819_200
 """The kernel's default, in bytes (RLIMIT_MSGQUEUE)."""
 _DEPLOY = ("deploy", "resources", "limits")
 _SIZE = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?)\s*([kmgtp]?)(?:i?b)?\s*", re.IGNORECASE | re.ASCII)
-_POWERS = {letter: 1024**power for power, letter in enumerate(("", "k", "m", "g", "t", "p"))}
 _SIZES_OF_TMPFS = ("size=", "nr_blocks=")
 _MOST_LOGS = 10
-_UNLIMITED = ("", "0", "-1")
+UNLIMITED = ("", "0", "-1")
 """Sizes of a log that a test's copy replaces by its own."""
 _PERIOD = 100_000
 """us: the engine's default of ``cpu_period``."""
 
 
-@dataclass(frozen=True)
-class Excess:
-    """A value beyond a limit, and ``allowed`` in its place; ``key`` of ``sandbox`` sets the limit, if one does.
+def of_service(service: Mapping[str, Any], look: Look) -> Findings:
+    """Limits of a service beyond the test's, in plain values with their variables filled in.
 
-    ``is_written`` is False where the file sets nothing, and the engine would set no limit either. ``most`` is the
-    limit for people.
+    In a test's copy also those where nothing is written, and the engine would set no limit either.
     """
-
-    steps: Steps
-    allowed: int | float | str
-    key: str
-    most: str
-    is_written: bool = True
-
-    @property
-    def shown(self) -> str:
-        """The key as people write it: ``ulimits.nofile.hard``."""
-        return ".".join(step for step in self.steps if isinstance(step, str))
+    whose = f"'{look.name}'"
+    yield from (f for f in service_limits(service, look.limits, whose) if look.compiled or f.kind == "limit")
 
 
-def limit_findings(name: str, service: Mapping[str, Any], limits: SandboxLimits, compiled: bool) -> Findings:
-    """Limits of the service ``name`` beyond the test's; in a ``compiled`` test also where nothing is written."""
-    yield from _findings(f"'{name}'", service_excesses(service, limits), compiled)
+def of_volume(volume: Mapping[str, Any], look: Look) -> Findings:
+    """The same of one of the top-level ``volumes``."""
+    found = volume_limits(look.name, volume, look.limits)
+    yield from (f for f in found if look.compiled or f.kind == "limit")
 
 
-def volume_findings(volumes: Mapping[str, Any], limits: SandboxLimits, compiled: bool) -> Findings:
-    """The same of the top-level ``volumes``."""
-    found = _findings("the application's volumes", volume_excesses(volumes, limits), compiled)
-    yield from (finding.below("volumes") for finding in found)
-
-
-def _findings(whose: str, found: Iterator[Excess], compiled: bool) -> Findings:
-    for excess in found:
-        if excess.is_written or compiled:
-            message = f"'{excess.shown}' of {whose} is beyond the test's limit of {excess.most}"
-            hint = f"it is cut; '{excess.key}' of 'sandbox' in dodo.yml sets the limit" if excess.key else "it is cut"
-            yield AccessFinding(excess.steps, message, hint, "limit")
-
-
-def service_excesses(service: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess]:
-    """What a service sets beyond its limits, in plain values with their variables filled in."""
-    for steps, above, allowed, key in _rows(limits):
-        value = _at(service, steps)
-        if value is not None and above(value):
-            yield Excess(steps, allowed, key, _text(float(allowed), key))
-    yield from _quota(service, limits)
+def service_limits(service: Mapping[str, Any], limits: SandboxLimits, whose: str = "the service") -> Findings:
+    """The same with those that are not written, which are ``unlimited``."""
+    for steps, most, measure, key in _bounds(service, limits):
+        value, is_at_least_1 = at(service, steps), steps[-1] not in ("memswap_limit", "shm_size", "cpu_shares")
+        if value is not None and _is_above(value, most, measure, is_at_least_1):
+            is_text = steps[:1] == _DEPLOY[:1] and key != "processes"
+            yield _beyond(steps, str(most) if is_text else most, key, _text(most, key), whose)
+    yield from _quota(service, limits, whose)
     for base in (("ulimits",), ("build", "ulimits")):
-        yield from _ulimits(base, _at(service, base), limits)
-    yield from _tmpfs(service, limits)
-    yield from _logs(service, limits)
+        yield from _ulimits(base, at(service, base), limits, whose)
+    yield from _tmpfs(service, limits, whose)
+    yield from _logs(service, limits, whose)
 
 
-def volume_excesses(volumes: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess]:
-    """The same of the top-level ``volumes``: file systems in memory."""
-    for name, about in volumes.items() if isinstance(volumes, dict) else ():
-        options = about.get("driver_opts") if isinstance(about, dict) else None
-        if isinstance(options, dict) and options.get("type") == "tmpfs":
-            steps = (name, "driver_opts", "o")
-            yield from _options(steps, str(options.get("o") or ""), limits)
+def volume_limits(name: str, volume: Any, limits: SandboxLimits) -> Findings:
+    """The same of one of the top-level ``volumes``: of a file system in memory."""
+    if at(volume, ("driver_opts", "type")) == "tmpfs":
+        options = str(at(volume, ("driver_opts", "o")) or "")
+        shown = f"{name}.driver_opts.o"
+        yield from _options(("driver_opts", "o"), options, limits, "the application's volumes", shown=shown)
 
 
 def size(value: object) -> float:
     """Bytes of a size as compose reads it, ``8g``; infinite where it is none, or not known to be finite."""
-    if isinstance(value, bool):
-        return math.inf
-    if isinstance(value, int | float):
+    if isinstance(value, int | float) and not isinstance(value, bool):
         return value if value >= 0 else math.inf
     found = _SIZE.fullmatch(str(value))
-    return float(found[1]) * _POWERS[found[2].lower()] if found else math.inf
+    return float(found[1]) * 1024.0 ** " kmgtp".index(found[2].lower() or " ") if found else math.inf
 
 
 def _number(value: object) -> float:
@@ -108,111 +80,120 @@ def _number(value: object) -> float:
     return found if found >= 0 else math.inf
 
 
-def _above(most: float, measure: Callable[[object], float], zero_is_none: bool = False) -> Callable[[object], bool]:
-    """Whether a value is above ``most``; with ``zero_is_none`` also where it is 0, which sets no limit."""
-
-    def above(value: object) -> bool:
-        return "$" not in str(value) and (measure(value) > most or (zero_is_none and not measure(value)))
-
-    return above
+def _is_above(value: object, most: float, measure: Callable[[object], float], is_at_least_1: bool = False) -> bool:
+    """Whether a value is above ``most``, or is 0 where that sets no limit; of a variable nobody knows."""
+    return "$" not in str(value) and (measure(value) > most or (is_at_least_1 and not measure(value)))
 
 
-def _rows(limits: SandboxLimits) -> Iterator[tuple[Steps, Callable[[object], bool], int | float | str, str]]:
-    memory, processes = limits.memory, limits.processes
-    most_memory, most_processes = _above(memory, size, True), _above(processes, _number, True)
-    yield ("pids_limit",), most_processes, processes, "processes"
-    yield (*_DEPLOY, "pids"), most_processes, processes, "processes"
-    yield ("mem_limit",), most_memory, memory, "memory"
-    yield (*_DEPLOY, "memory"), most_memory, str(memory), "memory"
-    yield ("memswap_limit",), _above(2 * memory, size), 2 * memory, "memory"
-    for steps in (("shm_size",), ("build", "shm_size")):
-        yield steps, _above(memory, size), memory, "memory"
-    yield ("cpu_shares",), _above(CPU_SHARES, _number), CPU_SHARES, ""
+def _bounds(
+    service: Mapping[str, Any], limits: SandboxLimits
+) -> Iterator[tuple[Steps, int | float, Callable[[object], float], str]]:
+    steps: Steps
+    for steps in (("pids_limit",), (*_DEPLOY, "pids")):
+        yield steps, limits.processes, _number, "processes"
+    for steps in (("mem_limit",), (*_DEPLOY, "memory"), ("shm_size",), ("build", "shm_size")):
+        yield steps, limits.memory, size, "memory"
+    yield ("memswap_limit",), 2 * limits.memory, size, "memory"
+    yield ("cpu_shares",), CPU_SHARES, _number, ""
     if limits.cpus is not None:
-        yield ("cpus",), _above(limits.cpus, _number, True), limits.cpus, "cpus"
-        yield (*_DEPLOY, "cpus"), _above(limits.cpus, _number, True), str(limits.cpus), "cpus"
+        for steps in (("cpus",), (*_DEPLOY, "cpus")):
+            yield steps, limits.cpus, _number, "cpus"
 
 
-def _quota(service: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess]:
+def _quota(service: Mapping[str, Any], limits: SandboxLimits, whose: str) -> Findings:
     quota, period = service.get("cpu_quota"), service.get("cpu_period") or _PERIOD
     if limits.cpus is None or quota is None or "$" in f"{quota}{period}":
         return
     most = limits.cpus * _number(period)
-    if math.isfinite(most) and _above(most, _number, True)(quota):
-        yield Excess(("cpu_quota",), int(most), "cpus", f"{limits.cpus:g} processors")
+    if math.isfinite(most) and _is_above(quota, most, _number, True):
+        yield _beyond(("cpu_quota",), int(most), "cpus", f"{limits.cpus:g} processors", whose)
 
 
-def _logs(service: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess]:
+def _logs(service: Mapping[str, Any], limits: SandboxLimits, whose: str) -> Findings:
     """All files of a log together are no larger than one that a program may write."""
     steps = ("logging", "options")
-    options = _at(service, steps)
+    options = at(service, steps)
     if not isinstance(options, dict) or "$" in str(options.get("max-file")):
         return
     files = _number(options.get("max-file") or 1)
     if files > _MOST_LOGS:
-        yield Excess((*steps, "max-file"), str(_MOST_LOGS), "", str(_MOST_LOGS))
+        yield _beyond((*steps, "max-file"), str(_MOST_LOGS), "", str(_MOST_LOGS), whose)
     most = int(limits.file_size // max(1, min(files, _MOST_LOGS)))
     written = options.get("max-size")
-    if written is not None and str(written).strip() not in _UNLIMITED and _above(most, size)(written):
-        yield Excess((*steps, "max-size"), str(most), "file-size", _text(most, "file-size"))
+    if written is not None and str(written).strip() not in UNLIMITED and _is_above(written, most, size):
+        yield _beyond((*steps, "max-size"), str(most), "file-size", _text(most, "file-size"), whose)
 
 
-def _ulimits(base: Steps, written: Any, limits: SandboxLimits) -> Iterator[Excess]:
-    for name, (most, key) in _ulimit_bounds(limits).items():
-        value = written.get(name) if isinstance(written, dict) else None
+def _ulimits(base: Steps, written: Any, limits: SandboxLimits, whose: str) -> Findings:
+    """The highest limits of a process, with the keys of ``sandbox``; others bind a process to less than it has."""
+    for name, most, key in (
+        ("core", 0, ""),
+        ("fsize", limits.file_size, "file-size"),
+        ("nofile", limits.files, "files"),
+        ("nproc", limits.processes, "processes"),
+        ("memlock", limits.memory, "memory"),
+        ("msgqueue", _MESSAGE_QUEUES, ""),
+    ):
+        value = at(written, (name,))
         parts = value.items() if isinstance(value, dict) else [("", value)] if value is not None else []
         for part, number in parts:
-            if _above(most, _number)(number):
-                yield Excess((*base, name, part) if part else (*base, name), most, key, _text(most, key))
+            if _is_above(number, most, _number):
+                yield _beyond((*base, name, part) if part else (*base, name), most, key, _text(most, key), whose)
 
 
-def _ulimit_bounds(limits: SandboxLimits) -> dict[str, tuple[int, str]]:
-    """The highest limits of a process, with the keys of ``sandbox``; others bind a process to less than it has."""
-    return {
-        "core": (0, ""),
-        "fsize": (limits.file_size, "file-size"),
-        "nofile": (limits.files, "files"),
-        "nproc": (limits.processes, "processes"),
-        "memlock": (limits.memory, "memory"),
-        "msgqueue": (_MESSAGE_QUEUES, ""),
-    }
-
-
-def _tmpfs(service: Mapping[str, Any], limits: SandboxLimits) -> Iterator[Excess]:
-    written = service.get("tmpfs")
-    for item, word in enumerate(written if isinstance(written, list) else [written] if written else []):
+def _tmpfs(service: Mapping[str, Any], limits: SandboxLimits, whose: str) -> Findings:
+    for steps, word in items(service, "tmpfs"):
         target, _, options = str(word).partition(":")
-        steps: Steps = ("tmpfs", item) if isinstance(written, list) else ("tmpfs",)
-        for excess in _options(steps, options, limits):
-            yield replace(excess, allowed=f"{target}:{excess.allowed}")
-    mounts = service.get("volumes")
-    for item, mount in enumerate(mounts if isinstance(mounts, list) else ()):
-        if not isinstance(mount, dict) or mount.get("type") != "tmpfs":
-            continue
-        value = _at(mount, ("tmpfs", "size"))
-        if value is None or _above(limits.memory, size, True)(value):
-            most = _text(limits.memory, "memory")
-            yield Excess(("volumes", item, "tmpfs", "size"), limits.memory, "memory", most, value is not None)
+        own = steps if isinstance(service["tmpfs"], list) else steps[:1]
+        if word or own is steps:
+            yield from _options(own, options, limits, whose, before=f"{target}:")
+    for steps, mount in items(service, "volumes"):
+        value = at(mount, ("tmpfs", "size"))
+        if at(mount, ("type",)) == "tmpfs" and (value is None or _is_above(value, limits.memory, size, True)):
+            most, is_written = _text(limits.memory, "memory"), value is not None
+            yield _beyond((*steps, "tmpfs", "size"), limits.memory, "memory", most, whose, is_written=is_written)
 
 
-def _options(steps: Steps, options: str, limits: SandboxLimits) -> Iterator[Excess]:
+def _options(
+    steps: Steps, options: str, limits: SandboxLimits, whose: str, *, before: str = "", shown: str = ""
+) -> Findings:
     """Options of a file system in memory, as mount(8) reads them, with a size that it may have."""
     words = [word for word in options.split(",") if word]
     sizes = [word for word in words if word.startswith(_SIZES_OF_TMPFS)]
-    above = _above(limits.memory, size, True)
-    if "$" in options or (sizes and not any(above(word.removeprefix("size=")) for word in sizes)):
+    is_above = any(_is_above(word.removeprefix("size="), limits.memory, size, True) for word in sizes)
+    if "$" in options or (sizes and not is_above):
         return
     allowed = ",".join([*(word for word in words if word not in sizes), f"size={limits.memory}"])
-    yield Excess(steps, allowed, "memory", _text(limits.memory, "memory"), bool(sizes))
+    most = _text(limits.memory, "memory")
+    yield _beyond(steps, f"{before}{allowed}", "memory", most, whose, is_written=bool(sizes), shown=shown)
+
+
+def _beyond(
+    steps: Steps, allowed: float | str, key: str, most: str, whose: str, *, is_written: bool = True, shown: str = ""
+) -> AccessFinding:
+    """A value beyond a limit, with ``most`` for people; ``key`` of ``sandbox`` sets the limit, if one does."""
+    name = shown or dotted(steps)
+    hint = f"it is cut; '{key}' of 'sandbox' in dodo.yml sets the limit" if key else "it is cut"
+    message = f"'{name}' of {whose} is beyond the test's limit of {most}"
+    return AccessFinding(steps, message, hint, "limit" if is_written else "unlimited", allowed=allowed)
+
+
+def dotted(steps: Steps) -> str:
+    """The key as people write it: ``ulimits.nofile.hard``."""
+    return ".".join(step for step in steps if isinstance(step, str))
+
+
+def put(written: Any, finding: AccessFinding) -> None:
+    """Changes a plain value in place, so that it has what is allowed."""
+    *way, last = finding.steps
+    for step in way:
+        if isinstance(written, dict) and not isinstance(written.get(step), dict | list):
+            written[step] = {}
+        written = written[step]
+    written[last] = finding.allowed
 
 
 def _text(most: float, key: str) -> str:
     if key in ("memory", "file-size"):
         return f"{most / 10**9:g} GB ({most:,.0f} bytes)"
     return f"{most:,g}" if most < 10**6 else f"{most:,.0f}"
-
-
-def _at(value: Any, steps: Steps) -> Any:
-    for step in steps:
-        value = value.get(step) if isinstance(value, dict) else None
-    return value

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.application import opendlv_flags, slips
-from dodo_dsl.application.access import filled
+from dodo_dsl.application.interpolation import interpolated
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.replayed import IMAGE, without_pictures
@@ -62,7 +62,7 @@ def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
 def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> Iterator[Diagnostic]:
     """Flags that are almost ``--name=``, with a memory of the test."""
     for word, item in slips.words(service):
-        flag = slips.meant(filled.text(word, known), "--name")
+        flag = slips.meant(interpolated(word, known), "--name")
         if flag.partition("=")[2].removeprefix("/") in made:
             message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
             yield Diagnostic(item.span, "application-memory", message, f"did you mean '{flag}'?", "warning")
@@ -71,6 +71,6 @@ def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> It
 def _asked(service: ComposeService, known: dict[str, str]) -> Asked:
     found: Asked = {}
     for word, item in slips.words(service):
-        names = opendlv_flags.memories([filled.text(word, known)])
+        names = opendlv_flags.memories([interpolated(word, known)])
         found.update((name, item.span) for name in names if "$" not in name)
     return found

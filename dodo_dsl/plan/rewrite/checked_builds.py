@@ -5,17 +5,15 @@ from dataclasses import replace
 from typing import Any
 
 from dodo_dsl.application import compose_paths
-from dodo_dsl.application.access import filled
-from dodo_dsl.application.access.access_diagnostics import diagnostic
-from dodo_dsl.application.access.build_findings import build_findings, is_remote
 from dodo_dsl.application.access.compose_keys import BUILD, removed
+from dodo_dsl.application.access.findings import service_findings, shared_findings
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.limit_findings import service_excesses
-from dodo_dsl.application.access.shared_findings import shared_findings
-from dodo_dsl.application.interpolation import EnvironmentProblem, interpolate
+from dodo_dsl.application.access.limit_findings import put, service_limits
+from dodo_dsl.application.access.model import Look, diagnostic
+from dodo_dsl.application.access.value_findings import is_remote
+from dodo_dsl.application.interpolation import EnvironmentProblem, changed_node, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.plan.rewrite.container_limits import put
 from dodo_dsl.source import Entry
 from dodo_dsl.source import Mapping as Node
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
@@ -48,7 +46,7 @@ def checked_builds(application: ApplicationSource) -> tuple[dict[str, Any], list
 
 
 def _literal(node: Node, known: Mapping[str, str]) -> Node:
-    written = filled.changed(node, lambda text: interpolate(text, known))
+    written = changed_node(node, lambda text: interpolate(text, known))
     assert isinstance(written, Node)
     return written
 
@@ -64,9 +62,8 @@ def _checked(written: Any, known: Mapping[str, str], limits: SandboxLimits) -> d
     if "args" in build:
         build["args"] = _with_values(build["args"], known)
     own = {"build": build}
-    for excess in list(service_excesses(own, limits)):
-        if excess.steps[0] == "build":
-            put(own, excess)
+    for finding in list(service_limits(own, limits)):
+        put(own, finding)
     return own
 
 
@@ -77,8 +74,8 @@ def _with_values(arguments: Any, known: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _problems(service: ComposeService, own: dict[str, Any], paths: HostPaths) -> Iterator[Diagnostic]:
-    for finding in build_findings(service.name, own, paths):
-        yield diagnostic(finding.below("build"), service.node, service.span)
+    for finding in service_findings(service.name, own, Look(paths)):
+        yield diagnostic(finding, service.node, service.span)
 
 
 def _secrets(application: ApplicationSource, paths: HostPaths) -> tuple[dict[str, Any], list[Diagnostic]]:
@@ -94,5 +91,5 @@ def _secrets(application: ApplicationSource, paths: HostPaths) -> tuple[dict[str
         return {}, [Diagnostic(place, "application-file", f"the secrets: {problem}", "set it")]
     moved = compose_paths.mapped_rest(entries, lambda path: _whole(path, paths))
     secrets = {key: plain(value) for key, value in moved.items()}
-    found = shared_findings(secrets, paths, application.access.passed)
+    found = shared_findings(secrets, Look(paths, passed=application.access.passed))
     return secrets, [diagnostic(finding, node, written.span) for finding in found]

@@ -1,65 +1,42 @@
 """``plan_application``: a test's own copy of the application's compose file."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
+from dodo_dsl import source
 from dodo_dsl.application import compose_paths, host_access, interpolation, opendlv_flags
+from dodo_dsl.application.access.model import Look
+from dodo_dsl.application.access.secret_variables import is_steering
+from dodo_dsl.application.compose_files import text_of
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, Word, environment, plain, text
 from dodo_dsl.application.test_variables import with_variables
 from dodo_dsl.plan.model import STARTED, Application, ApplicationService
-from dodo_dsl.plan.rewrite import (
-    cid_and_image,
-    container_limits,
-    other_changes,
-    removals,
-    service_namespaces,
-    variables,
-    volumes,
-)
-from dodo_dsl.plan.rewrite.file_copies import FileCopies
-from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
-from dodo_dsl.source import Node
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.plan.rewrite import cid_and_image, confinement, service_namespaces, volumes
+from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy, Setting
+from dodo_dsl.source import Node, Scalar
 
 _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
     cid_and_image.assign_image,
-    removals.remove_machine_settings,
-    removals.remove_hardware,
-    container_limits.confine,
+    confinement.remove_machine_settings,
+    confinement.remove_hardware,
+    confinement.confine,
     service_namespaces.own_namespaces,
     volumes.own_mounts,
     service_namespaces.own_dependencies,
 )
 
 
-def plan_application(
-    application: ApplicationSource,
-    cid: int,
-    isolation: str,
-    folder: Path,
-    after: tuple[str, ...],
-    *,
-    hil: bool = False,
-    privileged_allowed: bool = False,
-    limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
-    given: Mapping[str, str] = MappingProxyType({}),
-) -> Application:
-    """The application as a test runs it; ``folder`` is the compiled test's, ``after`` the services it waits for.
-
-    Devices stay only with ``hil``, privileges only with ``privileged_allowed`` as well. ``given`` are variables
-    that the test sets.
-    """
-    application = with_variables(application, given)
-    base = _relative(application.folder, folder)
+def plan_application(application: ApplicationSource, setting: Setting) -> Application:
+    """The application as a test runs it."""
+    application = with_variables(application, dict(setting.given))
+    base = _relative(application.folder, setting.folder)
     written = compose_paths.escaped(base)
-    names = frozenset(application.services)
-    containers, known, ports = application.containers, application.known, application.access.ports
     changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
-    changes += [f"all services: {name} as the test sets it" for name in given]
+    changes += [f"all services: {name} as the test sets it" for name, _ in setting.given]
     path_variables: set[str] = set()
 
     def change(path: str) -> str:
@@ -68,44 +45,55 @@ def plan_application(
 
     nodes = {n: compose_paths.mapped_service(service.node, change) for n, service in application.services.items()}
     rest = {key: plain(node) for key, node in compose_paths.mapped_rest(application.rest, change).items()}
-    paths = replace(application.paths, folder=folder)
-    copies = FileCopies(paths, known, map(plain, nodes.values()), rest.get("volumes"))
-    setting = Setting(cid, isolation, after, names, containers, hil, privileged_allowed, known, limits, ports, copies)
-    services = {name: _copied(application.services[name], node, setting, changes) for name, node in nodes.items()}
+    project = _project(application, setting, map(plain, nodes.values()), rest.get("volumes"))
+    services = {name: _copied(application.services[name], node, project, changes) for name, node in nodes.items()}
     for key in ("secrets", "configs"):
         if isinstance(rest.get(key), dict):
             rest[key] = {name: volumes.without_name(about) for name, about in rest[key].items()}
-    changes = other_changes.of_all(changes, list(services))
-    if "volumes" in rest or copies.sources:
-        rest["volumes"] = volumes.own_volumes(rest.get("volumes"), changes, copies.sources, limits, known, paths)
-    changes += other_changes.of_top_level(application, rest)
-    planned = tuple(_planned(service, cid, application) for service in application.services.values())
-    carried = variables.carried(application, cid, base, path_variables)
-    secrets = {name: _relative(file, folder) for name, file in application.secrets.items()}
+    changes = _with_common(changes, list(services))
+    copies = project.copies.sources if project.copies else {}
+    if "volumes" in rest or copies:
+        rest["volumes"] = volumes.own_volumes(rest.get("volumes"), changes, project)
+    changes += _of_top_level(application, rest)
     access = replace(
         application.access,
-        roots=tuple(_relative(root, folder) for root in application.other_roots),
-        devices=hil,
-        privileged=hil and privileged_allowed,
+        roots=tuple(_relative(root, setting.folder) for root in application.other_roots),
+        devices=setting.hil,
+        privileged=setting.keeps_privileges,
     )
-    compose = {"services": services, **rest}
     return Application(
-        base, planned, compose, tuple(changes), carried, limits, secrets=secrets, access=access, copies=copies.sources
+        base,
+        tuple(_planned(service, setting.cid, application) for service in application.services.values()),
+        {"services": services, **rest},
+        tuple(changes),
+        carried(application, setting.cid, base, path_variables),
+        setting.limits,
+        secrets={name: _relative(file, setting.folder) for name, file in application.secrets.items()},
+        access=access,
+        copies=copies,
     )
+
+
+def _project(application: ApplicationSource, setting: Setting, services: Iterable[Any], named: Any) -> Project:
+    """What the copies of the services share; their paths and those of the ``named`` volumes are as the copies have."""
+    paths = replace(application.paths, folder=setting.folder)
+    look = Look(paths, containers=application.containers, ports=application.access.ports, limits=setting.limits)
+    copies = volumes.FileCopies(paths, application.known, services, named)
+    return Project(setting, frozenset(application.services), look, application.known, copies)
 
 
 def _relative(path: Path, folder: Path) -> str:
     return Path(os.path.relpath(path, folder)).as_posix()
 
 
-def _copied(service: ComposeService, node: Node, setting: Setting, changes: list[str]) -> dict[str, Any]:
+def _copied(service: ComposeService, node: Node, project: Project, changes: list[str]) -> dict[str, Any]:
     """The service rewritten, without keys that have no value, most of which compose refuses."""
     kept = {key: value for key, value in _with_values(plain(node)).items() if key not in KEYS}
-    copy = ServiceCopy(service.name, kept, setting, changes)
+    copy = ServiceCopy(service.name, kept, project, changes)
     cid_and_image.assign_cid(copy, service.cid_variables)
     for step in _STEPS:
         step(copy)
-    other_changes.note_others(copy, _with_values(plain(service.node)), _with_values(plain(node)))
+    _note_others(copy, _with_values(plain(service.node)), _with_values(plain(node)))
     return copy.service
 
 
@@ -167,3 +155,85 @@ def _condition(about: Any) -> str:
 
 def _names(words: Iterable[Word]) -> tuple[str, ...]:
     return tuple(name for name, _ in words)
+
+
+def _note_others(copy: ServiceCopy, written: Mapping[str, Any], with_paths: Mapping[str, Any]) -> None:
+    """Notes each key that differs from the file and that no change of the service names.
+
+    ``written`` is the service as in the file, ``with_paths`` the same with paths as seen from the test's folder.
+    """
+    if moved := [key for key, value in with_paths.items() if written.get(key) != value]:
+        copy.note(f"paths start at this folder: {', '.join(sorted(moved))}")
+    noted = [line for line in copy.changes if line.startswith(f"{copy.name}: ")]
+    for words, keys in (
+        ("changed for the test", [key for key, value in copy.service.items() if with_paths.get(key, value) != value]),
+        ("added for the test", [key for key in copy.service if key not in with_paths]),
+        ("left out", [key for key in with_paths if key not in copy.service]),
+    ):
+        if unnamed := sorted(key for key in keys if not _is_named(key, noted)):
+            copy.note(f"{words}: {', '.join(unnamed)}")
+
+
+def _of_top_level(application: ApplicationSource, rest: Mapping[str, Any]) -> Iterator[str]:
+    """Of the file's keys beside ``services``: ``rest`` is what the copy has of them."""
+    changed = [key for key, node in application.rest.items() if rest[key] != plain(node)]
+    for words, keys in (("changed for the test", changed), ("left out", application.left_out)):
+        if keys:
+            yield f"{words}: {', '.join(sorted(keys))}"
+
+
+def _with_common(changes: Sequence[str], names: Sequence[str]) -> list[str]:
+    """The changes, where those that all of several services have are one each, after the others."""
+    texts = {
+        name: [line.removeprefix(f"{name}: ") for line in changes if line.startswith(f"{name}: ")] for name in names
+    }
+    common = (
+        [text for text in texts[names[0]] if all(text in other for other in texts.values())] if len(names) > 1 else []
+    )
+    repeated = {f"{name}: {text}" for name in names for text in common}
+    return [*(line for line in changes if line not in repeated), *(f"all services: {text}" for text in common)]
+
+
+def _is_named(key: str, lines: Sequence[str]) -> bool:
+    return any(re.search(rf"(?<![\w-]){re.escape(key)}(?![\w-])", line) for line in lines)
+
+
+def carried(application: ApplicationSource, cid: int, base: str, path_variables: set[str]) -> dict[str, str]:
+    """Those that it uses and that are no secrets, with the test's CID, and paths relative to the test."""
+    found = {}
+    for name in _used(application):
+        if is_steering(name) or name in application.secrets:
+            continue
+        value = application.variables[name]
+        is_path = name in path_variables and (value in (".", "..") or value.startswith(("./", "../")))
+        found[name] = compose_paths.rebased(value, base) if is_path else value
+    return {**found, **{name: str(cid) for name in opendlv_flags.CID_VARIABLES if name in found}}
+
+
+def _used(application: ApplicationSource) -> list[str]:
+    """The variables that compose fills in anywhere, in the order of their files."""
+    services = application.services.values()
+    used = set(opendlv_flags.CID_VARIABLES)
+    for node in (*(service.node for service in services), *application.rest.values()):
+        used.update(_named(node))
+    for path in {file.path for service in services for file in service.env_files}:
+        used |= interpolation.names(text_of(application.folder / path))
+    before: set[str] = set()
+    while before != used:
+        before = set(used)
+        used.update(*(interpolation.names(application.variables.get(name, "")) for name in before))
+    return [name for name in application.variables if name in used]
+
+
+def _named(node: Node) -> Iterator[str]:
+    """Variables in strings, and names without a value, which take it from the variable of that name."""
+    for part in source.walk(node):
+        if isinstance(part, Scalar):
+            yield from interpolation.names(part.text)
+            yield part.text
+        elif isinstance(part, source.Mapping):
+            yield from _without_value(part.entries.items())
+
+
+def _without_value(entries: Iterable[tuple[str, source.Entry]]) -> Iterator[str]:
+    yield from (key for key, entry in entries if isinstance(entry.value, Scalar) and entry.value.value is None)

@@ -2,33 +2,34 @@
 
 from collections.abc import Mapping, MutableSequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.application.access import filled
-from dodo_dsl.plan.rewrite.file_copies import FileCopies
+from dodo_dsl.application.access.model import Look
+from dodo_dsl.application.interpolation import interpolated
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+
+if TYPE_CHECKING:
+    from dodo_dsl.plan.rewrite.volumes import FileCopies
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Properties of a test; ``waits`` are the services of DoDo after which the application starts.
+    """What a test's copy of the application depends on; ``folder`` is the compiled test's.
 
-    ``names`` are the application's services that start, ``containers`` their names by ``container_name``, ``known`` the
-    variables whose values are known, ``limits`` what a service gets that sets none, ``ports`` those of rigs, and
-    ``copies`` the folders of the repository that the test copies.
+    ``waits`` are the services of DoDo after which the application starts. Devices stay only with ``hil``, privileges
+    only with ``privileged_allowed`` as well. ``limits`` is what a service gets that sets none, and ``given`` are
+    variables that the test sets.
     """
 
     cid: int
     isolation: str
-    waits: tuple[str, ...]
-    names: frozenset[str]
-    containers: Mapping[str, str]
+    folder: Path
+    waits: tuple[str, ...] = ()
     hil: bool = False
     privileged_allowed: bool = False
-    known: Mapping[str, str] = field(default_factory=dict)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
-    ports: tuple[str, ...] = ()
-    copies: FileCopies | None = None
+    given: tuple[tuple[str, str], ...] = ()
 
     @property
     def own_network(self) -> bool:
@@ -40,17 +41,35 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class Project:
+    """What the services of one copy share: the ``names`` of those that start, and the variables that are ``known``.
+
+    ``look`` judges what they may have, and ``copies`` are the folders of the repository that the test copies.
+    """
+
+    setting: Setting
+    names: frozenset[str]
+    look: Look
+    known: Mapping[str, str] = field(default_factory=dict)
+    copies: "FileCopies | None" = None
+
+
+@dataclass(frozen=True)
 class ServiceCopy:
     """A service that is changed in place."""
 
     name: str
     service: dict[str, Any]
-    setting: Setting
+    project: Project
     changes: MutableSequence[str]
+
+    @property
+    def setting(self) -> Setting:
+        return self.project.setting
 
     def filled(self, value: Any) -> Any:
         """A value of the service with its variables filled in, as far as they are known."""
-        return filled.value(value, self.setting.known)
+        return interpolated(value, self.project.known)
 
     def note(self, change: str) -> None:
         line = "".join(c if c.isprintable() else "?" for c in f"{self.name}: {change}")

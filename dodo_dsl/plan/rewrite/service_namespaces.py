@@ -22,10 +22,10 @@ def _own_reference(copy: ServiceCopy, key: str) -> None:
     """``container:x`` becomes ``service:x`` where x is a service of the application that starts."""
     kind, name = host_access.reference(copy.service.get(key))
     if kind == "container":
-        name = copy.setting.containers.get(name, "")
+        name = copy.project.look.containers.get(name, "")
         copy.service[key] = f"service:{name}"
         copy.note(f"{key} is service:{name}")
-    if kind and name not in copy.setting.names:
+    if kind and name not in copy.project.names:
         copy.remove(key, "that service does not start")
 
 
@@ -78,23 +78,23 @@ def _without_network(sysctls: Any) -> Any:
 
 def own_dependencies(copy: ServiceCopy) -> None:
     """``depends_on`` of services that start, and of DoDo's that must be ready first."""
-    service, setting = copy.service, copy.setting
+    service, setting, project = copy.service, copy.setting, copy.project
     raw = service.get("depends_on") or {}
     started = {"condition": "service_started"}
     own = {str(name): dict(started) for name in raw} if isinstance(raw, list) else dict(raw)
-    for name in [name for name in own if name not in setting.names]:
+    for name in [name for name in own if name not in project.names]:
         copy.note(f"does not wait for {name}, which does not start")
         del own[name]
     waits = {name: {"condition": "service_healthy"} for name in setting.waits}
     if setting.own_network:
         waits = {SANDBOX: started, **waits}
-    if setting.copies is not None and _has_copies(service, setting.copies.sources):
+    if project.copies is not None and _has_copies(service, project.copies.sources):
         waits = {FILES: {"condition": "service_healthy"}, **waits}
     service.pop("depends_on", None)
     if waits or own:
         service["depends_on"] = {**own, **waits}
     links = service.get("links") or []
-    copy.keep_items("links", [link for link in links if str(link).partition(":")[0] in setting.names])
+    copy.keep_items("links", [link for link in links if str(link).partition(":")[0] in project.names])
     borrowed = [_borrowed(copy, entry) for entry in service.get("volumes_from") or ()]
     copy.keep_items("volumes_from", borrowed)
 
@@ -105,4 +105,4 @@ def _has_copies(service: dict[str, Any], copies: Collection[str]) -> bool:
 
 def _borrowed(copy: ServiceCopy, entry: Any) -> Any:
     kind, name, options = host_access.borrowed(entry)
-    return f"{copy.setting.containers[name]}{options}" if kind == "container" else entry
+    return f"{copy.project.look.containers[name]}{options}" if kind == "container" else entry

@@ -1,17 +1,106 @@
-"""Volumes of a service: ``/tmp``, shared memory and named volumes are the test's own."""
+"""Volumes of a service: ``/tmp``, shared memory and named volumes are the test's own.
 
-from collections.abc import Collection, Iterable, Mapping, MutableSequence
+Files of the repository are only read, or are copies of the test that it may change.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, MutableSequence
+from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application import host_access
-from dodo_dsl.application.access import filled
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.limit_findings import volume_excesses
-from dodo_dsl.application.interpolation import split_outside
-from dodo_dsl.plan.rewrite.container_limits import put
-from dodo_dsl.plan.rewrite.file_copies import of_volume, own_name, read_only
-from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.application.access.limit_findings import put, volume_limits
+from dodo_dsl.application.access.value_findings import OWN_VOLUMES
+from dodo_dsl.application.interpolation import interpolated, split_outside
+from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy
+
+COPY = "files-"
+"""How the volumes of copies begin, each with a number."""
+_OF_COPY = re.compile(rf"{COPY}\d+")
+_ACCESS = ("ro", "rw")
+
+
+def own_name(name: str) -> str:
+    """The name of an application's volume in the test's project, where DoDo has volumes of its own."""
+    return f"application-{name}" if name in OWN_VOLUMES or _OF_COPY.fullmatch(name) else name
+
+
+class FileCopies:
+    """The folders that a test copies: those of the repository that any of its services mounts to write to.
+
+    All services that mount such a folder share its copy; what is mounted beside it comes from the repository. So no
+    service can lead the mount of another one elsewhere. ``paths`` are relative to the compiled test's folder, as the
+    services and volumes are; ``known`` are the variables whose values are known. ``sources`` are the volumes of the
+    copies, each with the folder that it has at the begin, as the compose file writes it.
+    """
+
+    def __init__(
+        self, paths: HostPaths, known: Mapping[str, str], services: Iterable[Mapping[str, Any]], volumes: Any
+    ) -> None:
+        self._paths = paths
+        self._known = known
+        self._names: dict[str, str] = {}
+        self.sources: dict[str, str] = {}
+        for service in services:
+            for volume in service.get("volumes") or ():
+                self._add(volume)
+        for name, about in volumes.items() if isinstance(volumes, dict) else ():
+            seen = interpolated(about, known)
+            if host_access.is_bound(seen) and self._folder(str(seen["driver_opts"].get("device"))):
+                self._names[f"volume {own_name(name)}"] = own_name(name)
+                self.sources[own_name(name)] = str(about["driver_opts"]["device"])
+
+    def _add(self, volume: Any) -> None:
+        found = host_access.mount(interpolated(volume, self._known))
+        if found.read_only or not host_access.is_bind(volume, found.source):
+            return
+        place = self._folder(found.source)
+        if place and place not in self._names:
+            self._names[place] = f"{COPY}{len(self._names)}"
+            self.sources[self._names[place]] = host_access.mount(volume).source
+
+    def _folder(self, source: str) -> str:
+        """The real path of a folder of the repository, which may be missing yet; empty for files and other paths."""
+        paths = self._paths
+        if "$" in source or not paths.is_own(source) or paths.is_writable(source):
+            return ""
+        place = paths.names(source)[-1]
+        return "" if Path(place).is_file() else place
+
+    def name(self, volume: Any) -> str:
+        """The volume with the copy that a mount shows; empty where it shows none."""
+        found = host_access.mount(interpolated(volume, self._known))
+        if host_access.is_bind(volume, found.source):
+            return self._names.get(self._folder(found.source), "")
+        return self._names.get(f"volume {found.source}", "")
+
+    def is_to_read(self, volume: Any) -> bool:
+        """Whether a mount that could be written to is only to be read: one of a file, or of an unknown path."""
+        found = host_access.mount(interpolated(volume, self._known))
+        if found.read_only or not host_access.is_bind(volume, found.source):
+            return False
+        return "$" in found.source or self._paths.is_only_read(found.source)
+
+
+def of_volume(volume: Any, name: str) -> Any:
+    """The mount with a volume of the test in the place of its source, without what an image has there."""
+    found = host_access.mount(volume)
+    if isinstance(volume, str):
+        words = ["ro"] if found.read_only else []
+        return f"{name}:{split_outside(volume, ':')[1]}:{','.join([*words, 'nocopy'])}"
+    read_only = {"read_only": True} if found.read_only else {}
+    return {"type": "volume", "source": name, "target": volume.get("target"), **read_only, "volume": {"nocopy": True}}
+
+
+def read_only(volume: Any) -> Any:
+    """The same mount, without write access."""
+    if isinstance(volume, dict):
+        return {**volume, "read_only": True}
+    source, *target = split_outside(volume, ":")[:2]
+    words = [word for word in host_access.mount_options(volume) if word and word not in _ACCESS]
+    return ":".join([source, *target, ",".join([*words, "ro"])]) if target else volume
+
 
 _LONGEST = 255
 """Characters of a volume's name on the engine: it is a folder's."""
@@ -71,7 +160,7 @@ def _tmp_of_host(copy: ServiceCopy, volume: Any) -> Any:
 
 def _of_repository(copy: ServiceCopy, volume: Any) -> Any:
     """The mount with the test's copy of a folder of the repository, or to be read only."""
-    copies = copy.setting.copies
+    copies = copy.project.copies
     if copies is None:
         return volume
     if name := copies.name(volume):
@@ -88,12 +177,12 @@ def without_name(about: Any) -> Any:
     return {key: value for key, value in about.items() if key != "name"} if isinstance(about, dict) else about
 
 
-def _to_read(about: Any, paths: HostPaths | None) -> str:
+def _to_read(about: Any, paths: HostPaths) -> str:
     """``o`` of a volume that could be written to and is only to be read; empty for all others."""
     if not host_access.is_bound(about) or host_access.is_read_only(about):
         return ""
     device = str(about["driver_opts"].get("device") or "")
-    if "$" not in device and (paths is None or not paths.is_only_read(device)):
+    if "$" not in device and not paths.is_only_read(device):
         return ""
     words = (word.strip() for word in host_access.volume_options(about))
     return ",".join([*(word for word in words if word not in ("", "ro", "rw")), "ro"])
@@ -104,36 +193,29 @@ def too_long(slug: str, volumes: Iterable[str]) -> str:
     return next((name for name in volumes if len(f"dodo-{slug}-{_MARK}_{name}") > _LONGEST), "")
 
 
-def own_volumes(
-    volumes: Any,
-    changes: MutableSequence[str],
-    copies: Collection[str] = (),
-    limits: SandboxLimits = SandboxLimits(),  # noqa: B008  (it is frozen)
-    known: Mapping[str, str] | None = None,
-    paths: HostPaths | None = None,
-) -> dict[str, Any]:
+def own_volumes(volumes: Any, changes: MutableSequence[str], project: Project) -> dict[str, Any]:
     """Top-level ``volumes``: each test has its own, so names that all of the host would share are removed.
 
-    File systems in memory get no more than a service may have; ``known`` are variables whose values are known. A folder
-    of the repository is one of the ``copies``; what ``paths`` lets be read alone, or does not know, is read-only.
+    File systems in memory get no more than a service may have. A folder of the repository is one of the project's
+    copies; what may only be read, or is not known, is read-only.
     """
     found: dict[str, Any] = {}
-    for excess in list(volume_excesses(filled.value(volumes or {}, known or {}), limits)):
-        put(volumes, excess)
-        changes.append(f"volume {excess.steps[0]}: o is {excess.allowed}")
+    copies = project.copies.sources if project.copies else {}
+    for name, about in (volumes or {}).items():
+        for finding in list(volume_limits(name, interpolated(about, project.known), project.setting.limits)):
+            put(about, finding)
+            changes.append(f"volume {name}: o is {finding.allowed}")
     for name, about in (volumes or {}).items():
         if own_name(name) in copies:
             found[own_name(name)] = {}
             continue
-        if options := _to_read(filled.value(about, known or {}), paths):
+        if options := _to_read(interpolated(about, project.known), project.look.paths):
             about["driver_opts"]["o"] = options
             changes.append(f"volume {own_name(name)}: is only read")
         if isinstance(about, dict) and about.pop("labels", None):
             changes.append(f"volume {own_name(name)}: labels removed, programs of the host act on them")
-        is_external = host_access.is_external(about)
-        if isinstance(about, dict) and "name" in about and not is_external:
+        if isinstance(about, dict) and "name" in about and not host_access.is_external(about):
             changes.append(f"volume {own_name(name)}: name removed, each test has its own")
-            found[own_name(name)] = without_name(about)
-        else:
-            found[own_name(name)] = about
+            del about["name"]
+        found[own_name(name)] = about
     return {**found, **{name: {} for name in copies if name not in found}}

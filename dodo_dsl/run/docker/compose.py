@@ -15,8 +15,8 @@ from typing import Any
 from dodo_dsl import advice, atomic
 from dodo_dsl.application import compose_paths
 from dodo_dsl.application.access import secret_variables
-from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
-from dodo_dsl.application.access.model import AccessFinding
+from dodo_dsl.application.access.findings import CompiledTest, compiled_findings
+from dodo_dsl.application.access.model import AccessFinding, shown
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.application.service_environment import image_variable

@@ -19,5 +19,5 @@ def text() -> str:
     parts = [_HEAD]
     for title, rows in compose_keys.TABLES.items():
         parts.append(f"\n## {title[0].upper()}{title[1:]}\n\n| key | | why |\n|---|---|---|\n")
-        parts.extend(f"| `{key}` | {treatment} | {why} |\n" for key, (treatment, why) in rows.items())
+        parts.extend(f"| `{key}` | {row.treatment} | {row.why} |\n" for key, row in sorted(rows.items()))
     return "".join(parts)

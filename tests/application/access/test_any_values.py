@@ -9,12 +9,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.application.access import compose_keys
-from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings
+from dodo_dsl.application.access.findings import CompiledTest, compiled_findings
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.access.model import Access, Rows
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import format_text
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 
 WORDS = st.sampled_from(["", "host", "/", "..", "$", "${A", "${A:-/}", "bind", "a:b:c", "x=y", "ALL", "~", "~nobody/x"])
 VALUES = st.recursive(
@@ -24,7 +25,7 @@ VALUES = st.recursive(
 )
 
 
-def some(rows: compose_keys.Rows) -> st.SearchStrategy[dict[str, Any]]:
+def some(rows: Rows) -> st.SearchStrategy[dict[str, Any]]:
     """Some of the keys, with any values."""
     return st.dictionaries(st.sampled_from(sorted(rows)), VALUES, max_size=6)
 
@@ -69,4 +70,5 @@ def test_written_files(service: dict[str, Any], rest: dict[str, Any], tmp_path: 
     source, problems = read_application(file)
     assert format_text(problems) or source is not None
     if source is not None:
-        assert plan_application(source, 140, "network", tmp_path / "t", ()).compose["services"]["a"]
+        setting = Setting(140, "network", tmp_path / "t")
+        assert plan_application(source, setting).compose["services"]["a"]

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.application.access.build_findings import short_name
-from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
+from dodo_dsl.application.access.findings import CompiledTest, compiled_findings
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.access.model import Access, shown
+from dodo_dsl.application.access.value_findings import short_name
 
 FOLDER = Path("/builds/team")
 NOTHING = Access()
@@ -77,6 +77,19 @@ def test_volumes_that_could_be_written_to(options: str, refused: bool) -> None:
     """The engine takes the last word, and none with a space."""
     bound = {"driver_opts": {"type": "none", "o": options, "device": "/usr/share"}}
     assert found({}, volumes={"v": bound}) == ["volumes.v.driver_opts.o"] * refused
+
+
+@pytest.mark.parametrize(("name", "refused"), [("team", False), ("/", True), ("dodo-other_tmp", True)])
+def test_names_of_volumes_that_exist(name: str, refused: bool) -> None:
+    places = found({}, volumes={"v": {"name": name, "external": True}})
+    assert places == ["volumes.v.name"] * refused
+
+
+@pytest.mark.parametrize(("word", "refused"), [("writable", True), ("enabled", False), ("readonly", False)])
+def test_mounts_below_a_folder(word: str, refused: bool) -> None:
+    volume = {"type": "bind", "source": "/builds/team/maps", "target": "/m", "read_only": True}
+    places = found({"volumes": [{**volume, "bind": {"recursive": word}}]})
+    assert places == ["services.driver.volumes[0].bind.recursive"] * refused
 
 
 def test_images_of_dodo_are_not_built() -> None:

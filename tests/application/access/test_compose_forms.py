@@ -11,17 +11,17 @@ import pytest
 import yaml
 
 from dodo_dsl.application.access import compose_keys
-from dodo_dsl.application.access.compiled_findings import CompiledTest, compiled_findings, shown
 from dodo_dsl.application.access.compose_keys import removed
+from dodo_dsl.application.access.findings import CompiledTest, compiled_findings
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.access.nested_keys import mappings
-from dodo_dsl.application.access.shared_findings import OWN_VOLUMES
+from dodo_dsl.application.access.model import Access, mappings, shown
+from dodo_dsl.application.access.value_findings import OWN_VOLUMES
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.application.read import read_application
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.plan.model import Application
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 from tests.application.access import compose_forms
 from tests.application.access.compose_forms import Form, forms, schema
 from tests.emit.readers import compose
@@ -38,7 +38,7 @@ REFUSED = {
     "service.build": ("entitlements: ",),
     "service.memswap_limit": ("string '-1'",),  # by compose, too
     **dict.fromkeys(("service.post_start", "service.pre_stop"), PRIVILEGED),
-    "service.volumes": ("list of type: cluster", "list of type: npipe"),
+    "service.volumes": ("list of type: cluster", "list of type: npipe", "list of bind: recursive: writable"),
     "volume.driver_opts": ("",),
 }
 """How the forms begin that are refused for their values, of keys that are not."""
@@ -78,7 +78,7 @@ class Case:
         words = REFUSED.get(f"{self.table}.{self.key}", ())
         if any(self.form.label.startswith(word) for word in words):
             return "refused"
-        treatment, _ = ROWS[self.table][self.key]
+        treatment = ROWS[self.table][self.key].treatment
         return "nothing" if self.name.replace("string 'false'", "false") in HARMLESS else treatment
 
     @property
@@ -148,7 +148,8 @@ def compiled(written: list[Case], folder: Path, hil: bool = False) -> tuple[Appl
     if source is None:
         return None, problems
     place = folder.parent / "generated" / "t"
-    return plan_application(source, 140, "network", place, (), hil=hil, privileged_allowed=hil), problems
+    setting = Setting(140, "network", place, hil=hil, privileged_allowed=hil)
+    return plan_application(source, setting), problems
 
 
 @pytest.mark.parametrize("key", CASES)

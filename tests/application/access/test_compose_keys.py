@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.access import compose_keys
+from dodo_dsl.application.access.model import Rows
 from tests.application.access import keys_page
 from tests.application.access.compose_forms import schema
 
@@ -41,6 +42,7 @@ def of_object(definition: str, key: str, *steps: str) -> set[str]:
         (compose_keys.DEPLOY, keys("deployment")),
         (compose_keys.RESERVATIONS, below("deployment", "resources", "reservations")),
         (compose_keys.MOUNT, of_object("container_spec", "volumes")),
+        (compose_keys.BIND, of_object("container_spec", "volumes", "bind")),
         (compose_keys.MOUNTED_VOLUME, of_object("container_spec", "volumes", "volume")),
         (compose_keys.VOLUME, keys("volume")),
         (compose_keys.NETWORK, keys("network")),
@@ -49,9 +51,9 @@ def of_object(definition: str, key: str, *steps: str) -> set[str]:
     ],
     ids=list(compose_keys.TABLES),
 )
-def test_each_key_has_a_row(rows: compose_keys.Rows, expected: set[str]) -> None:
+def test_each_key_has_a_row(rows: Rows, expected: set[str]) -> None:
     assert set(rows) == expected
-    assert all(why for _, why in rows.values())
+    assert all(row.why for row in rows.values())
 
 
 def test_the_page_is_up_to_date(update_goldens: bool) -> None:

@@ -7,14 +7,13 @@ from typing import Any
 import pytest
 import yaml
 
+from dodo_dsl.application.access.compose_keys import BELOW
 from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.access.nested_keys import NESTED
 from dodo_dsl.application.read import read_application
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 from tests.application.access.compose_forms import schema
 
-ELSEWHERE = ("build", "volumes.*")
-"""Mappings whose keys have a table of their own."""
+NESTED = {path: tuple(rows) for path, rows in BELOW.items()}
 UNUSED = ("develop", "extends", "models", "post_start", "pre_start", "pre_stop", "provider")
 """What a test's copy does not have, and what is merged before."""
 
@@ -36,7 +35,7 @@ def mappings(node: Any, path: str = "", seen: tuple[str, ...] = ()) -> Iterator[
 
 
 def test_the_keys_are_those_of_composes_schema() -> None:
-    found = {path: keys for path, keys in mappings(schema()["$defs"]["service"]) if path not in ELSEWHERE}
+    found = dict(mappings(schema()["$defs"]["service"]))
     assert {path: set(keys) for path, keys in NESTED.items()} == found
 
 

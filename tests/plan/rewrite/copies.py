@@ -1,11 +1,15 @@
 """Copies of services for tests."""
 
+from pathlib import Path
 from typing import Any
 
-from dodo_dsl.plan.rewrite.file_copies import FileCopies
-from dodo_dsl.plan.rewrite.service_copy import ServiceCopy, Setting
+from dodo_dsl.application.access.host_paths import HostPaths
+from dodo_dsl.application.access.model import Look
+from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy, Setting
+from dodo_dsl.plan.rewrite.volumes import FileCopies
 from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
 
+FOLDER = Path("/builds/team")
 CONFINED: dict[str, Any] = {
     "pids_limit": 1024,
     "mem_limit": 2_000_000_000,
@@ -28,6 +32,10 @@ def copy(
     copies: FileCopies | None = None,
 ) -> ServiceCopy:
     """A service beside ``eyes``, whose container is ``camera``."""
-    names, containers = frozenset(["a", "eyes"]), {"camera": "eyes"}
-    setting = Setting(140, isolation, ("judge",), names, containers, hil, privileged, {}, limits, ports, copies)
-    return ServiceCopy("a", service, setting, [])
+    setting = Setting(140, isolation, FOLDER, ("judge",), hil, privileged, limits)
+    return ServiceCopy("a", service, project(setting, ports, copies), [])
+
+
+def project(setting: Setting, ports: tuple[str, ...] = (), copies: FileCopies | None = None) -> Project:
+    look = Look(HostPaths(FOLDER, (FOLDER,)), containers={"camera": "eyes"}, ports=ports, limits=setting.limits)
+    return Project(setting, frozenset(["a", "eyes"]), look, {}, copies)

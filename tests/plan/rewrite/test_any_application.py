@@ -13,6 +13,7 @@ from dodo_dsl.application.read import read_application
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 
 KEYS = {
     "command": st.text(max_size=20) | st.lists(st.text(max_size=8) | st.integers() | st.booleans(), max_size=3),
@@ -63,7 +64,8 @@ def test_what_is_read_can_be_rewritten(services: dict[str, Any], isolation: str,
     if found is None:
         assert any(p.severity == "error" for p in problems)
         return
-    application = plan_application(found, 140, isolation, tmp_path / "generated" / "t", ("track",), hil=hil)
+    setting = Setting(140, isolation, tmp_path / "generated" / "t", ("track",), hil=hil)
+    application = plan_application(found, setting)
     common = ("", "sil", "closed-loop", 10.0, "realtime", isolation, 1, 140, "", "sil", "sandbox", ())
     texts = {f.path: f.text for f in render_plan(Plan("t", "t", "t.dodo.yml", *common, application))}
     node, wrong = source.parse(texts["t/application.compose.yml"], "copy")

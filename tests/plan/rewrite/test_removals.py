@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.plan.rewrite.removals import remove_hardware, remove_machine_settings
+from dodo_dsl.plan.rewrite.confinement import remove_hardware, remove_machine_settings
 from tests.plan.rewrite.copies import copy
 
 

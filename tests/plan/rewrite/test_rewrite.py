@@ -5,6 +5,7 @@ from pathlib import Path
 from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Application
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 from tests.plan.rewrite.copies import CONFINED
 
 COMPOSE = """\
@@ -41,7 +42,7 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> 
     source, problems = read_application(folder / "docker-compose.yml")
     assert problems == []
     assert source is not None
-    return plan_application(source, 140, isolation, tmp_path / "generated" / "my-test", ("track",))
+    return plan_application(source, Setting(140, isolation, tmp_path / "generated" / "my-test", ("track",)))
 
 
 def test_own_network(tmp_path: Path) -> None:

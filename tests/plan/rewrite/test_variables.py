@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.read import read_application
-from dodo_dsl.plan.rewrite.variables import carried
+from dodo_dsl.plan.rewrite.rewrite import carried
 
 COMPOSE = """\
 services:

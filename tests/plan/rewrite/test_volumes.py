@@ -1,14 +1,17 @@
 """Volumes of copied services."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.plan.rewrite.file_copies import FileCopies, own_name
-from dodo_dsl.plan.rewrite.volumes import own_mounts, own_volumes, too_long
-from tests.plan.rewrite.copies import copy
+from dodo_dsl.plan.rewrite.service_copy import Setting
+from dodo_dsl.plan.rewrite.volumes import FileCopies, own_mounts, own_name, own_volumes, too_long
+from tests.plan.rewrite.copies import FOLDER, copy, project
+
+PROJECT = project(Setting(140, "network", FOLDER))
 
 TMP = {"type": "volume", "source": "tmp", "target": "/t", "volume": {"nocopy": True}}
 
@@ -53,7 +56,7 @@ def test_top_level_volumes() -> None:
     changes: list[str] = []
     shared = {"name": "y", "external": True}
     written: dict[str, Any] = {"a": {"labels": ["x"]}, "tmp": {"name": "x", "driver": "local"}, "shared": shared}
-    assert own_volumes(written, changes) == {
+    assert own_volumes(written, changes, PROJECT) == {
         "a": {},
         "application-tmp": {"driver": "local"},
         "shared": {"name": "y", "external": True},
@@ -62,7 +65,7 @@ def test_top_level_volumes() -> None:
         "volume a: labels removed, programs of the host act on them",
         "volume application-tmp: name removed, each test has its own",
     ]
-    assert own_volumes(None, changes) == {}
+    assert own_volumes(None, changes, PROJECT) == {}
     assert (own_name("report"), own_name("a")) == ("application-report", "a")
 
 
@@ -75,10 +78,14 @@ def team(tmp_path: Path) -> Path:
     return tmp_path / "team"
 
 
+def file_copies(team: Path, *services: list[Any], volumes: Any = None) -> FileCopies:
+    paths = HostPaths(team, (team,), (team.parent / "allowed",))
+    return FileCopies(paths, {}, [{"volumes": each} for each in services], volumes)
+
+
 def mounts(team: Path, *services: list[Any], volumes: Any = None) -> list[Any]:
     """What becomes of the services' mounts, and the copies."""
-    paths = HostPaths(team, (team,), (team.parent / "allowed",))
-    copies = FileCopies(paths, {}, [{"volumes": each} for each in services], volumes)
+    copies = file_copies(team, *services, volumes=volumes)
     found: list[Any] = []
     for each in services:
         made = copy({"volumes": each}, copies=copies)
@@ -122,12 +129,13 @@ def test_copies_of_long_forms_and_of_volumes(team: Path) -> None:
     (own,), (volume,), sources = mounts(team, [bind], ["bound:/b:ro"], volumes=bound)
     assert own == {"type": "volume", "source": "files-0", "target": "/d", "volume": {"nocopy": True}}
     assert (volume, sources) == ("bound:/b:ro,nocopy", {"files-0": "./data", "bound": "./data"})
-    assert own_volumes(bound, [], sources) == {"bound": {}, "files-0": {}}
+    whole = replace(PROJECT, copies=file_copies(team, [bind], ["bound:/b:ro"], volumes=bound))
+    assert own_volumes(bound, [], whole) == {"bound": {}, "files-0": {}}
 
 
 def test_volumes_that_nobody_knows_are_only_read() -> None:
     unknown = {"vol": {"driver_opts": {"o": "bind,rw", "type": "none", "device": "${X}"}}}
-    assert own_volumes(unknown, [])["vol"]["driver_opts"]["o"] == "bind,ro"
+    assert own_volumes(unknown, [], PROJECT)["vol"]["driver_opts"]["o"] == "bind,ro"
 
 
 def test_names_that_are_too_long_for_the_engine() -> None:

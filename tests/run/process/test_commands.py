@@ -10,6 +10,7 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Application, Plan, PlannedService
 from dodo_dsl.plan.rewrite.rewrite import plan_application
+from dodo_dsl.plan.rewrite.service_copy import Setting
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
 
@@ -41,7 +42,7 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *passed: str) -> Co
     source, problems = read_application(tmp_path / "docker-compose.yml")
     assert source is not None, problems
     folder = tmp_path / "generated" / "t"
-    application = replace(plan_application(source, 140, "host", folder, ()), access=Access(passed=passed))
+    application = replace(plan_application(source, Setting(140, "host", folder)), access=Access(passed=passed))
     common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox", ())
     plan = Plan("t", "t", "t.dodo.yml", *common, application, import_paths=("../..",))
     commands = Commands(plan, folder, tmp_path / "report", Slot(150))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.mounted_folders import large_folders
+from dodo_dsl.application.mounts import large_folders
 from dodo_dsl.application.read import read_application
 from dodo_dsl.emit.containers import copy_command
 from dodo_dsl.plan.model import Application

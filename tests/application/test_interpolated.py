@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.application.access import filled
+from dodo_dsl.application import interpolation
 from dodo_dsl.source import plain
 from tests.source.nodes import mapping
 
@@ -28,13 +28,13 @@ KNOWN = {"A": "a", "EMPTY": ""}
     ],
 )
 def test_texts(written: str, expected: str) -> None:
-    assert filled.text(written, KNOWN) == expected
+    assert interpolation.interpolated(written, KNOWN) == expected
 
 
 def test_values_and_nodes_are_filled_alike() -> None:
     written = mapping("a: [1, '${A}', {b: '${B:-x}'}]\nc: true\n")
-    assert filled.value(plain(written), KNOWN) == {"a": [1, "a", {"b": "x"}], "c": True}
-    seen = filled.node(written, KNOWN)
+    assert interpolation.interpolated(plain(written), KNOWN) == {"a": [1, "a", {"b": "x"}], "c": True}
+    seen = interpolation.interpolated_node(written, KNOWN)
     assert plain(seen) == {"a": [1, "a", {"b": "x"}], "c": True}
     assert seen.span == written.span
 
@@ -42,7 +42,7 @@ def test_values_and_nodes_are_filled_alike() -> None:
 def test_the_variables_that_are_known() -> None:
     own = {"A": "a", "B": "${A}-${HOST}", "CI_TOKEN": "own"}
     outside = {"A": "outside", "HOST": "h", "CI_TOKEN": "pipeline", "X_KEY": "k", "Y_KEY": "k", "USER": "u"}
-    assert filled.known_variables(own, outside, "/team", ["Y_KEY", "HOST"]) == {
+    assert interpolation.known_variables(own, outside, "/team", ["Y_KEY", "HOST"]) == {
         "A": "a",
         "B": "a-h",
         "CI_TOKEN": "own",
