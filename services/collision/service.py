@@ -6,9 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
-from services.collision.geometry import VehicleBox, VehiclePose, heading_of
+from services.collision.geometry import VehicleBox, VehiclePose
 from services.collision.model import TrackEvaluator
 from services.collision.obstacles import load, pick
 from services.collision.requests import Requests
