@@ -37,6 +37,10 @@ class Collision(TrackEvaluator):
         self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
         for name, stamp in requests:
             self.inputs[name, stamp] = self._request(name)
+            self.judged.message(name, stamp)
+        roles = {**dict.fromkeys(flags["walls"], "wall"), **dict.fromkeys(flags["gates"], "gate")}
+        roles |= {flags["goal"]: "goal"} if flags["goal"] else {}
+        self.judged.way(flags["frame-id"], box.length, box.width, roles)
 
     def advance(self, now: int) -> None:
         super().advance(now)
