@@ -11,6 +11,8 @@ from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
 
 SUFFIX = ".times"
+JUDGED_SUFFIX = ".judged"
+"""Of the file beside an evaluator's log with what it judged over time."""
 _MOST = 100_000
 """Parts whose times are kept."""
 _STEP_US = 1000

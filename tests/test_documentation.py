@@ -161,6 +161,7 @@ def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
     """Its obstacles and instances are what report and services read."""
     (text,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "reference" / "maps.md").read_text(), re.DOTALL)
     (tmp_path / "map.json").write_text(text)
+    (tmp_path / "cone.obj").touch()
     ground = read_ground(tmp_path)
     assert [name for name, _ in ground.lines] == ["left", "right", "finish"]
     assert [len(points) for _, points in ground.models] == [2]

@@ -20,7 +20,7 @@ from dodo_dsl.report.changes import markdown
 from dodo_dsl.report.changes.comparison import Comparison
 from dodo_dsl.report.pictures.duration_plot import Times
 from dodo_dsl.report.pictures.duration_plot import draw as draw_times
-from dodo_dsl.report.pictures.trajectory import read_drive
+from dodo_dsl.report.pictures.trajectory import Way, read_drive
 from dodo_dsl.report.suite import check_history, html
 from dodo_dsl.report.viewer import names as viewer
 from dodo_dsl.spec.instances.matrix import SLUG
@@ -256,7 +256,10 @@ def _specs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
 
 
 def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
-    drive = read_drive(test.plan, test.folder, folder / RECORDING)
+    from dodo_dsl.report.viewer import judged
+
+    way = judged.read(test.plan, folder / viewer.LOGS).way
+    drive = read_drive(test.plan, test.folder, folder / RECORDING, way or Way())
     if drive is None:
         return
     from dodo_dsl.report.pictures.trajectory_plot import draw

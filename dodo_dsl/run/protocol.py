@@ -45,6 +45,13 @@ class Malformed:
 
 
 @dataclass(frozen=True)
+class Recorded:
+    """A line of what an evaluator judged over time, for the report."""
+
+    service: str
+
+
+@dataclass(frozen=True)
 class Exited:
     """A service has ended; ``code`` is negative for a signal, as in subprocess."""
 
@@ -163,6 +170,7 @@ Event = (
     Ready
     | VerdictEvent
     | Malformed
+    | Recorded
     | Overrun
     | Late
     | Paused

@@ -3,6 +3,7 @@
 from services.base.clock import Clock, Inbox, RealTimeClock
 from services.base.evaluator import Evaluator, JudgedTime, UnjudgeableError
 from services.base.flags import Flags, FlagsError
+from services.base.judged import Judged, JudgedBoxes, Series
 from services.base.process import run
 from services.base.service import Context, Handler, Output, Service, period_of
 from services.base.verdict import Check, Verdict
@@ -16,9 +17,12 @@ __all__ = [
     "FlagsError",
     "Handler",
     "Inbox",
+    "Judged",
+    "JudgedBoxes",
     "JudgedTime",
     "Output",
     "RealTimeClock",
+    "Series",
     "Service",
     "UnjudgeableError",
     "Verdict",

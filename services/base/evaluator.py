@@ -8,6 +8,7 @@ from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from services.base.clock import MICROSECONDS
+from services.base.judged import Judged
 from services.base.service import Output, Service
 from services.base.verdict import Verdict
 
@@ -35,13 +36,16 @@ class Evaluator(Service, ABC):
 
     Time zero is the first of ``begin``, ``update`` and whatever else looks at ``elapsed``; ``begin`` counts once and
     overrides the others. Subclasses take their messages in ``inputs`` and decide in ``decide``, or before by setting
-    ``verdict``; each of them may raise UnjudgeableError.
+    ``verdict``; each of them may raise UnjudgeableError. What they put into ``judged`` the report draws over time.
     """
+
+    judged: Judged
 
     def __init__(self, max_time: float, max_delay: float = 0.0) -> None:
         """``max_time`` in s after time zero; ``max_delay`` in s in which answers may follow the end of the input."""
         self.now: int | None = None
         """The time of the last update."""
+        self.judged = Judged()
         self._max_time, self._max_delay = max_time, max_delay
         self._zero: int | None = None
         self._ended: int | None = None
@@ -60,6 +64,7 @@ class Evaluator(Service, ABC):
     def begin(self, now: int) -> None:
         if not self._has_begun:
             self._has_begun, self._zero = True, now
+            self.judged.clear()
             self.forget(now)
 
     def update(self, now: int) -> Iterable[Message | Output | Envelope]:

@@ -24,7 +24,7 @@ from services.base.identity.world import World
 from services.base.log_messages import published
 from services.base.loop import Loop
 from services.base.manifest import load_manifest
-from services.base.service import Build, Context
+from services.base.service import Build, Context, Service
 from services.base.usage import help_text
 from services.base.verdict import undeclared_checks
 
@@ -97,7 +97,11 @@ def _serve(
             members = resources.enter_context(_membership(session, role, key, world))
             loop = Loop(role, service, session, clock, flags["id"], members)
             resources.enter_context(_readiness(ready, session))
-            (service.drive or loop.run)(stop)
+            try:
+                (service.drive or loop.run)(stop)
+            finally:
+                if key or _recording():  # by hand nobody reads it
+                    _print_record(service)
             if service.verdict is not None:
                 if undeclared := undeclared_checks(service.verdict, manifest.get("checks")):
                     print(json.dumps({"dodo": "note", "text": undeclared}), flush=True)
@@ -109,6 +113,15 @@ def _serve(
         crash.tell(error, folder, expected=expected, verbose=bool(flags["verbose"]))
         return code if expected else BROKEN
     return DONE
+
+
+def _print_record(service: Service) -> None:
+    """What an evaluator judged, as far as it came; without a verdict, too."""
+    if service.judged is not None:
+        service.record()
+        checks = service.verdict.checks if service.verdict else ()
+        for line in service.judged.lines({check.name: check.parameters for check in checks if check.parameters}):
+            print(line, flush=True)
 
 
 def _messages() -> MessageSet:

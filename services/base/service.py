@@ -15,6 +15,7 @@ from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from services.base.clock import MICROSECONDS, Clock, RealTimeClock
 from services.base.flags import Flags
+from services.base.judged import Judged
 from services.base.verdict import Verdict
 
 IDLE_PERIOD = 50_000
@@ -44,6 +45,8 @@ class Service:
     inputs: Mapping[tuple[str, int | None], Handler] = {}
     observe: Callable[[Envelope], None] | None = None
     verdict: Verdict | None = None
+    judged: Judged | None = None
+    """What an evaluator records of what it judged, for the report."""
     finished: bool = False
     late_after: float | None = None
     """Microseconds after which an update that ends counts as late; None for half a period, and 10 ms at least."""
@@ -63,6 +66,9 @@ class Service:
 
     def end_of_input(self, now: int) -> None:
         """A source has ended: evaluators decide."""
+
+    def record(self) -> None:
+        """The service ends, with a verdict or without: complete what is in ``judged``."""
 
 
 @dataclass

@@ -13,6 +13,8 @@ class Check:
     """A measure with its limit, ``min`` and ``max``; no finite value is null.
 
     A value at a limit passes, unless the limits are ``exclusive``, as of a distance that has to be more than 0.
+    ``parameters`` of the manifest set the limit, where they are not ``max-NAME``, ``min-NAME`` or ``NAME``: the report
+    shows their lines of the spec.
     """
 
     name: str
@@ -21,6 +23,7 @@ class Check:
     unit: str = ""
     ok: bool = True
     exclusive: bool = False
+    parameters: tuple[str, ...] = field(default=(), compare=False)
 
     def as_json(self) -> dict[str, Any]:
         """The check in the verdict line; numbers may come from numpy."""

@@ -18,11 +18,13 @@ class DriveMeasures:
     wall_margin: float | None = None
     time_to_goal: float | None = None
 
-    def move(self, start: tuple[int, VehiclePose], end: tuple[int, VehiclePose]) -> None:
-        """The vehicle went from one pose to the next, each with its time in microseconds."""
+    def move(self, start: tuple[int, VehiclePose], end: tuple[int, VehiclePose]) -> float:
+        """The vehicle went from one pose to the next, each with its time in microseconds; returns its speed."""
         length = math.hypot(end[1].x - start[1].x, end[1].y - start[1].y)
+        speed = length * MICROSECONDS / (end[0] - start[0])
         self.distance += length
-        self.max_speed = max(self.max_speed or 0.0, length * MICROSECONDS / (end[0] - start[0]))
+        self.max_speed = max(self.max_speed or 0.0, speed)
+        return speed
 
     def approach(self, margin: float) -> None:
         """The vehicle came this close to a wall, in m; touching is a margin of zero."""
@@ -30,18 +32,22 @@ class DriveMeasures:
 
     def goal_check(self, max_time: float) -> Check:
         """The time to the goal; null, and not ok, when it was not reached."""
-        return Check("time-to-goal", self.time_to_goal, {"max": max_time}, "s", self.time_to_goal is not None)
+        is_reached = self.time_to_goal is not None
+        return Check(
+            "time-to-goal", self.time_to_goal, {"max": max_time}, "s", is_reached, parameters=("max-time", "goal")
+        )
 
     @staticmethod
     def rest_check(rest: float) -> Check:
         """The way left to the goal in m; it says how far a drive that failed came, and decides nothing."""
-        return Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0)
+        return Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0, parameters=("goal", "gates"))
 
     def wall_check(self, limit: float) -> Check:
         """The margin, at least its limit, or more than a limit of zero: a wall touched is a wall hit."""
         margin = self.wall_margin
         is_kept = margin is not None and margin >= limit and margin > 0.0
-        return Check("wall-margin", margin, {"min": limit}, "m", is_kept, exclusive=limit <= 0.0)
+        flags = ("min-margin", "walls")
+        return Check("wall-margin", margin, {"min": limit}, "m", is_kept, exclusive=limit <= 0.0, parameters=flags)
 
     @staticmethod
     def gate_check(crossed: int, gates: int) -> Check:

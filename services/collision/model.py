@@ -37,6 +37,9 @@ class TrackEvaluator(Evaluator):
         self._requests = requests or Requests()
         self._last: tuple[int, VehiclePose] | None = None
         self._closest: dict[str, float | str | None] = {}
+        least = track.min_margin
+        self._margins = self.judged.series("Distance to the walls", "m", low=least, exclusive=least <= 0.0)
+        self._speeds = self.judged.series("Speed", "m/s", high=track.max_speed)
 
     def forget(self, now: int) -> None:
         self._measures = DriveMeasures()
@@ -75,8 +78,10 @@ class TrackEvaluator(Evaluator):
 
     def _judge(self, start: tuple[int, VehiclePose], time: int, pose: VehiclePose) -> None:
         area, when = swept(start[1], pose, self.box), f"after {self.elapsed(time):.2f} s"
-        self._measures.move(start, (time, pose))
+        self._speeds.add(time, self._measures.move(start, (time, pose)))
         margin, near = self._approach(area)
+        if self.track.walls:
+            self._margins.add(time, margin)
         wall = touched(self.track.walls, area) if margin < _CLOSE else None
         goal = self._reached(start[1], pose, area)
         if wall is not None:

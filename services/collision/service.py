@@ -6,9 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
-from services.collision.geometry import VehicleBox, VehiclePose, heading_of
+from services.collision.geometry import VehicleBox, VehiclePose
 from services.collision.model import TrackEvaluator
 from services.collision.obstacles import load, pick
 from services.collision.requests import Requests
@@ -36,6 +37,10 @@ class Collision(TrackEvaluator):
         self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
         for name, stamp in requests:
             self.inputs[name, stamp] = self._request(name)
+            self.judged.message(name, stamp)
+        roles = {**dict.fromkeys(flags["walls"], "wall"), **dict.fromkeys(flags["gates"], "gate")}
+        roles |= {flags["goal"]: "goal"} if flags["goal"] else {}
+        self.judged.way(flags["frame-id"], box.length, box.width, roles)
 
     def advance(self, now: int) -> None:
         super().advance(now)

@@ -91,8 +91,8 @@ class SignalMeasures:
             _check("mean", self.mean, "max", limits.mean),
             _check("std", self.std, "max", limits.std),
             _check("distance", self.distance, "max", limits.distance),
-            _check("mean-over-time", self.mean_over_time, "max", limits.mean),
-            _check("std-over-time", self.std_over_time, "max", limits.std),
+            _check("mean-over-time", self.mean_over_time, "max", limits.mean, parameters=("max-mean",)),
+            _check("std-over-time", self.std_over_time, "max", limits.std, parameters=("max-std",)),
             *share,
             *lag,
             *repeats,
@@ -176,9 +176,16 @@ def _coverage(times: Times, begin: int, end: int, hold: int) -> Coverage | None:
     return cover(times[(times >= begin) & (times <= end)], begin, end, hold) if begin < end else None
 
 
-def _check(name: str, value: float | None, side: str, limit: float | None, unit: str = "") -> Check:
+def _check(
+    name: str,
+    value: float | None,
+    side: str,
+    limit: float | None,
+    unit: str = "",
+    parameters: tuple[str, ...] = (),
+) -> Check:
     if limit is None:
         return Check(name, value, {}, unit)
     ok = value is not None and (value <= limit if side == "max" else value >= limit)
     bounds: Mapping[str, float] = {side: limit}
-    return Check(name, value, bounds, unit, ok)
+    return Check(name, value, bounds, unit, ok, parameters=parameters)

@@ -33,6 +33,7 @@ class ContinuousSignal(SignalEvaluator):
             raise ValueError(f"{first}, when --max-time={flags['max-time']:g} is over: nothing could be judged")
         super().__init__(name, target, _limits(flags), flags["max-time"], from_begin)
         self._source, self._target_source = signal, other
+        self.plot.name = f"{signal.field} of {signal.message.rpartition('.')[2]}/{signal.sender}"
         self.inputs = {(signal.message, signal.sender): self._take}
         if target is None:
             check(other, context.messages)

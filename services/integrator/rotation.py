@@ -2,6 +2,8 @@
 
 import math
 
+from dodo_dsl.opendlv.attitude import heading_of
+
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
@@ -32,8 +34,7 @@ def angles(q: Quaternion) -> Vector:
     if abs(sine) > UPRIGHT:
         return 0.0, math.copysign(math.pi / 2, sine), math.remainder(2 * math.atan2(z, w), math.tau)
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return roll, math.asin(sine), yaw
+    return roll, math.asin(sine), heading_of(*q) or 0.0
 
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:

@@ -3,6 +3,8 @@
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
+from services.base import JudgedBoxes
+from services.base.judged import LabelledArea, ScoredArea
 from services.object_detection.boxes import LabelledBox, overlaps
 from services.object_detection.mistakes import Frame, Mistakes, mistakes
 from services.object_detection.pairing import best_pairs
@@ -47,10 +49,14 @@ class Counts:
 
 @dataclass
 class CountsByClass:
-    """Counts by class, in the order in which classes came, and what kinds of mistakes they contain."""
+    """Counts by class, in the order in which classes came, and what kinds of mistakes they contain.
+
+    Those of one frame have its ``boxes``.
+    """
 
     by_label: dict[str, Counts] = field(default_factory=dict)
     mistakes: Mistakes = field(default_factory=Mistakes)
+    boxes: JudgedBoxes = field(default=JudgedBoxes((), (), ()), compare=False, repr=False)
 
     def add(self, label: str, counts: Counts) -> None:
         """Add counts of a class."""
@@ -76,6 +82,7 @@ def compare(
     """
     result = CountsByClass()
     false, hit, missed = list[LabelledBox](), list[LabelledBox](), list[LabelledBox]()
+    right = list[ScoredArea]()
     for label in dict.fromkeys(each.label for each in (*true, *found)):
         if labels and label not in labels:
             continue
@@ -87,10 +94,17 @@ def compare(
         result.add(label, Counts(len(pairs), len(mine) - len(pairs), len(real) - len(pairs), overlap))
         rows, columns = {row for row, _ in pairs}, {column for _, column in pairs}
         false += [each for row, each in enumerate(mine) if row not in rows]
+        right += [(label, *mine[row].box, float(scores[row, column])) for row, column in pairs]
         for column, each in enumerate(real):
             (hit if column in columns else missed).append(each)
     result.mistakes = mistakes(Frame(false, hit, missed), threshold)
+    result.boxes = JudgedBoxes(right, areas(false), areas(missed))
     return result
+
+
+def areas(boxes: Sequence[LabelledBox]) -> list[LabelledArea]:
+    """Boxes as they are recorded."""
+    return [(label, *box) for label, box in boxes]
 
 
 def _ratio(part: float, whole: int) -> float | None:

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from services.base import Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.base import Evaluator, JudgedBoxes, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
 from services.base.evaluator import EARLY
 from services.object_detection.boxes import Box, LabelledBox
-from services.object_detection.counts import CountsByClass, compare
+from services.object_detection.counts import CountsByClass, areas, compare
 from services.object_detection.frames import DetectedFrame, Detections, FrameKey, Value
 from services.object_detection.reason import verdict
 from services.object_detection.score import DetectionLimits, Rules, Score
@@ -16,6 +16,8 @@ from services.object_detection.truth import Truth
 
 _OTHER_CLOCK = 10.0
 """Sample times farther than this, in s, from when their frame came are of another clock."""
+_DAY = 86_400.0
+"""The same for the boxes of recorded pictures, which have those sample times, too."""
 
 
 class DetectionEvaluator(Evaluator):
@@ -64,6 +66,10 @@ class DetectionEvaluator(Evaluator):
             self._answer(frame)
         elif frame is not None:
             frame.has_truth = True
+
+    def record(self) -> None:
+        if self.verdict is None:  # what came of frames that nobody judges any more
+            self._settle(lambda frame: True)
 
     def advance(self, now: int) -> None:
         patience = self._rules.max_delay * MICROSECONDS
@@ -147,20 +153,24 @@ class DetectionEvaluator(Evaluator):
             self._judge(frame)
 
     def _judge(self, frame: DetectedFrame) -> None:
-        true = self._true(frame)
+        true, found = self._true(frame), frame.found.labelled()
+        sampled = self.zero + round(self._time(frame, _DAY) * MICROSECONDS)
         self._score.repeated += frame.found.repeated
         if true is None:
             self._score.without_truth += 1
+            shown = [each for each in found if not self._rules.labels or each.label in self._rules.labels]
+            self.judged.frame(sampled, JudgedBoxes((), areas(shown), (), is_known=False))
             return
-        counts = compare(frame.found.labelled(), true, self._rules.iou, self._rules.labels)
+        counts = compare(found, true, self._rules.iou, self._rules.labels)
+        self.judged.frame(sampled, counts.boxes)
         order = frame.key.number if self._truth and self._truth.frames == "number" else frame.key.time
         time = self._time(frame)
         key = {"time": time, "sample-time": frame.key.time, "sample-id": frame.key.number}
         self._count(counts, JudgedFrame(order, f"at {time:.2f} s", frame.answered), key)
 
-    def _time(self, frame: DetectedFrame) -> float:
+    def _time(self, frame: DetectedFrame, farthest: float = _OTHER_CLOCK) -> float:
         """When a frame was sampled, in s; when it came, where its sample time is of another clock, as in recordings."""
-        is_near = abs(frame.key.time - frame.since) <= _OTHER_CLOCK * MICROSECONDS
+        is_near = abs(frame.key.time - frame.since) <= farthest * MICROSECONDS
         return self.elapsed(frame.key.time if is_near else frame.since)
 
     def _true(self, frame: DetectedFrame) -> Sequence[LabelledBox] | None:

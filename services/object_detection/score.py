@@ -118,7 +118,7 @@ class Score:
         return (
             *(_check(name, getattr(total, name), limits.of(name)) for name in MEASURES),
             *(Check(name, value) for name, value in counts.items()),
-            _check("answered", self.answered, limits.frames),
+            _check("answered", self.answered, limits.frames, ("min-frames",)),
             _at_most("unanswered", self.unanswered.share, limits.unanswered),
             _at_most("gap", self.gap.end - self.gap.begin if self.gap else None, limits.gap, "s"),
             *(Check(name, value) for name, value in left_out.items()),
@@ -129,13 +129,13 @@ class Score:
         for label, counts in self.counts:
             for name in MEASURES:
                 limit = limits.of(name) if limits.each_class else None
-                yield _check(f"{name}-{label or 'unnamed'}", getattr(counts, name), limit)
+                yield _check(f"{name}-{label or 'unnamed'}", getattr(counts, name), limit, (f"min-{name}",))
 
 
-def _check(name: str, value: float | None, least: float | None) -> Check:
+def _check(name: str, value: float | None, least: float | None, parameters: tuple[str, ...] = ()) -> Check:
     if least is None:
         return Check(name, value)
-    return Check(name, value, {"min": least}, "", value is not None and value >= least)
+    return Check(name, value, {"min": least}, "", value is not None and value >= least, parameters=parameters)
 
 
 def _at_most(name: str, value: float | None, most: float | None, unit: str = "") -> Check:

@@ -3,10 +3,8 @@
 var dodo = {};
 
 dodo.data = (function () {
-  function unpack(text) {
-    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-    return new Float32Array(bytes.buffer);
-  }
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const unpack = (text) => new Float32Array(bytes(text).buffer);
 
   // The index of the last time that is not after `time`; -1 before the first.
   function at(times, time) {
@@ -32,6 +30,7 @@ dodo.data = (function () {
     test,
     channels,
     unpack,
+    bytes,
     unpacked,
     at,
     channel: (message, sender) => channels.find((c) => c.message === message && c.sender === sender),

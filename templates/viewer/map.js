@@ -90,8 +90,18 @@ dodo.map = (function () {
     vehicle(context, way.poseBefore(time), "before");
   }
 
+  // The corners of a vehicle about its centre, from the front left counter-clockwise.
+  function corners(pose, length, width) {
+    const cos = Math.cos(pose.heading);
+    const sin = Math.sin(pose.heading);
+    return [[1, 1], [-1, 1], [-1, -1], [1, -1]].map(([along, across]) => [
+      pose.x + (along * cos * length - across * sin * width) / 2,
+      pose.y + (along * sin * length + across * cos * width) / 2,
+    ]);
+  }
+
   function vehicle(context, pose, colour) {
-    const ring = dodo.geometry.corners(pose, way.length || 0.36, way.width || 0.16);
+    const ring = corners(pose, way.length || 0.36, way.width || 0.16);
     trace(context, ring.map(([x, y]) => view.to(x, y)));
     context.closePath();
     context.fillStyle = dodo.canvas.colour(colour);

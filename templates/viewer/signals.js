@@ -2,13 +2,8 @@
 "use strict";
 
 dodo.signals = (function () {
-  const { data, way } = dodo;
+  const { data } = dodo;
   const { make } = dodo.dom;
-
-  function outside(values, min, max) {
-    const [low, high] = [min ?? -Infinity, max ?? Infinity];
-    return (n) => (values[n] < low || values[n] > high ? "failed" : "");
-  }
 
   // The target at a time by straight lines; NaN outside.
   function interpolated(target, time) {
@@ -20,39 +15,19 @@ dodo.signals = (function () {
     return target.values[n] + share * (target.values[next] - target.values[n]);
   }
 
-  function judgedSignal(raw) {
-    const channel = data.channel(raw.message, raw.sender);
-    const field = data.field(channel, raw.field);
-    const target = { times: data.unpack(raw.target.times), values: data.unpack(raw.target.values) };
-    const times = field ? channel.times : new Float32Array(0);
-    const values = field ? field.values : times;
-    const [from, until] = [raw.from ?? -Infinity, raw.until ?? Infinity];
-    const marked = (n) => {
-      if (times[n] < from || times[n] > until) return "";
-      if (!Number.isFinite(values[n])) return "failed";
-      const away = Math.abs(values[n] - interpolated(target, times[n])) - 1e-7;
-      if (raw.distance !== null && away > raw.distance) return "failed";
-      return raw.band !== null && away > raw.band ? "warned" : "";
-    };
+  const MARKS = ["", "warned", "failed"];
+
+  // What an evaluator recorded: which samples failed, it says.
+  function recorded(raw) {
+    const [times, values, marks] = [data.unpack(raw.times), data.unpack(raw.values), data.bytes(raw.marks)];
+    const target = raw.target.times ? { times: data.unpack(raw.target.times), values: data.unpack(raw.target.values) } : null;
     const text = (time) => {
       const n = data.at(times, time + 1e-4);
-      const wanted = dodo.dom.number(interpolated(target, time));
-      return `${n < 0 ? "–" : dodo.dom.number(values[n])} · target ${wanted}`;
+      const value = n < 0 ? "–" : dodo.dom.withUnit(values[n], raw.unit);
+      return target ? `${value} · target ${dodo.dom.number(interpolated(target, time))}` : value;
     };
-    const parts = [raw.band !== null && `band ±${dodo.dom.number(raw.band)}`, raw.limit, raw.problem];
-    const title = `${raw.field} of ${data.short(raw.message)}/${raw.sender}`;
-    return { title, unit: "", times, values, target, band: raw.band, reach: raw.distance, marked, text, note: parts.filter(Boolean).join(", ") };
-  }
-
-  function margin(raw) {
-    const values = way.margins();
-    const marked = (n) => (values[n] <= 0 || values[n] < (raw.min ?? 0) ? "failed" : "");
-    return { title: "Distance to the walls", unit: "m", times: way.times, values, min: raw.min ?? 0, marked, note: raw.limit };
-  }
-
-  function speed(raw) {
-    const values = way.speeds();
-    return { title: "Speed", unit: "m/s", times: way.times, values, max: raw.max, marked: outside(values, null, raw.max), note: raw.limit };
+    const limits = { min: raw.low, max: raw.high, band: raw.band, reach: raw.distance };
+    return { title: raw.name, unit: raw.unit, times, values, target, ...limits, marked: (n) => MARKS[marks[n]], text, note: raw.note };
   }
 
   // Right, missed and false boxes of each frame, one on top of the other.
@@ -101,14 +76,12 @@ dodo.signals = (function () {
   }
 
   function judged() {
-    return data.test.judged.flatMap((raw) => {
-      if (raw.kind === "signal") return [judgedSignal(raw)];
-      if (raw.kind === "margin") return way.poses.length ? [margin(raw)] : [];
-      if (raw.kind === "speed") return way.poses.length ? [speed(raw)] : [];
-      if (raw.kind === "detection") return dodo.detection.frames.length ? [detected()] : [];
-      const channel = data.channel(raw.message, raw.sender);
-      return channel && raw.kind === "request" ? channel.fields.map((field) => plain(channel, field)) : [];
-    });
+    const channels = data.test.messages.flatMap((each) => data.channels.filter((c) => c.message === each.message && (each.sender === null || c.sender === each.sender)));
+    return [
+      ...data.test.judged.map(recorded),
+      ...channels.flatMap((channel) => channel.fields.map((field) => plain(channel, field))),
+      ...(dodo.detection.frames.length ? [detected()] : []),
+    ];
   }
 
   const others = () => data.channels.filter((channel) => !channel.message.startsWith("dodo."));
@@ -138,7 +111,8 @@ dodo.signals = (function () {
     if (!data.test.checks.length) list.push(...others().filter((channel) => channel.message.startsWith("opendlv.proxy.") && channel.message.endsWith("Request")).map(rate));
     const plots = make("div", { class: "plots", tabindex: "0" });
     parent.append(make("h2", {}, "Signals", chooser(plots)), plots);
-    if (!list.length) plots.append(make("p", { class: "nothing" }, "No signal that is judged was recorded."));
+    if (data.test.why) plots.append(make("p", { class: "nothing" }, data.test.why));
+    if (!list.length && !data.test.why) plots.append(make("p", { class: "nothing" }, "No signal that is judged was recorded."));
     for (const signal of list) dodo.plot.show(plots, signal, null);
   }
 

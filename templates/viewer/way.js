@@ -33,19 +33,6 @@ dodo.way = (function () {
     return { time, x: a.x + share * (b.x - a.x), y: a.y + share * (b.y - a.y), heading: a.heading + share * turn };
   }
 
-  function speeds() {
-    return Float32Array.from(poses, (b, n) => {
-      const a = poses[n - 1];
-      return n ? Math.hypot(b.x - a.x, b.y - a.y) / (b.time - a.time) : NaN;
-    });
-  }
-
-  function margins() {
-    const walls = dodo.geometry.circled(test.scene.lines.filter((each) => each.role === "wall").flatMap((each) => each.lines));
-    if (!walls.length) return new Float32Array(0);
-    return Float32Array.from(poses, (each) => dodo.geometry.margin(each, length, width, walls));
-  }
-
   function nearest(x, y) {
     let best = null;
     for (const each of poses) {
@@ -55,5 +42,5 @@ dodo.way = (function () {
     return best && best.time;
   }
 
-  return { poses, times, pose, before, poseBefore, speeds, margins, nearest, length, width };
+  return { poses, times, pose, before, poseBefore, nearest, length, width };
 })();

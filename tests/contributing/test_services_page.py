@@ -9,6 +9,8 @@ import yaml
 from dodo_dsl import __version__
 from dodo_dsl.images.names import Image
 from dodo_dsl.images.own_images import base_of
+from dodo_dsl.report.joined.drive_page import read_document
+from dodo_dsl.report.viewer.encoded import unpacked
 from tests.contributing.tutorial import New, follow, steps
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/services.md"
@@ -26,6 +28,12 @@ def test_it_can_be_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
     (tmp_path / "repository").mkdir()
     follow(PAGE, tmp_path / "repository", Path(sys.executable).parent)
+    data = read_document(tmp_path / "repository" / "dodo-report" / "sil-smooth" / "drive.js")
+    steps_over_time = next(each for each in data["judged"] if each["evaluator"] == "smooth")
+    assert (steps_over_time["name"], steps_over_time["note"]) == ("Step of the steering", "at most 3 deg")
+    assert unpacked(steps_over_time["values"]).max() > 3 and steps_over_time["marks"]
+    (check,) = [each for each in data["checks"] if each["name"] == "largest-step"]
+    assert "max-step: 3 deg" in check["places"][0]["text"]
 
 
 def test_its_image_starts_what_the_manifest_says_on_this_version(tmp_path: Path) -> None:

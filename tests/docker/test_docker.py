@@ -133,6 +133,8 @@ def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path
         assert set(checks) == {"time-to-goal", "to-goal", "wall-margin", "distance", "max-speed", "silence"}
         assert checks["wall-margin"]["value"] > 0.03
         assert (tmp_path / "docker" / slug / slug / "trajectory.png").is_file()
+        record = (tmp_path / "docker" / slug / slug / "logs" / "evaluation.track.judged").read_text()
+        assert '"samples": "Distance to the walls"' in record
         assert "frame 1:" in (tmp_path / "docker" / slug / slug / "logs" / "application.perception.log").read_text()
         assert (tmp_path / "docker" / slug / slug / "test.rec").stat().st_size > 10_000
 

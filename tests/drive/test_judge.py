@@ -1,5 +1,6 @@
 """What is judged can be checked: recordings judged again, and evaluators against other people's programs."""
 
+import io
 import json
 import math
 import re
@@ -14,6 +15,7 @@ import shapely.affinity
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
+from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv.recordings.recording import read_envelopes
 from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS
 from tests.drive.applications import ROOT
@@ -49,6 +51,17 @@ def test_the_example_passes_every_shipped_test(runs: Runs) -> None:
         assert (test["outcome"], test["clock"], test["checks"] != []) == ("passed", "lockstep", True), test
         assert runs.recording(slug).stat().st_size > 10_000
     assert runs.checks(BOARD)["true-positives"] > 300
+
+
+def test_what_was_judged_over_time_is_the_same_in_a_report_of_its_own(runs: Runs, tmp_path: Path) -> None:
+    recording, report = runs.recording(CONES), tmp_path / "again"
+    judged(0, recording, "--spec", CONES, "--report", report)
+    record = "logs/evaluation.cones.judged"
+    assert (report / CONES / record).read_bytes() == (recording.parent / record).read_bytes()
+    assert (report / CONES / "drive.html").is_file() and (report / "index.html").is_file()
+    said = io.StringIO()
+    assert main(["judge", str(recording), "--spec", CONES, "--report", str(report)], said, said) == 2
+    assert f"'{report}' is there already, expected a new folder" in said.getvalue()
 
 
 @pytest.mark.parametrize("slug", ALL)

@@ -20,7 +20,7 @@ from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.inputs import obstacles
 from dodo_dsl.opendlv.inputs.json_node import MapError
-from dodo_dsl.opendlv.inputs.map_file import MAX_OVERLAYS, read_map, read_obstacles
+from dodo_dsl.opendlv.inputs.map_file import MAX_OVERLAYS, read_map
 from dodo_dsl.opendlv.inputs.mesh_text import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES
 from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError, SharedMemory, SharedMemoryError
 from dodo_dsl.opendlv.messages.message_set import MessageSet
@@ -136,18 +136,15 @@ def test_what_a_map_takes_in_all_is_limited(monkeypatch: pytest.MonkeyPatch, lim
         scene.load_scene(shipped)
 
 
-@pytest.mark.parametrize("reading", [obstacles.read, read_obstacles])
-def test_lines_of_obstacles_are_counted(
-    reading: Callable[[Path], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lines_of_obstacles_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluators measure the distance to each line."""
     written = [{"name": name, "lines": [[0, 0, 1, 1]] * 5} for name in "ab"]
     (tmp_path / "map.json").write_text(json.dumps({"obstacles": written}))
     monkeypatch.setattr(obstacles, "MAX_LINES", 10)
-    reading(tmp_path)
+    obstacles.read(tmp_path)
     monkeypatch.setattr(obstacles, "MAX_LINES", 9)
     with pytest.raises(MapError, match="10 lines of obstacles, expected at most 9"):
-        reading(tmp_path)
+        obstacles.read(tmp_path)
 
 
 def test_overlays_are_counted(tmp_path: Path) -> None:

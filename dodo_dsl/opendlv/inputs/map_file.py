@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from dodo_dsl.opendlv.inputs.json_node import MAX_NUMBER, MapError, Node, of_keys, unread
-from dodo_dsl.opendlv.inputs.obstacles import require_few_lines
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
@@ -58,14 +57,6 @@ class OverlayEntry:
     file: Path
     size: tuple[float, float]
     places: tuple[tuple[float, float], ...]
-
-
-@dataclass(frozen=True)
-class ObstacleEntry:
-    """Lines on the ground, each x1, y1, x2, y2 in m."""
-
-    name: str
-    lines: tuple[tuple[float, float, float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -146,14 +137,6 @@ def _overlay(node: Node) -> OverlayEntry | None:
 def _names(item: Node, names: str) -> str:
     """OpenDLV reads the first two numbers of an overlay's place; maps often write four as elsewhere."""
     return "x y z angle" if isinstance(item.value, list) and len(item.value) == 4 else names
-
-
-def _obstacle(node: Node) -> ObstacleEntry | None:
-    rows = [item.numbers("x1 y1 x2 y2") for item in node.items("lines")]
-    name = node.member("name")
-    if not rows or name is None:
-        return None
-    return ObstacleEntry(name.text(), tuple((a, b, c, d) for a, b, c, d in rows))
 
 
 def find_map(path: Path) -> Path:
@@ -270,10 +253,3 @@ def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report:
     except MapError as error:
         report(error)
     return tuple(found)
-
-
-def read_obstacles(path: Path) -> tuple[ObstacleEntry, ...]:
-    """The map's obstacles that have lines; MapError names the file and the JSON path."""
-    root = Node.load(find_map(path))
-    require_few_lines(root)
-    return tuple(o for o in map(_obstacle, root.items("obstacles")) if o)

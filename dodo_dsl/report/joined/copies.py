@@ -19,7 +19,7 @@ MOST_FILES = 2000
 """In a folder; further ones are left out."""
 _PART = 1 << 20
 _FILES = {RECORDING, PICTURES_FILE, SNAPSHOT, TRAJECTORY, SANDBOX_LOG, *viewer.VIDEOS}
-_LOG = re.compile(r"[^/\0]+\.(log|times)")
+_LOG = re.compile(r"[^/\0]+\.(log|times|judged)")
 _ATTEMPT = re.compile(r"[1-9][0-9]{0,3}")
 
 

@@ -46,7 +46,7 @@ def read_document(path: Path) -> dict[str, Any]:
         text = data.decode("ascii")
         if not (text.startswith(_BEGIN) and text.endswith(_END)):
             raise NotCopied("it holds more than the data of a drive")
-        document = json.loads(text[len(_BEGIN) : -len(_END)], parse_constant=_refuse)
+        document = page.of_today(json.loads(text[len(_BEGIN) : -len(_END)], parse_constant=_refuse))
         if document["version"] != page.VERSION:
             raise NotCopied(f"it is of version {shown(document['version'], 20)}, expected {page.VERSION}")
         if not isinstance(document["test"], dict) or not {*_videos(document)} <= {*VIDEOS}:

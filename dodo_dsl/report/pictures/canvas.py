@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from dodo_dsl.report.pictures.duration_plot import round_step
+
 Colour = tuple[int, int, int]
 """Red, green and blue, from 0 to 255."""
 Point = tuple[float, float]
@@ -97,7 +99,7 @@ class Axes:
         """Lines at round numbers, at least so many pixels apart, and these numbers."""
         for axis in (0, 1):
             first, last = self._first[axis], self._last[axis]
-            step = _round_step(apart / self._scale)
+            step = round_step(apart / self._scale)
             digits = max(0, -math.floor(math.log10(step) + 1e-9))
             for number in range(math.ceil(first / step), math.floor(last / step) + 1):
                 self._mark(axis, number * step, f"{number * step:.{digits}f}".replace("-", "\u2212"), size)
@@ -125,12 +127,6 @@ class Axes:
         scaled = (np.asarray(points, np.float64) - (self._first[0], self._last[1])) * (self._scale, -self._scale)
         limited = np.clip(scaled, -10_000.0, 10_000.0) * (1 << _SHIFT)
         return np.rint(limited).astype(np.int32)
-
-
-def _round_step(least: float) -> float:
-    """1, 2 or 5 times a power of ten."""
-    power: float = 10.0 ** math.floor(math.log10(least))
-    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= least)
 
 
 def thinned(points: Sequence[Point], distance: float) -> list[Point]:

@@ -47,7 +47,7 @@ def draw(tests: Mapping[str, Sequence[Times]], machine: str) -> str:
     """One bar for each test with the median of its runs on this machine, each run as a point; the longest on top."""
     names = sorted(tests, key=lambda name: sum(_median(tests[name])), reverse=True)[:_MOST]
     longest = max(sum(run) for name in names for run in tests[name])
-    step = _step(longest)
+    step = round_step(max(longest, 0.001) / _INTERVALS)
     scale = (_WIDTH - _LEFT - _RIGHT) / max(longest, step)
     bottom = _TOP + _ROW * len(names)
     return _template().render(
@@ -84,10 +84,9 @@ def _row(number: int, name: str, runs: Sequence[Times], scale: float) -> Row:
     return Row(shown, _TOP + _ROW * number, round(setup * scale, 1), round(execution * scale, 1), places, text)
 
 
-def _step(longest: float) -> float:
-    """Seconds between labels: 1, 2 or 5 times a power of ten."""
-    least = max(longest, 0.001) / _INTERVALS
-    power = 10.0 ** math.floor(math.log10(least))
+def round_step(least: float) -> float:
+    """The step of an axis that is at least so large: 1, 2 or 5 times a power of ten."""
+    power: float = 10.0 ** math.floor(math.log10(least))
     return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= least)
 
 

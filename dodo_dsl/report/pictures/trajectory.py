@@ -1,16 +1,21 @@
 """The drive in a recording: the vehicle's path over the map's cones and lines."""
 
-import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.emit.output_folder import FILES
+from dodo_dsl.opendlv.attitude import heading_of
+from dodo_dsl.opendlv.inputs import map_file, obstacles
+from dodo_dsl.opendlv.inputs.json_node import MapError
 from dodo_dsl.plan.model import Plan
 
+MAP = "map-path"
+"""The parameter of all services that read the test's map."""
 _FRAME = "opendlv.sim.Frame"
+_GREY = 0.5, 0.5, 0.5
 
 Point = tuple[float, float]
 
@@ -24,6 +29,21 @@ class Ground:
 
 
 @dataclass(frozen=True)
+class Way:
+    """The sender stamp of the vehicle's frames, its size in m, and the roles of the map's obstacles by their names."""
+
+    frame: int = 0
+    length: float = 0.0
+    width: float = 0.0
+    roles: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def goal(self) -> str:
+        """The obstacle to be reached; empty where there is none."""
+        return next((name for name, role in self.roles.items() if role == "goal"), "")
+
+
+@dataclass(frozen=True)
 class DrivenPath:
     """A path in the world frame: x and y in metres, heading in radians, and seconds since its begin."""
 
@@ -34,15 +54,16 @@ class DrivenPath:
     goal: str = ""
 
 
-def read_drive(plan: Plan, folder: Path, recording: Path) -> DrivenPath | None:
-    """The drive of a test, or None when its recording holds no Frame."""
+def read_drive(plan: Plan, folder: Path, recording: Path, way: Way) -> DrivenPath | None:
+    """The drive of a test, or None when its recording holds no Frame; ``way`` as its judges recorded it."""
     path = list(_path(recording)) if recording.is_file() else []
-    if not path:
-        return None
-    flags = {f.name: f.value for s in plan.services for f in s.flags if s.judge or f.name == "map-path"}
-    ground = read_ground(folder / FILES / flags["map-path"]) if "map-path" in flags else Ground()
-    length, width = (float(flags.get(name, 0.0)) for name in ("length", "width"))
-    return DrivenPath(path, ground, length, width, flags.get("goal", ""))
+    return DrivenPath(path, ground_of(plan, folder), way.length, way.width, way.goal) if path else None
+
+
+def ground_of(plan: Plan, folder: Path) -> Ground:
+    """The map of a test, of which its judges come last; ``folder`` is the compiled test's."""
+    maps = [flag.value for service in plan.services for flag in service.flags if flag.name == MAP]
+    return read_ground(folder / FILES / maps[-1]) if maps else Ground()
 
 
 def _path(path: Path) -> Iterator[tuple[float, float, float, float]]:
@@ -62,31 +83,24 @@ def _path(path: Path) -> Iterator[tuple[float, float, float, float]]:
                 frame: Any = messages.decode(envelope.data_type, envelope.payload)
             except MessageError:
                 continue
-            if not all(map(math.isfinite, (frame.x, frame.y, frame.qx, frame.qy, frame.qz, frame.qw))):
+            heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
+            if heading is None or not math.isfinite(frame.x + frame.y):
                 continue
-            heading = math.atan2(2 * (frame.qw * frame.qz + frame.qx * frame.qy), 1 - 2 * (frame.qy**2 + frame.qz**2))
             start = envelope.sample_time if start is None else start
             yield frame.x, frame.y, heading, (envelope.sample_time - start) / 1e6
 
 
 def read_ground(place: Path) -> Ground:
     """The parts of an OpenDLV map that a picture shows; an unreadable map is empty: services report its errors."""
-    try:
-        raw = json.loads((place / "map.json" if place.is_dir() else place).read_text(encoding="utf-8"))
-        models = [
-            (_colour(model.get("color")), [(float(i[0]), float(i[1])) for i in model.get("instances", [])])
-            for model in raw.get("model", [])
-        ]
-        lines = [(str(o.get("name", "")), _lines(o.get("lines", []))) for o in raw.get("obstacles", [])]
-    except (OSError, ValueError, TypeError, IndexError, AttributeError, KeyError):
+    found, _ = map_file.problems(place)
+    if found is None:
         return Ground()
-    return Ground(models, lines)
-
-
-def _colour(raw: Any) -> tuple[float, float, float]:
-    return (float(raw[0]), float(raw[1]), float(raw[2])) if isinstance(raw, list) else (0.5, 0.5, 0.5)
-
-
-def _lines(raw: list[Any]) -> list[tuple[float, float, float, float]]:
-    rows = raw if raw and isinstance(raw[0], list) else [raw]
-    return [(float(r[0]), float(r[1]), float(r[2]), float(r[3])) for r in rows if len(r) == 4]
+    models = [
+        (_GREY if isinstance(model.paint, Path) else model.paint, [each.position[:2] for each in model.instances])
+        for model in found.models
+    ]
+    try:
+        lines = obstacles.read(found.path)
+    except MapError:
+        lines = {}
+    return Ground(models, [(name, [(*a, *b) for a, b in each]) for name, each in lines.items()])

@@ -1,117 +1,203 @@
-"""What the evaluators of a test looked at, as the page draws it; which they are, their names in the Plan say."""
+"""What a test's evaluators recorded of what they judged, as the page draws it: it lies beside their logs.
 
+An evaluator of someone's own records as the shipped ones do, and nothing here knows which one it was.
+"""
+
+import base64
+import json
+import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.emit.output_folder import FILES
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.plan.model import Plan, PlannedService
+import numpy as np
+
+from dodo_dsl.log_times import JUDGED_SUFFIX
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import check_words
-from dodo_dsl.report.viewer import target
+from dodo_dsl.report.pictures.trajectory import Way
 from dodo_dsl.report.viewer.encoded import packed, shown
-from dodo_dsl.report.viewer.recorded import RecordedTest
-from dodo_dsl.report.viewer.scene import flags_of
+from dodo_dsl.report.viewer.recorded import MICROSECONDS, Values
 
-SIGNAL, TRACK, DETECTION = "continuous-signal", "collision", "object-detection"
-_RECORDING = ".rec"
-_MOST = 200_000
-"""Samples of a target that are drawn."""
-
-Key = tuple[str, int]
-"""Message and sender stamp."""
+_KINDS = ("hit", "false", "missed")
+_ROLES = ("wall", "gate", "goal")
+_MOST_BYTES = 16 << 20
 
 
-def channels(plan: Plan) -> set[Key]:
-    """The channels of which every sample is judged."""
-    found = set()
+@dataclass
+class _Series:
+    """A plot, and the parts of its samples and its target: times in us of the test, values, marks."""
+
+    about: dict[str, Any]
+    samples: list[tuple[Values, Values, bytes]] = field(default_factory=list)
+    target: list[tuple[Values, Values, bytes]] = field(default_factory=list)
+
+
+@dataclass
+class Judged:
+    """All records of a test; ``silent`` are its evaluators that left none.
+
+    ``parameters`` set the limit of a check, by the service's name and the check's.
+    """
+
+    way: Way | None = None
+    parameters: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict)
+    silent: list[str] = field(default_factory=list)
+    messages: list[dict[str, Any]] = field(default_factory=list)
+    is_cut: bool = False
+    _series: dict[tuple[str, str], _Series] = field(default_factory=dict)
+    _frames: dict[int, dict[str, Any]] = field(default_factory=dict)
+
+    def series(self, begin: int) -> list[dict[str, Any]]:
+        """One plot each; ``begin`` of the test in us, from which on its times count."""
+        return [
+            {**each.about, **_columns(each.samples, begin), "target": _columns(each.target, begin)}
+            for each in self._series.values()
+            if each.samples or each.target
+        ]
+
+    def frames(self, begin: int) -> list[dict[str, Any]]:
+        """The boxes of each frame by what became of them, in the order of the frames' times."""
+        return [{"time": (time - begin) / MICROSECONDS, **self._frames[time]} for time in sorted(self._frames)]
+
+    def why(self) -> str:
+        """Why something may be missing, in a sentence; else empty."""
+        if self.silent:
+            names = " and ".join(f"'{shown(name, 80)}'" for name in self.silent)
+            its = "its" if len(self.silent) == 1 else "their"
+            return f"{names} recorded nothing of what was judged over time: {its} limits and targets are not drawn."
+        return f"Only the first {sum(map(_count, self._frames.values())):,} boxes are drawn." if self.is_cut else ""
+
+    def take(self, service: str, line: Mapping[str, Any]) -> None:
+        """A line of a record; raises what a malformed one leads to."""
+        if "series" in line:
+            self._series[service, line["series"]] = _Series(_about(service, line))
+        elif "samples" in line:
+            self._series[service, line["samples"]].samples.append(_part(line))
+        elif "target" in line:
+            self._series[service, line["target"]].target.append(_part(line))
+        elif "message" in line:
+            sender = line["sender"]
+            self.messages.append(
+                {"message": shown(line["message"], 100), "sender": None if sender is None else int(sender)}
+            )
+        elif "frames" in line:
+            self._take_frames(line)
+        elif "way" in line:
+            self.way = self.way or _way(line["way"])
+        elif "parameters" in line:
+            self.parameters[service] = {check: tuple(map(str, names)) for check, names in line["parameters"].items()}
+
+    def _take_frames(self, line: Mapping[str, Any]) -> None:
+        self.is_cut = self.is_cut or "cut" in line
+        for time, is_known, boxes in line["frames"]:
+            frame = self._frames.setdefault(
+                _time(time),
+                {"isKnown": bool(is_known), "hit": list[Any](), "false": list[Any](), "missed": list[Any]()},
+            )
+            for kind, label, *numbers in boxes:
+                if kind in _KINDS and len(numbers) == (5 if kind == "hit" else 4):
+                    frame[kind].append([shown(label, 60), *map(_finite, numbers)])
+
+
+def read(plan: Plan, logs: Path) -> Judged:
+    """The records of a test's evaluators in the folder of its logs; what cannot be read is left out."""
+    found = Judged()
     for service in plan.services:
-        flags = flags_of(service)
-        if service.judge and service.uses == SIGNAL:
-            found.add((flags.get("message", ""), whole(flags.get("sender"))))
+        if service.judge:
+            lines = list(_lines(logs / f"{service.layer}.{service.name}{JUDGED_SUFFIX}"))
+            found.silent += [] if lines else [service.name]
+            for line in lines:
+                try:
+                    found.take(service.name, line)
+                except (ValueError, TypeError, KeyError, AttributeError, OverflowError):
+                    continue
     return found
 
 
-def judged(plan: Plan, folder: Path, test: RecordedTest, messages: MessageSet) -> Iterator[dict[str, Any]]:
-    """One description for each plot; ``folder`` is the compiled test's."""
-    for service in plan.services:
-        if not service.judge:
+def _lines(path: Path) -> Iterator[dict[str, Any]]:
+    try:
+        texts = regular_file.text(path, _MOST_BYTES).splitlines()
+    except (OSError, ValueError):
+        return
+    for text in texts:
+        try:
+            line = json.loads(text)
+        except (ValueError, RecursionError):
             continue
-        flags = flags_of(service)
-        if service.uses == SIGNAL:
-            yield _signal(service, flags, folder, test, messages)
-        elif service.uses == TRACK:
-            yield from _track(service, flags)
-        elif service.uses == DETECTION:
-            yield _detection(service, flags, folder)
+        if isinstance(line, dict):
+            yield line
 
 
-def whole(text: str | None) -> int:
-    """A number that a flag gives, 0 where it gives none."""
-    return int(text) if text and text.isdecimal() else 0
-
-
-def number(text: str | None) -> float | None:
-    try:
-        return float(text) if text else None
-    except ValueError:
-        return None
-
-
-def _signal(
-    service: PlannedService, flags: Mapping[str, str], folder: Path, test: RecordedTest, messages: MessageSet
-) -> dict[str, Any]:
-    problem = ""
-    try:
-        times, values = _target(flags, folder, test, messages)
-    except (OSError, ValueError, IndexError) as error:
-        times, values = target.EMPTY
-        problem = shown(f"its target is not shown: {getattr(error, 'strerror', None) or error}", 200)
+def _about(service: str, line: Mapping[str, Any]) -> dict[str, Any]:
+    low, high, distance, band = (_number(line.get(key)) for key in ("low", "high", "distance", "band"))
+    unit, exclusive = shown(line.get("unit") or "", 40), bool(line.get("exclusive"))
+    limits = [
+        "" if band is None else f"band ±{band:.4g}",
+        "" if low is None else check_words.bound("min", low, unit, exclusive),
+        "" if high is None else check_words.bound("max", high, unit, exclusive),
+        "" if distance is None else f"distance {check_words.bound('max', distance)}",
+    ]
     return {
-        "kind": "signal",
-        "evaluator": service.name,
-        "message": flags.get("message", ""),
-        "sender": whole(flags.get("sender")),
-        "field": flags.get("field", ""),
-        "target": {"times": packed(times[:_MOST]), "values": packed(values[:_MOST])},
-        "band": number(flags.get("band")),
-        "distance": (distance := number(flags.get("max-distance"))),
-        "limit": "" if distance is None else f"distance {check_words.bound('max', distance)}",
-        "from": number(flags.get("from")),
-        "until": number(flags.get("until")),
-        "problem": problem,
+        "evaluator": shown(service, 80),
+        "name": shown(line["series"], 200),
+        "unit": unit,
+        "low": low,
+        "high": high,
+        "distance": distance,
+        "band": band,
+        "note": ", ".join(filter(None, limits)),
     }
 
 
-def _target(flags: Mapping[str, str], folder: Path, test: RecordedTest, messages: MessageSet) -> target.Samples:
-    message = flags.get("target-message") or flags.get("message", "")
-    sender = whole(flags.get("target-sender") or flags.get("sender"))
-    field = flags.get("target-field") or flags.get("field", "")
-    if not flags.get("target"):
-        return target.from_channel(test, message, sender, field)
-    path, is_sample_time = folder / FILES / flags["target"], flags.get("align") == "sample-time"
-    if path.suffix == _RECORDING:
-        return target.from_recording(path, message, sender, field, messages, test, is_sample_time)
-    return target.from_table(path, field, is_sample_time, test.begin)
+def _part(line: Mapping[str, Any]) -> tuple[Values, Values, bytes]:
+    times, values = (
+        np.frombuffer(base64.b64decode(line[key], validate=True), "<f4").astype(np.float64)
+        for key in ("times", "values")
+    )
+    marks = base64.b64decode(line["marks"], validate=True)
+    if not len(times) == len(values) == len(marks):
+        raise ValueError("parts of different lengths")
+    return float(line["zero"]) + times * MICROSECONDS, values, marks
 
 
-def _track(service: PlannedService, flags: Mapping[str, str]) -> Iterator[dict[str, Any]]:
-    if flags.get("walls"):
-        least = number(flags.get("min-margin"))
-        limit = check_words.bound("min", least or 0.0, "m", exclusive=not least)
-        yield {"kind": "margin", "evaluator": service.name, "min": least, "limit": limit}
-    most = number(flags.get("max-speed"))
-    limit = "" if most is None else check_words.bound("max", most, "m/s")
-    yield {"kind": "speed", "evaluator": service.name, "max": most, "limit": limit}
-    for request in filter(None, flags.get("requests", "").split(",")):
-        message, _, sender = request.partition("/")
-        yield {"kind": "request", "evaluator": service.name, "message": shown(message, 100), "sender": whole(sender)}
-
-
-def _detection(service: PlannedService, flags: Mapping[str, str], folder: Path) -> dict[str, Any]:
+def _columns(parts: list[tuple[Values, Values, bytes]], begin: int) -> dict[str, Any]:
+    times = np.concatenate([np.empty(0), *(part[0] for part in parts)])
+    values = np.concatenate([np.empty(0), *(part[1] for part in parts)])
+    marks = np.frombuffer(b"".join(part[2] for part in parts), np.uint8)
+    order = np.argsort(times, kind="stable")
     return {
-        "kind": "detection",
-        "evaluator": service.name,
-        "iou": number(flags.get("iou")),
-        "classes": [shown(name, 100) for name in flags.get("classes", "").split(",") if name],
+        "times": packed((times[order] - begin) / MICROSECONDS),
+        "values": packed(values[order]),
+        "marks": base64.b64encode(marks[order].tobytes()).decode(),
     }
+
+
+def _way(raw: Mapping[str, Any]) -> Way:
+    roles = {str(name): role for name, role in raw["roles"].items() if role in _ROLES}
+    return Way(int(raw["frame"]), _finite(raw["length"]), _finite(raw["width"]), roles)
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None else _finite(value)
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("not a finite number")
+    return number
+
+
+def _time(value: Any) -> int:
+    """In us, as messages have it."""
+    time = int(value)
+    if abs(time) >= 1 << 63:
+        raise ValueError("no time")
+    return time
+
+
+def _count(frame: Mapping[str, Any]) -> int:
+    return sum(len(frame[kind]) for kind in _KINDS)

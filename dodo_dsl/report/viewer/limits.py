@@ -1,6 +1,6 @@
 """Each check's limit with the lines of the spec that set it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,7 @@ from dodo_dsl.outcome import (
 from dodo_dsl.plan.model import Place, Plan, PlannedService
 from dodo_dsl.report import check_words
 from dodo_dsl.report.viewer.encoded import shown
-from dodo_dsl.report.viewer.scene import flags_of
 
-_OTHER_NAMES = {
-    "time-to-goal": ("max-time", "goal"),
-    "to-goal": ("goal", "gates"),
-    "wall-margin": ("min-margin", "walls"),
-    "answered": ("min-frames",),
-}
-"""Parameters that set the limit of a check whose name does not name them."""
 _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
 """Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
 _OF_USE = {
@@ -36,8 +28,10 @@ _OF_USE = {
     PROCESSOR_SHARE: "max-processor-share",
 }
 """The same of the test's ``resources``; the name of a service follows that of the check."""
-_ENDINGS = ("-over-time",)
 _MOST_SPEC = 1 << 20
+
+Parameters = Mapping[str, Mapping[str, tuple[str, ...]]]
+"""What sets the limits of checks: names of parameters by the evaluator's name and the check's, as they recorded it."""
 
 
 class SpecLines:
@@ -65,10 +59,10 @@ class SpecLines:
         return []
 
 
-def checks(plan: Plan, outcome: Outcome, lines: SpecLines) -> Iterator[dict[str, Any]]:
+def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters) -> Iterator[dict[str, Any]]:
     """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
     for check in outcome.checks:
-        places = list(_places(plan, check["name"])) if check.get("limit") else []
+        places = list(_places(plan, check["name"], recorded)) if check.get("limit") else []
         yield {
             "name": shown(check["name"], 100),
             "value": check["value"],
@@ -84,7 +78,7 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines) -> Iterator[dict[str,
         }
 
 
-def _places(plan: Plan, check: str) -> Iterator[tuple[str, Place]]:
+def _places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
     if check in _OF_THE_TEST and "response" in plan.source_map:
         yield _OF_THE_TEST[check], plan.source_map["response"]
     for name, flag in _OF_USE.items():
@@ -93,24 +87,16 @@ def _places(plan: Plan, check: str) -> Iterator[tuple[str, Place]]:
     for service in plan.services:
         if not service.judge:
             continue
-        key, flags = f"{service.layer}.{service.name}", flags_of(service)
-        found = [
-            (name, plan.source_map[f"{key}.{name}"])
-            for name in _parameters(service, check)
-            if f"{key}.{name}" in plan.source_map
-        ]
+        key, names = f"{service.layer}.{service.name}", _parameters(service, check, recorded)
+        found = [(name, plan.source_map[f"{key}.{name}"]) for name in names if f"{key}.{name}" in plan.source_map]
         if found:
             yield from found
-        elif any(name in flags for name in _parameters(service, check)) and key in plan.source_map:
+        elif names and key in plan.source_map:
             yield "", plan.source_map[key]
 
 
-def _parameters(service: PlannedService, check: str) -> tuple[str, ...]:
-    """The parameters of a judge that may set the limit of a check."""
-    bare = next((check.removesuffix(ending) for ending in _ENDINGS if check.endswith(ending)), check)
-    own = flags_of(service)
-    named = _OTHER_NAMES.get(bare, (f"max-{bare}", f"min-{bare}", bare))
-    if not any(name in own for name in named) and "-" in bare:  # of one class, as recall-yellow
-        bare = bare.partition("-")[0]
-        named = (f"max-{bare}", f"min-{bare}")
-    return tuple(name for name in named if name in own)
+def _parameters(service: PlannedService, check: str, recorded: Parameters) -> list[str]:
+    """The parameters of a judge that set the limit of a check: those that it recorded, else by their names."""
+    named = recorded.get(service.name, {}).get(check, (f"max-{check}", f"min-{check}", check))
+    own = {flag.name for flag in service.flags}
+    return [name for name in named if name in own]

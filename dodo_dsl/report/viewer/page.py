@@ -11,12 +11,19 @@ from dodo_dsl.opendlv.odvd.tokens import OdvdError
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING
-from dodo_dsl.report.viewer import boxes, judged, limits, log_lines, moment, pictures, recorded, scene
+from dodo_dsl.report.pictures.trajectory import Way, ground_of
+from dodo_dsl.report.viewer import judged, limits, log_lines, moment, pictures, recorded
 from dodo_dsl.report.viewer.encoded import packed, script, shown
 from dodo_dsl.report.viewer.names import BEFORE, DATA, LOGS, PAGE, SHARED
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
 
-VERSION = 2
+VERSION = 3
+FRAME = "opendlv.sim.Frame"
+_MOST = 20_000
+"""Points and lines of a map that are drawn."""
+_WITHOUT_RECORDS = 2
+"""A version whose evaluators recorded nothing: the report itself worked out what they judged."""
+_OF_BEFORE_RECORDS = "Evaluators of the DoDo that made this report did not record what they judged over time."
 _OF_BEFORE = f'<script defer src="{BEFORE}"></script>\n'
 
 
@@ -47,20 +54,46 @@ def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict
     """All that the page shows, as a JSON value whose keys are fixed."""
     messages = _messages(plan, compiled)
     recording = folder / RECORDING
-    test = recorded.read(recording, messages, judged.channels(plan)) if recording.is_file() else RecordedTest()
+    test = recorded.read(recording, messages) if recording.is_file() else RecordedTest()
+    record = judged.read(plan, folder / LOGS)
     return {
         "version": VERSION,
         "test": _facts(outcome),
         "duration": test.duration,
         "isRecorded": bool(test.channels),
         "moment": dataclasses.asdict(moment.decisive(outcome, test.duration)),
-        "checks": list(limits.checks(plan, outcome, limits.SpecLines())),
-        "scene": scene.scene(plan, compiled),
+        "checks": list(limits.checks(plan, outcome, limits.SpecLines(), record.parameters)),
+        "scene": scene(plan, compiled, record.way or Way()),
         "log": log_lines.merged(folder / LOGS, test),
         "channels": [_channel(channel) for channel in test.channels],
-        "frames": boxes.frames(plan, compiled, test),
+        "frames": record.frames(test.begin),
         "videos": _videos(folder, test, messages),
-        "judged": list(judged.judged(plan, compiled, test, messages)),
+        "judged": record.series(test.begin),
+        "messages": record.messages,
+        "why": record.why() if test.channels else "",
+    }
+
+
+def of_today(document: dict[str, Any]) -> dict[str, Any]:
+    """What a page of an earlier version holds, as one of today's: without limits where no evaluator recorded them."""
+    if document["version"] != _WITHOUT_RECORDS:
+        return document
+    nothing = {"version": VERSION, "frames": [], "judged": [], "messages": []}
+    return {**document, **nothing, "why": f"{_OF_BEFORE_RECORDS} No limits, targets and boxes are drawn."}
+
+
+def scene(plan: Plan, folder: Path, way: Way) -> dict[str, Any]:
+    """The map under the test's path, as its judges see it; ``folder`` is the compiled test's."""
+    ground = ground_of(plan, folder)
+    return {
+        "models": [{"colour": list(colour), "points": points[:_MOST]} for colour, points in ground.models],
+        "lines": [
+            {"name": shown(name, 80), "role": way.roles.get(name, "other"), "lines": lines[:_MOST]}
+            for name, lines in ground.lines
+        ],
+        "length": way.length,
+        "width": way.width,
+        "frame": {"message": FRAME, "sender": way.frame},
     }
 
 

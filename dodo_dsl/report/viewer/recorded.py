@@ -1,6 +1,6 @@
 """What was on the bus of a finished test, as columns over the test's own time."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -64,8 +64,8 @@ class RecordedTest:
         return next((c for c in self.channels if (c.message, c.sender) == (message, sender)), None)
 
 
-def read(path: Path, messages: MessageSet, whole: Collection[tuple[str, int]] = ()) -> RecordedTest:
-    """The recording of a test; all samples of the channels in ``whole``. Raises OSError and RecordingError."""
+def read(path: Path, messages: MessageSet) -> RecordedTest:
+    """The recording of a test; raises OSError and RecordingError."""
     with Recording(path) as recording:
         index = recording.index
         begins = recording.rows({messages.id(_BEGIN)})
@@ -79,7 +79,7 @@ def read(path: Path, messages: MessageSet, whole: Collection[tuple[str, int]] = 
         seconds = (times - begin) / MICROSECONDS
         rows = rows[np.abs(seconds) < _FAR]
         clock = _Clock(begin)
-        channels = list(_channels(recording, messages, rows, clock, set(whole)))
+        channels = list(_channels(recording, messages, rows, clock))
         ends = seconds[recording.rows({messages.id(_END)})]
     last = max((float(c.times[-1]) for c in channels if len(c.times)), default=0.0)
     duration = float(ends[-1]) if len(ends) else last
@@ -117,9 +117,7 @@ class _Clock:
         return walls.astype(np.float64), moments
 
 
-def _channels(
-    recording: Recording, messages: MessageSet, rows: Numbers, clock: _Clock, whole: set[tuple[str, int]]
-) -> Iterator[Channel]:
+def _channels(recording: Recording, messages: MessageSet, rows: Numbers, clock: _Clock) -> Iterator[Channel]:
     index = recording.index[rows]
     keys = index["data_type"].astype(np.int64) << 32 | index["sender_stamp"]
     order = np.argsort(keys, kind="stable")
@@ -132,7 +130,7 @@ def _channels(
         if id_ in OWN_IDS and name != _BEGIN:
             continue
         sender = int(recording.index["sender_stamp"][group[0]])
-        every = 1 if (name, sender) in whole else -(-len(group) // MOST_SAMPLES)
+        every = -(-len(group) // MOST_SAMPLES)
         if name == PICTURES:
             yield Channel(name, sender, clock.seconds(np.sort(recording.index["time"][group[::every]])), {}, every)
             continue

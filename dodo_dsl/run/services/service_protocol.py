@@ -23,12 +23,14 @@ from dodo_dsl.run.protocol import (
     Overrun,
     Paused,
     Ready,
+    Recorded,
     Responded,
     Stopped,
     Time,
     VerdictEvent,
 )
 
+JUDGED = b'{"dodo": "judged"'
 _OUTCOMES = ("passed", "failed")
 _STOPS = ("unanswered", "stuck", "timedout")
 _MAX_TEXT = 2000
@@ -40,8 +42,10 @@ _MOST_EVIDENCE, _MAX_EVIDENCE_TEXT = 20, 200
 
 
 def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
-    """The event that a line represents, or None for a line of log; only evaluators give verdicts."""
+    """The event that a line represents, or None for a line of log; only evaluators give verdicts, and record."""
     text = line.strip()
+    if text.startswith(JUDGED):  # its JSON is the report's to read
+        return Recorded(service) if is_evaluator else None
     if not text.startswith(b"{") or b'"dodo"' not in text:
         return None
     try:
@@ -59,10 +63,8 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return _told(service, message)
     if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
         return Overrun(service, message["messages"])
-    if kind == "late":
-        return _late(service, message)
-    if kind == "paused":
-        return _paused(service, message.get("s"))
+    if kind in ("late", "paused"):
+        return _late(service, message) if kind == "late" else _paused(service, message.get("s"))
     if kind == "verdict" and is_evaluator:
         if problem := _problem(message):
             return Malformed(service, problem)

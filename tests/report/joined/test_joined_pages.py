@@ -7,8 +7,10 @@ import pytest
 from dodo_dsl.report.changes.comparison import compare
 from dodo_dsl.report.given_report import read
 from dodo_dsl.report.joined import other_ways
+from dodo_dsl.report.joined.drive_page import read_document
 from dodo_dsl.report.joined.join import join
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.viewer.encoded import script
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium
 
@@ -34,6 +36,26 @@ def test_each_drive_is_replayed_from_the_joined_report(chromium: Chromium, tmp_p
         assert [url for url in page.requests if not url.startswith((out.as_uri(), "data:,"))] == []
     assert outcomes[1].slug == "test-0--report-2"
     assert (out / "test-0--report-2" / "camera-0.mp4").is_file()
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("chromium")
+def test_a_page_without_records_shows_the_drive_and_why_there_are_no_limits(chromium: Chromium, tmp_path: Path) -> None:
+    """Of a DoDo whose report worked out itself what evaluators judge."""
+    folder, out = tmp_path / "report", tmp_path / "out"
+    drives.write(folder, [failures.wall_hit()])
+    data = folder / "test-0" / "drive.js"
+    document = {key: value for key, value in read_document(data).items() if key not in ("messages", "why")}
+    old = {"version": 2, "judged": [{"kind": "margin", "min": 0}], "frames": [{"time": 1, "found": [], "true": None}]}
+    data.write_text(script({**document, **old}))
+    outcomes, said = join([read(folder)], out)
+    write_summaries(out, outcomes)
+    assert said == []
+    with chromium.page((out / "test-0" / "drive.html").as_uri()) as page:
+        shown = page.value("document.querySelector('.plots .nothing').textContent")
+        assert shown.endswith("did not record what they judged over time. No limits, targets and boxes are drawn.")
+        assert page.value("[dodo.way.poses.length, dodo.signals.judged().length]") == [322, 0]
+        assert page.faults == []
 
 
 @pytest.mark.slow

@@ -1,17 +1,25 @@
 """Drives of tests that failed, made without running them: a recording, logs, an outcome, and the test's real Plan."""
 
+import importlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.emit.output_folder import FILES
+from dodo_dsl.log_times import JUDGED_SUFFIX
 from dodo_dsl.opendlv.bus.envelope import Envelope
 from dodo_dsl.opendlv.messages.message_set import MessageSet
 from dodo_dsl.opendlv.recordings.writer import RecordingWriter
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.report.report_folder import Drawable, write_report
+from services.base import Context, Service
+from services.base.flags import parse
+from services.base.manifest import load_manifest
+from services.base.service import Build
 
 ROOT = Path(__file__).parents[3]
 GOLDEN = ROOT / "tests" / "emit" / "golden"
@@ -53,6 +61,7 @@ def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
         tests[slug] = Drawable(replace(plan, slug=slug), compiled)
         record(report / slug / "test.rec", drive)
         log(report / slug / "logs", drive)
+        judge(report / slug / "logs", plan, compiled, drive)
     assert write_report(report, outcomes, tests) == []
     return outcomes
 
@@ -82,6 +91,42 @@ def log(folder: Path, drive: MadeDrive) -> None:
             offset += len(line.encode()) + 1
         (folder / f"{name}.log").write_text("".join(f"{line}\n" for _, line in lines))
         (folder / f"{name}.times").write_text("".join(times))
+
+
+def judge(folder: Path, plan: Plan, compiled: Path, drive: MadeDrive) -> None:
+    """What the test's evaluators record of the samples, beside the logs."""
+    for service in plan.services if drive.samples else ():
+        if service.judge:
+            package = f"services.{service.uses.replace('-', '_')}"
+            manifest = load_manifest(ROOT / package.replace(".", "/"))
+            words = [f"--{f.name}={compiled / FILES / f.value if f.kind == 'path' else f.value}" for f in service.flags]
+            build: Build = importlib.import_module(f"{package}.service").build
+            evaluator = build(Context(service.name, parse(manifest, words), MESSAGES))
+            feed(evaluator, drive)
+            record = folder / f"{service.layer}.{service.name}{JUDGED_SUFFIX}"
+            record.write_text("".join(f"{line}\n" for line in lines_of(evaluator)))
+
+
+def feed(evaluator: Service, drive: MadeDrive) -> None:
+    """A drive as an evaluator in lockstep sees it, until it has its verdict."""
+    evaluator.begin(EPOCH)
+    step = 0
+    for time, name, sender, fields in sorted(drive.samples, key=lambda sample: sample[0]):
+        while step <= round(time * 100) and evaluator.verdict is None:
+            evaluator.update(EPOCH + step * 10_000)
+            step += 1
+        now = evaluator.arrived = EPOCH + round(time * 1e6)
+        for (message, stamp), handler in evaluator.inputs.items():
+            if message == name and stamp in (None, sender) and evaluator.verdict is None:
+                handler(MESSAGES.type(name)(**fields), now)
+
+
+def lines_of(evaluator: Service) -> Iterator[str]:
+    """What it prints at its end."""
+    evaluator.record()
+    checks = evaluator.verdict.checks if evaluator.verdict else ()
+    assert evaluator.judged is not None
+    return evaluator.judged.lines({check.name: check.parameters for check in checks if check.parameters})
 
 
 def poses(way: Callable[[float], Pose], duration: float) -> Iterator[Sample]:

@@ -1,93 +1,121 @@
-"""What evaluators looked at: targets as the evaluator reads them, and the map by its roles."""
+"""What evaluators recorded, as the page draws it."""
 
-import base64
+import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from dodo_dsl.plan.model import Flag, Plan, PlannedService
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import from_json
-from dodo_dsl.report.viewer import judged, recorded, scene
-from services.continuous_signal.csv_target import read_table
-from services.continuous_signal.recorded_target import read_recording
-from services.continuous_signal.signals import Signal
-from tests.report.viewer import failures
-from tests.report.viewer.drives import EPOCH, GOLDEN, MESSAGES, ROOT, MadeDrive, Sample, record, requests
-
-STEERING = "opendlv.proxy.GroundSteeringRequest"
+from dodo_dsl.report.viewer import encoded, judged, page
+from services.base import Judged, JudgedBoxes
+from services.base import judged as recording
+from tests.report.viewer import drives, failures
+from tests.report.viewer.drives import EPOCH, GOLDEN, ROOT
 
 
-def plan(*flags: Flag) -> Plan:
-    named = (Flag("message", STEERING), Flag("field", "groundSteering"), Flag("sender", "0"), *flags)
-    judge = PlannedService("evaluation", "signal", "continuous-signal", "x", (), named, judge=True)
-    whole = from_json((GOLDEN / "sil-closed-straight" / "test.json").read_text())
-    return replace(whole, services=(judge,))
+def plan(slug: str) -> Plan:
+    return from_json((GOLDEN / slug / "test.json").read_text())
 
 
-def described(folder: Path, tested: Plan, samples: list[Sample]) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-    """Times and values of the target."""
-    record(folder / "test.rec", MadeDrive("x", 5.0, samples, {}))
-    test = recorded.read(folder / "test.rec", MESSAGES)
-    (signal,) = judged.judged(tested, folder, test, MESSAGES)
-    times, values = (np.frombuffer(base64.b64decode(signal["target"][key]), "<f4") for key in ("times", "values"))
-    return times, values
+def recorded(folder: Path, fill: Callable[[Judged], object], *more: str) -> judged.Judged:
+    """What the page gets of an evaluator's record, and of further lines in it."""
+    record = Judged()
+    fill(record)
+    lines = [*record.lines({"largest-step": ("max-step",)}), *more]
+    (folder / "evaluation.track.judged").write_text("\n".join(lines))
+    assert max(map(len, lines)) < 60_000
+    return judged.read(plan("sil-closed-straight"), folder)
 
 
-def test_the_target_of_a_table(tmp_path: Path) -> None:
-    (tmp_path / "files").symlink_to(ROOT / "tests_registry")
-    times, values = described(tmp_path, plan(Flag("target", "targets/straight.csv", "path")), [])
-    expected = read_table(ROOT / "tests_registry" / "targets" / "straight.csv", "groundSteering", False)
-    assert times == pytest.approx(expected.times / 1e6, abs=1e-6)
-    assert values == pytest.approx(expected.values, abs=1e-6)
+def test_a_series_with_its_limits_and_its_target(tmp_path: Path) -> None:
+    def fill(record: Judged) -> None:
+        series = record.series("Step", "deg", high=3, distance=0.5, band=0.1)
+        for number, value in enumerate((1.0, 1.2, 2.0, 4.0, float("nan"))):
+            series.add(EPOCH + number * 500_000, value, target=1.0)
+
+    found = recorded(tmp_path, fill)
+    (series,) = found.series(EPOCH)
+    assert (series["name"], series["unit"], series["high"]) == ("Step", "deg", 3)
+    assert series["note"] == "band ±0.1, at most 3 deg, distance at most 0.5"
+    assert encoded.unpacked(series["times"]).tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert encoded.unpacked(series["values"]).tolist()[:4] == np.float32([1, 1.2, 2, 4]).tolist()
+    assert series["marks"] == "AAECAgI="  # 0 1 2 2 2
+    assert encoded.unpacked(series["target"]["values"]).tolist() == [1.0] * 5
+    assert found.parameters == {"track": {"largest-step": ("max-step",)}}
+    assert (found.silent, found.why()) == ([], "")
 
 
-@pytest.mark.parametrize(("first", "zero"), [(EPOCH / 1e6 + 0.5, 0.5), (1e6, 0.0)])
-def test_the_target_of_a_table_of_sample_times(tmp_path: Path, first: float, zero: float) -> None:
-    """In the test's time, or from its first row on where it is of another day."""
-    (tmp_path / "files").mkdir()
-    (tmp_path / "files" / "t.csv").write_text(f"time,value\n{first},1\n{first + 1},2\n")
-    flags = Flag("target", "t.csv", "path"), Flag("align", "sample-time")
-    times, values = described(tmp_path, plan(*flags), [])
-    assert (times.tolist(), values.tolist()) == ([zero, zero + 1], [1.0, 2.0])
+def test_what_failed_is_among_the_samples_that_are_kept(tmp_path: Path) -> None:
+    count = 3 * recording.MOST_SAMPLES
+
+    def fill(record: Judged) -> None:
+        series = record.series("Distance", low=0, exclusive=True)
+        for number in range(count):
+            series.add(EPOCH + number * 1000, 0.0 if number == 41_001 else 1.0 + number % 7)
+
+    (series,) = recorded(tmp_path, fill).series(EPOCH)
+    times, values = encoded.unpacked(series["times"]), encoded.unpacked(series["values"])
+    assert recording.MOST_SAMPLES / 4 < len(times) <= recording.MOST_SAMPLES
+    assert (values.min(), values.max(), times[values == 0].tolist()) == (0, 7, [np.float32(41.001)])
+    assert (np.diff(times) > 0).all()
 
 
-@pytest.mark.parametrize("align", ["begin", "sample-time"])
-def test_the_target_of_a_recording(tmp_path: Path, align: str) -> None:
-    (tmp_path / "files").mkdir()
-    record(tmp_path / "files" / "t.rec", MadeDrive("x", 3.0, list(requests(lambda t: t / 10, 2.0)), {}))
-    flags = Flag("target", "t.rec", "path"), Flag("align", align)
-    times, values = described(tmp_path, plan(*flags), [])
-    expected = read_recording(tmp_path / "files" / "t.rec", Signal(STEERING, 0, "groundSteering"), MESSAGES)
-    assert times == pytest.approx(expected.times / 1e6)
-    assert values == pytest.approx(expected.values)
+def test_boxes_of_frames(tmp_path: Path) -> None:
+    many = [(str(n) + 50 * "\N{AUTOMOBILE}", 0.1, 0.2, 0.3, 0.4) for n in range(400)]
+
+    def fill(record: Judged) -> None:
+        record.frame(EPOCH + 200_000, JudgedBoxes([("a", 0.1, 0.2, 0.3, 0.4, 0.51234)], [], many))
+        record.frame(EPOCH + 100_000, JudgedBoxes([], [("far", 1e6, 0, 1, 1)], [], is_known=False))
+
+    unknown, frame = recorded(tmp_path, fill).frames(EPOCH)
+    assert unknown == {"time": 0.1, "isKnown": False, "hit": [], "false": [], "missed": []}
+    assert (frame["time"], frame["isKnown"], frame["false"]) == (0.2, True, [])
+    assert frame["hit"] == [["a", 0.1, 0.2, 0.3, 0.4, 0.5123]]
+    assert [label for label, *_ in frame["missed"]] == [label for label, *_ in many]
 
 
-def test_a_live_target_and_none(tmp_path: Path) -> None:
-    live = [(0.5, STEERING, 9, {"groundSteering": 0.25})]
-    times, values = described(tmp_path, plan(Flag("target-sender", "9")), live)
-    assert (times.tolist(), values.tolist()) == ([0.5], [0.25])
-    (tmp_path / "test.rec").unlink()
-    assert not described(tmp_path, plan(Flag("target", "gone.csv", "path")), [])[0].size
+def test_too_many_boxes_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording, "MOST_BOXES", 5)
+
+    def fill(record: Judged) -> None:
+        for number in range(4):
+            record.frame(EPOCH + number, JudgedBoxes([], [("a", 0, 0, 1, 1)] * 2, []))
+
+    found = recorded(tmp_path, fill)
+    assert (len(found.frames(EPOCH)), found.why()) == (2, "Only the first 4 boxes are drawn.")
+
+
+def test_lines_that_are_none_cost_only_themselves(tmp_path: Path) -> None:
+    wrong = [{"samples": "gone"}, {"series": 7, "low": "x"}, {"way": []}, {"frames": [1]}, {"parameters": 3}, {}]
+    wrong += [{"frames": [[1 << 70, True, []]]}, {"frames": [[EPOCH, True, [["false", "a", 0, 0, 1, float("inf")]]]]}]
+    part = {"samples": "Step", "zero": EPOCH, "times": "AAAA", "values": "AAAA", "marks": ""}
+    lines = [*(json.dumps({"dodo": "judged", **each}) for each in (*wrong, part)), "[", "[]", "7"]
+    found = recorded(tmp_path, lambda record: record.series("Step").add(EPOCH, 1.0), *lines)
+    assert [each["name"] for each in found.series(EPOCH)] == ["Step"]
+    assert [frame["false"] for frame in found.frames(EPOCH)] == [[]]
+
+
+def test_an_evaluator_without_a_record_is_named(tmp_path: Path) -> None:
+    why = "'track' recorded nothing of what was judged over time: its limits and targets are not drawn."
+    assert judged.read(plan("sil-closed-straight"), tmp_path).why() == why
 
 
 def test_lines_of_the_map_have_roles(tmp_path: Path) -> None:
     (tmp_path / "files").symlink_to(ROOT / "tests_registry")
-    whole = from_json((GOLDEN / failures.wall_hit().slug / "test.json").read_text())
-    shown = scene.scene(whole, tmp_path)
+    whole = plan(failures.wall_hit().slug)
+    drives.judge(tmp_path, whole, tmp_path, failures.wall_hit())
+    way = judged.read(whole, tmp_path).way
+    assert way is not None and way.goal == "finish"
+    shown = page.scene(whole, tmp_path, way)
     assert {line["name"]: line["role"] for line in shown["lines"]} == {
         "left": "wall",
         "right": "wall",
         "finish": "goal",
     }
     assert (shown["length"], shown["width"], shown["frame"]["sender"]) == (0.36, 0.16, 0)
-
-
-def test_a_target_that_cannot_be_read_is_said(tmp_path: Path) -> None:
-    record(tmp_path / "test.rec", MadeDrive("x", 5.0, [], {}))
-    test = recorded.read(tmp_path / "test.rec", MESSAGES)
-    (signal,) = judged.judged(plan(Flag("target", "none.csv", "path")), tmp_path, test, MESSAGES)
-    assert signal["problem"] == "its target is not shown: No such file or directory"
-    assert signal["target"] == {"times": "", "values": ""}
+    other = replace(way, roles={})
+    assert {line["role"] for line in page.scene(whole, tmp_path, other)["lines"]} == {"other"}

@@ -15,6 +15,7 @@ RESPONSE = "response: {max: 100 ms, over: 10 %, sample-times: copied}"
 OUTCOME = Outcome("t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad", 130, 0, "lockstep", "process")
 
 
+RECORDED = {"signal": {"mean-over-time": ("max-mean",)}}
 RESOURCES = Place("tests_registry/dil-static-rig/dil-static-rig.dodo.yml", 9, 1)
 
 
@@ -22,7 +23,7 @@ def test_the_place_of_a_limit_of_memory() -> None:
     plan = from_json((GOLDEN / "dil-static-rig" / "test.json").read_text())
     plan = replace(plan, source_map={**plan.source_map, "resources": RESOURCES})
     outcome = replace(OUTCOME, checks=(check("peak-memory-perception", 210.0, False, max=200),))
-    (found,) = checks(plan, outcome, SpecLines((ROOT,)))
+    (found,) = checks(plan, outcome, SpecLines((ROOT,)), RECORDED)
     assert [(p["flag"], p["line"]) for p in found["places"]] == [("max-memory", 9)]
 
 
@@ -41,7 +42,7 @@ def test_the_place_of_a_limit_of_memory() -> None:
 def test_places_of_limits(slug: str, name: str, expected: list[tuple[str, int, str]]) -> None:
     plan = from_json((GOLDEN / slug / "test.json").read_text())
     outcome = replace(OUTCOME, checks=(check(name, 1.0, False, max=0.5),))
-    (found,) = checks(plan, outcome, SpecLines((ROOT,)))
+    (found,) = checks(plan, outcome, SpecLines((ROOT,)), RECORDED)
     assert [(p["flag"], p["line"], p["text"]) for p in found["places"]] == expected
 
 

@@ -1,6 +1,5 @@
 """The pages of failed tests in a real browser."""
 
-import json
 import math
 import re
 import time
@@ -8,14 +7,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import shapely
 
 from services.collision.geometry import VehicleBox, VehiclePose, outline
 from services.collision.obstacles import load
-from services.object_detection.boxes import Box, overlaps
-from services.object_detection.pairing import best_pairs
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
 from tests.report.viewer.hostile import HOSTILE
@@ -148,20 +144,6 @@ def test_a_frame_is_shown_with_its_boxes(page: Page) -> None:
     assert middle(page, ".view canvas") == pytest.approx(64, abs=3)
 
 
-@pytest.mark.parametrize("page", ["missed cones"], indirect=True)
-def test_boxes_are_paired_as_the_evaluator_does(page: Page) -> None:
-    rng = np.random.default_rng(7)
-    cases = [[(rng.random((rng.integers(0, 8), 4)) * 0.5 + 0.05).tolist() for _ in range(2)] for _ in range(300)]
-    box = "([x, y, width, height]) => ({x, y, width, height})"
-    pairs = page.value(f"{json.dumps(cases)}.map(lists => dodo.detection.pairs(...lists.map(l => l.map({box})), 0.2))")
-    for (mine, true), found in zip(cases, pairs, strict=True):
-        scores = overlaps([Box(*each) for each in mine], [Box(*each) for each in true])
-        expected = best_pairs(scores, 0.2)
-        assert len(found) == len(expected)
-        assert sum(score for *_, score in found) == pytest.approx(sum(scores[pair] for pair in expected))
-        assert [score for *_, score in found] == pytest.approx([scores[a, b] for a, b, _ in found])
-
-
 @pytest.mark.parametrize("page", ["crash"], indirect=True)
 def test_the_log_follows_the_cursor(page: Page) -> None:
     now = "document.querySelector('.lines .now').innerText.split(/\\s+/).join(' ')"
@@ -180,15 +162,15 @@ def test_the_log_follows_the_cursor(page: Page) -> None:
 
 @pytest.mark.parametrize("page", ["wall hit"], indirect=True)
 def test_the_margin_is_the_evaluators(page: Page) -> None:
-    """The distances to the walls are those of the geometry by which walls are judged."""
+    """The distances to the walls are those that were judged: none after the wall was hit, which alone is marked."""
     walls = load(drives.ROOT / "tests_registry" / "maps" / "straight")
-    box = VehicleBox(0.36, 0.16)
-    margins = page.value("Array.from(dodo.way.margins())")
-    assert margins[-1] == 0 < min(margins[:-20])
-    poses = [VehiclePose(*failures.into_the_wall(n / 100)) for n in range(len(margins))]
-    lines = [walls["left"], walls["right"]]
-    expected = [min(shapely.distance(line, outline(pose, box)) for line in lines) for pose in poses]
-    assert margins == pytest.approx(expected, abs=1e-5)
+    signal = "dodo.signals.judged().find(s => s.title === 'Distance to the walls')"
+    margins = page.value(f"(s => Array.from(s.values, (v, n) => [s.times[n], v, s.marked(n)]))({signal})")
+    for at, margin, mark in margins:
+        area = outline(VehiclePose(*failures.into_the_wall(at)), VehicleBox(0.36, 0.16))
+        assert margin <= min(shapely.distance(walls[name], area) for name in ("left", "right")) + 1e-6
+        assert mark == ("failed" if margin == 0 else "")
+    assert [margin for _, margin, _ in margins].count(0) == 1 and margins[-1][1] == 0
 
 
 @pytest.mark.parametrize("page", ["wrong signal"], indirect=True)

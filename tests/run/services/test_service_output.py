@@ -60,6 +60,23 @@ def test_lines_do_not_depend_on_how_they_were_written(chunks: list[bytes]) -> No
     assert read.tail == [line.decode("utf-8", "replace") for line in log_lines[-8:]]
 
 
+def test_what_an_evaluator_recorded_is_in_a_file_beside_the_log(tmp_path: Path) -> None:
+    """However it was written; of an application, whose lines are no protocol, it stays in the log."""
+    line = b'{"dodo": "judged", "series": "x"}\n'
+    read = Read(tmp_path, [b"a\n{", line[1:20], line[20:] + b"b\n", line, b"c"])
+    assert (read.log, read.tail) == (b"a\nb\nc", ["a", "b", "c"])
+    assert (tmp_path / "logs" / "app.judged").read_bytes() == 2 * line
+    assert Read(tmp_path / "other", [b" " + line]).log == b" " + line
+    assert not (tmp_path / "other" / "logs" / "app.judged").exists()
+
+
+def test_a_record_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    line = b'{"dodo": "judged", "series": "x"}\n'
+    monkeypatch.setattr(service_output, "_MAX_RECORD", 2 * len(line))
+    read = Read(tmp_path, [3 * line, b"end\n"])
+    assert (read.log, (tmp_path / "logs" / "app.judged").read_bytes()) == (b"end\n", 2 * line)
+
+
 def test_a_long_line_is_in_the_log_and_its_begin_in_the_tail(tmp_path: Path) -> None:
     """Longer than a line of the protocol may be, so that it is not one."""
     long = b"x" * 200_000

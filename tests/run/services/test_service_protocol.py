@@ -19,6 +19,7 @@ from dodo_dsl.run.protocol import (
     Overrun,
     Paused,
     Ready,
+    Recorded,
     Responded,
     Stopped,
     Time,
@@ -53,6 +54,8 @@ def test_a_complete_verdict_is_taken_from_an_evaluator() -> None:
     assert read_line("track", True, line()) == VerdictEvent("track", True, "done", (JUDGED,))
     assert read_line("track", True, line(outcome="failed")) == VerdictEvent("track", False, "done", (JUDGED,))
     assert read_line("track", False, line()) is None
+    assert read_line("track", True, b'{"dodo": "judged", "series": "x"}') == Recorded("track")
+    assert read_line("camera", False, b'{"dodo": "judged", "series": "x"}') is None
     assert read_line("camera", False, b'{"dodo": "ready"}\n') == Ready("camera")
 
 

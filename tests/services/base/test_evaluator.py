@@ -1,6 +1,8 @@
+import json
+
 import pytest
 
-from services.base import Verdict
+from services.base import JudgedBoxes, Verdict
 from services.base.evaluator import Evaluator, JudgedTime
 
 SECOND = 1_000_000
@@ -35,6 +37,18 @@ def test_the_time_of_a_test_is_limited() -> None:
     evaluator.update(BEGIN + 10 * SECOND + 1)
     assert evaluator.verdict == Verdict("passed", "within 10.00 s")
     assert evaluator.spans == [JudgedTime("within 10.00 s", "for 10.00 s", False)]
+
+
+def test_what_was_judged_before_the_begin_does_not_count() -> None:
+    evaluator = Spans()
+    series = evaluator.judged.series("x", high=1)
+    series.add(BEGIN - SECOND, 7.0, target=0.5)
+    evaluator.judged.frame(BEGIN - SECOND, JudgedBoxes((), (), ()))
+    evaluator.begin(BEGIN)
+    assert [json.loads(line) for line in evaluator.judged.lines({})] == [{"dodo": "judged", **next(series.lines())}]
+    series.add(BEGIN, 1.0)
+    samples = json.loads([*evaluator.judged.lines({})][1])
+    assert (samples["zero"], samples["marks"]) == (BEGIN, "AA==")
 
 
 def test_the_end_of_the_input_is_the_end() -> None:

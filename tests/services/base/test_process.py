@@ -113,6 +113,33 @@ def test_a_message_decides(start: Start, cid: int) -> None:
     assert service.end() == (0, "", "")
 
 
+def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, cid: int) -> None:
+    """Where there is a runner, whose key the service has; else, as above, nobody reads it."""
+    about = {
+        "series": "Distance",
+        "unit": "m",
+        "exclusive": False,
+        "low": None,
+        "high": 1,
+        "distance": None,
+        "band": None,
+    }
+    with Session(cid) as session:
+        service = start("--role=judge", DODO_KEY="00" * 16)
+        assert service.line() == READY
+        session.send(DISTANCE(distance=1.5), sample_time=7)
+        assert service.line() == {"dodo": "judged", **about}
+        samples = service.line()
+        assert (samples["samples"], samples["zero"], samples["marks"]) == ("Distance", 7, "Ag==")
+        assert [service.line()["dodo"] for _ in range(2)] == ["note", "verdict"]
+        assert service.end() == (0, "", "")
+        stopped = start("--role=judge", DODO_KEY="00" * 16)
+        assert stopped.line() == READY
+        stopped.stop()
+        assert stopped.line() == {"dodo": "judged", **about}
+        assert stopped.end() == (0, "", "")
+
+
 @pytest.mark.thorough
 def test_a_source_that_runs_out_ends_the_judge(start: Start, cid: int) -> None:
     with Session(cid) as session:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
-from services.collision.geometry import VehicleBox, VehiclePose, heading_of, outline, swept
+from services.collision.geometry import VehicleBox, VehiclePose, outline, swept
 
 KIWI = VehicleBox(0.36, 0.16)
 places = st.floats(-2, 2)
@@ -76,22 +76,3 @@ def test_a_fast_vehicle_does_not_jump_over_a_line() -> None:
 def test_a_turn_goes_the_shorter_way_round() -> None:
     area = swept(VehiclePose(0, 0, math.radians(175)), VehiclePose(0, 0, math.radians(-175)), KIWI)
     assert area.bounds[3] == pytest.approx(outline(VehiclePose(0, 0, math.radians(175)), KIWI).bounds[3])
-
-
-@given(st.floats(-math.pi + 1e-6, math.pi), st.floats(0.01, 100))
-def test_heading_of_a_quaternion_of_any_length(heading: float, length: float) -> None:
-    qz, qw = length * math.sin(heading / 2), length * math.cos(heading / 2)
-    found = heading_of(0, 0, qz, qw)
-    assert found is not None
-    assert math.remainder(found - heading, math.tau) == pytest.approx(0, abs=1e-9)
-
-
-def test_heading_of_a_pitched_body_is_where_its_nose_points_on_the_ground() -> None:
-    yaw, pitch = 0.8, 0.5
-    cy, sy, cp, sp = math.cos(yaw / 2), math.sin(yaw / 2), math.cos(pitch / 2), math.sin(pitch / 2)
-    assert heading_of(-sp * sy, sp * cy, cp * sy, cp * cy) == pytest.approx(0.8)
-
-
-@pytest.mark.parametrize("q", [(0, 0, 0, 0), (math.nan, 0, 0, 1), (0, 0, math.inf, 1)])
-def test_no_heading_without_an_attitude(q: tuple[float, float, float, float]) -> None:
-    assert heading_of(*q) is None

@@ -1,4 +1,7 @@
+import base64
+import json
 import math
+from array import array
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -486,3 +489,14 @@ def test_a_speed_within_its_limit_is_kept() -> None:
     drive(it, (0.0, 0.5, 0, 0), (2.0, 3.0, 0, 0))
     assert decided(it).outcome == "passed"
     assert oks(it)["max-speed"] is True
+
+
+def test_what_is_recorded_is_what_was_judged() -> None:
+    """Of each move the distance and the speed by which it was judged, none before the begin and none after the end."""
+    it = judge(replace(LANE, max_speed=3.0))
+    drive(it, (-1, -0.5, 0, 0), (0, 0, 0, 0), (1, 1, 0.05, 3), (2, 2.5, 0, 0), (2.5, 2.9, 0, 0), (9, 0, 0, 0))
+    lines = [json.loads(line) for line in it.judged.lines({})]
+    (margins, speeds) = (array("f", base64.b64decode(line["values"])).tolist() for line in lines if "samples" in line)
+    assert values(it)["wall-margin"] == pytest.approx(min(margins)) and len(margins) == len(speeds) == 4
+    assert values(it)["max-speed"] == pytest.approx(max(speeds))
+    assert [(line["low"], line["high"]) for line in lines if "series" in line] == [(0, None), (None, 3)]

@@ -1,5 +1,8 @@
+import base64
+import json
 import math
 import random
+from array import array
 
 import numpy as np
 import pytest
@@ -394,8 +397,51 @@ def test_time_0_is_the_first_update_when_nobody_says_begin() -> None:
 
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "MOST_SAMPLES", 3)
+    monkeypatch.setattr(model, "MOST_IN_MEMORY", 3)
     it = judge(SignalLimits(mean=1e-9, samples=1))
     hear(it, (1, 0.1), (2, 0.2), (3, 0.3))
     it.update(BEGIN + 4 * SECOND)
     assert it.verdict is not None and it.verdict.outcome == "passed"
+
+
+def recorded(it: SignalEvaluator) -> dict[str, tuple[list[float], list[float], list[int]]]:
+    """Times in s of the test, values and marks of samples and target."""
+    it.record()
+    found = {}
+    for line in map(json.loads, it.judged.lines({})):
+        if "times" in line:
+            times, numbers = (array("f", base64.b64decode(line[key])).tolist() for key in ("times", "values"))
+            seconds = [(line["zero"] - BEGIN) / SECOND + time for time in times]
+            found["samples" if "samples" in line else "target"] = (
+                [round(each, 3) for each in seconds],
+                [round(each, 3) for each in numbers],
+                list(base64.b64decode(line["marks"])),
+            )
+    return found
+
+
+def test_what_is_recorded_is_marked_as_it_was_judged() -> None:
+    """By the target at its time, and in the window alone."""
+    it = judge(SignalLimits(distance=0.3, band=0.1, start=SECOND, samples=1))
+    hear(it, (5, 0.9), (0.5, 3.0), (2, 0.2), (3, 0.45), (4, math.nan), (11, 0.5))
+    decided(it)
+    found = recorded(it)
+    assert found["target"][:2] == ([0, 10], [0, 1])
+    times, values, marks = found["samples"]
+    assert (times, marks) == ([0.5, 2, 3, 4, 5, 11], [0, 0, 1, 2, 2, 0])
+    assert values[:3] == [3.0, 0.2, 0.45]
+
+
+def test_without_a_verdict_there_is_a_record_and_nothing_makes_none() -> None:
+    it = judge(SignalLimits(distance=0.3), target=None)
+    assert recorded(it) == {}
+    hear(it, (1, 0.5))
+    it.take_target(0.4, BEGIN + SECOND)
+    assert recorded(it) == {"samples": ([1], [0.5], [0]), "target": ([1], [0.4], [0])}
+
+
+def test_of_very_many_samples_the_farthest_are_recorded() -> None:
+    away = np.zeros(model.MOST_SAMPLES * 2 + 2)
+    away[[7, 40_000]] = 1.0
+    chosen = model.farthest_of(np.arange(len(away)), away)
+    assert len(chosen) <= model.MOST_SAMPLES and {7, 40_000} <= {*chosen} and chosen == sorted(chosen)

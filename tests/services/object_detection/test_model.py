@@ -1,3 +1,5 @@
+import json
+
 import pytest
 
 from services.base import UnjudgeableError, Verdict
@@ -426,3 +428,31 @@ def test_pictures_of_the_future_cannot_be_answered() -> None:
     verdict = decided(it)
     assert values(verdict)["recall"] == 1.0
     assert "left out: 1 detection of the future" in verdict.reason
+
+
+def frames(it: DetectionEvaluator) -> list[tuple[int, bool, list[list[object]]]]:
+    it.record()
+    lines = [json.loads(line) for line in it.judged.lines({})]
+    return [tuple(row) for line in lines for row in line.get("frames", ())]
+
+
+def test_what_became_of_each_box_is_recorded() -> None:
+    it = judge(limits=DetectionLimits(0.7, 0.7, 0.7, frames=2), labels=["yellow", "blue"])
+    near = LabelledBox("blue", Box(0.5, 0.1, 0.1, 0.08))
+    detect(it, 1, near, LabelledBox("red", FAR), LabelledBox("blue", FAR))
+    decided(it)
+    hit, false, missed = ["hit", "blue", *near.box, 0.8], ["false", "blue", *FAR], ["missed", "yellow", *A]
+    assert frames(it) == [(SECOND, True, [hit, false, missed])]
+
+
+def test_without_a_verdict_what_came_is_recorded_and_what_has_no_truth() -> None:
+    """A frame from another day is where it came."""
+    it = judge(FILM)
+    detect(it, 2, YELLOW)
+    detect(it, 9, YELLOW)
+    detect(it, -100_000, BLUE)
+    assert [(time, is_known, [kind for kind, *_ in boxes]) for time, is_known, boxes in frames(it)] == [
+        (2 * SECOND, True, ["hit", "missed"]),
+        (9 * SECOND, False, ["false"]),
+        (BEGIN, False, ["false"]),
+    ]

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from services.base import Check, Context, Output, Service, UnjudgeableError, Verdict, period_of, run
+from services.base import Check, Context, Judged, Output, Service, UnjudgeableError, Verdict, period_of, run
 
 
 class Echo(Service):
@@ -42,8 +42,11 @@ class Judge(Service):
     def __init__(self, context: Context) -> None:
         self.inputs = {("opendlv.proxy.DistanceReading", None): self.take}
         self.context = context
+        self.judged = Judged()
+        self.series = self.judged.series("Distance", "m", high=1)
 
     def take(self, message: Any, sample_time: int) -> None:
+        self.series.add(sample_time, message.distance)
         if message.distance > 1.0:
             self.verdict = Verdict("failed", "too far", (Check("range", message.distance, {"max": 1.0}, "m", False),))
 
