@@ -26,8 +26,8 @@ def test_what_cannot_be_read_is_an_error_and_no_silence(tmp_path: Path) -> None:
 
 
 LATE = """#!/bin/sh
-echo '{"ready": true, "port": "/dev/pts/99"}'
 echo '{"event": "late", "t": 0.1, "late": 9.0, "total": 9.0}'
+echo '{"ready": true, "port": "/dev/pts/99"}'
 while [ ! -e "$0-go" ]; do sleep 0.02; done
 cat "$0-go"
 exec sleep 60
