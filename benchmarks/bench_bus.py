@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, cost_row, plan, rate_row, report
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 
 COUNT, BURST, WINDOW, ROUNDS = 10_000, 100, 300, 15
 CID = 127

@@ -20,11 +20,11 @@ from players import ROOT, cost_of
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, rate_row, report
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import STANDARD
-from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
-from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from dodo_dsl.opendlv.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
 
 PEER = Path(sys.executable).with_name("cluon-rec2csv")
 ENVELOPES, ROUNDS = 300_000, 9

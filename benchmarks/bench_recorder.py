@@ -22,12 +22,12 @@ from players import ROOT, Measured, peer, service, tool
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Row, attempt, cost_row, plan, report
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from dodo_dsl.opendlv.video.decoder import VideoDecoder
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+from dodo_dsl.opendlv.video import VideoDecoder
 
 BUDGET = Budget.given()
 CID, ROUNDS = 125, 5

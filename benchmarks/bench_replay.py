@@ -24,9 +24,9 @@ from players import Measured, peer, service, tool
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, rate_row, report
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from dodo_dsl.opendlv.session import Session
 
 FAST, EVEN, SHORT, ROUNDS = 50_000, 3_000, 1_000, 5  # messages; those in real time are 2 ms apart
 CID = 126

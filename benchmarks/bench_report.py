@@ -20,10 +20,10 @@ import numpy as np
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
-from dodo_dsl.opendlv.video.encoder import VideoEncoder
+from dodo_dsl.opendlv.video import VideoEncoder
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.report import overview
 from dodo_dsl.report.report_folder import write_summaries
-from dodo_dsl.report.suite import check_history
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import PROGRAM, Chromium
 
@@ -62,7 +62,7 @@ def suites(folder: Path) -> Iterator[tuple[int, Path]]:
         values = rng.uniform(0, 1, (size, RUNS, len(CHECKS))).tolist()
         names = [check["name"] for check in CHECKS]
         runs = [[{"outcome": "passed", "checks": dict(zip(names, run, strict=True))} for run in v] for v in values]
-        check_history.write(place, {o.slug: r for o, r in zip(outcomes, runs, strict=True)})
+        overview.write(place, {o.slug: r for o, r in zip(outcomes, runs, strict=True)})
         write_summaries(place, outcomes)
         yield size, place / "index.html"
 

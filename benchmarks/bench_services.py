@@ -27,8 +27,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Row, attempt, cost_row, plan, report
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from tests.services.gantry.fake_rig import FakeRig
 
 ROOT = Path(__file__).resolve().parents[1]

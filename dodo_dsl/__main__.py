@@ -16,11 +16,11 @@ def run() -> None:
     if sys.getfilesystemencoding() != "utf-8":
         _start_again_in_utf8()
     if _COMPLETES in os.environ:
-        from dodo_dsl.cli.completion.protocol import answer
+        from dodo_dsl.cli.completion import answer
 
         answer()
     if sys.argv[1:2] == ["run"]:
-        from dodo_dsl.cli.run.loading import begin
+        from dodo_dsl.cli.run_jobs import begin
 
         begin(sys.argv[2:])
     try:

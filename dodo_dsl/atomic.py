@@ -16,7 +16,7 @@ import os
 import secrets
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -175,3 +175,18 @@ def _naming(path: Path, part: Path) -> Iterator[None]:
         if error.errno is None or error.filename not in (None, str(part)):
             raise
         raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+class OutputExists(Exception):
+    """A result would replace an existing file; one sentence."""
+
+
+def refuse_existing(paths: Iterable[Path], force: bool) -> None:
+    """Raises OutputExists for the first path that is there, unless it is a file and ``force`` is given."""
+    for path in paths:
+        try:
+            refuse_others(path)
+        except (NotReplaceable, IsADirectoryError) as error:
+            raise OutputExists(f"'{path}' cannot take the result: {error.strerror}") from None
+        if not force and path.exists():
+            raise OutputExists(f"'{path}' exists already; --force replaces it")

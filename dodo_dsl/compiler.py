@@ -9,28 +9,27 @@ from typing import TYPE_CHECKING, NamedTuple
 from dodo_dsl import package_data
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.mounts import unseen_problems
 from dodo_dsl.application.read import read_application
-from dodo_dsl.application.unseen import unseen_problems
-from dodo_dsl.check import check, manifest_messages
+from dodo_dsl.check import check
+from dodo_dsl.check import problems as check_problems
 from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.problems import Problems
 from dodo_dsl.check.resolve import ResolvedTest, resolve
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
-from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
-from dodo_dsl.spec.deployment.rig import PORT
-from dodo_dsl.spec.instances.matrix import Choice
-from dodo_dsl.spec.instances.pools import on_each
-from dodo_dsl.spec.instances.vary import Values
-from dodo_dsl.spec.load import Loaded, load_spec, varied
+from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.load import Loaded, Settings, applied, load_spec, on_each, varied
 from dodo_dsl.spec.manifest import Manifest, load_manifests
+from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location, locate
-from dodo_dsl.spec.settings import Settings, applied
+from dodo_dsl.spec.rig import PORT
+from dodo_dsl.spec.vary import Values
 
 if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it takes as long as the rest
-    from dodo_dsl.emit.job_options import JobOptions
     from dodo_dsl.emit.pipeline import SearchJobs
+    from dodo_dsl.emit.pipeline_jobs import JobOptions
     from dodo_dsl.emit.render import File
     from dodo_dsl.plan.build import Compiled
 
@@ -133,7 +132,7 @@ def load(
     reader = sources.read
     deployment, found = load_deployment(find_deployment(sources.start, paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
-    own = manifest_messages.problems(deployment.services, reader, known_messages(deployment.messages))
+    own = check_problems.problems(deployment.services, reader, known_messages(deployment.messages))
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
     loaded = sources.load(locations)
     source = None
@@ -230,9 +229,9 @@ def plan(
     The pipeline has the jobs of ``searches``, too, and ``options`` hold for all its jobs. What ``before_each`` raises,
     which is called before each test, ends the planning.
     """
-    from dodo_dsl.emit.job_options import NO_OPTIONS
     from dodo_dsl.emit.output_folder import pipeline_folder
     from dodo_dsl.emit.pipeline import artifact_problems, pipeline_problems
+    from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS
     from dodo_dsl.emit.render import render_pipeline
     from dodo_dsl.plan.build import build
 

@@ -23,8 +23,8 @@ import pytest
 
 from dodo_dsl import advice, package_data
 from dodo_dsl.cli.main import COMMANDS, parser
-from dodo_dsl.run.capabilities import kernel
-from dodo_dsl.run.docker import own_images
+from dodo_dsl.run import capabilities
+from dodo_dsl.run.docker import pulls
 from dodo_dsl.state_folder import UnsafeFolder, secured
 from tests.emit.readers import run
 from tests.run.scripted import plan
@@ -202,7 +202,7 @@ def test_the_rig_is_built_in_the_checkout(monkeypatch: pytest.MonkeyPatch, tmp_p
 
 IN_NAMESPACES = """\
 import subprocess
-from dodo_dsl.run.capabilities import kernel
+from dodo_dsl.run import capabilities as kernel
 for check in (kernel.multicast, kernel.shared_memory):
     (before,) = check()
     print(before.state, before.advice, sep="|")
@@ -227,15 +227,18 @@ def test_a_machine_without_multicast_and_shared_memory() -> None:
 
 def test_limits_of_the_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The keys are the kernel's; in a container they are its host's, and users need sudo."""
-    for advised in (kernel._sysctl("net.core.rmem_max=1"), kernel._sysctl("kernel.shmmni=1", "kernel.shmmax=2")):
+    for advised in (
+        capabilities._sysctl("net.core.rmem_max=1"),
+        capabilities._sysctl("kernel.shmmni=1", "kernel.shmmax=2"),
+    ):
         assert all(re.fullmatch(r"[\w.]+=\d+", word) for word in advised.partition("sysctl -w ")[2].split())
     assert Path("/proc/sys/kernel/shmmni").is_file()
     (tmp_path / "net").mkdir()
-    monkeypatch.setattr(kernel, "_SYS", tmp_path)
-    assert kernel._sysctl("net.rmem=1") == "on the host: sysctl -w net.rmem=1"
+    monkeypatch.setattr(capabilities, "_SYS", tmp_path)
+    assert capabilities._sysctl("net.rmem=1") == "on the host: sysctl -w net.rmem=1"
     (tmp_path / "net" / "rmem").touch(0o644)
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert kernel._sysctl("net.rmem=1") == "sudo sysctl -w net.rmem=1"
+    assert capabilities._sysctl("net.rmem=1") == "sudo sysctl -w net.rmem=1"
 
 
 def test_a_state_folder_that_all_can_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -270,7 +273,7 @@ def test_images_that_were_never_built(prefix: str, tmp_path: Path, monkeypatch: 
 
     monkeypatch.chdir(tmp_path)
     reference = f"{prefix}/sandbox:7"
-    command = re.fullmatch("'dodo (.+)' makes it", own_images.hints(plan(sandbox_image=reference))[reference])
+    command = re.fullmatch("'dodo (.+)' makes it", pulls.hints(plan(sandbox_image=reference))[reference])
     assert command
     options = parser().parse_args(shlex.split(command[1]))
     assert reference in {image.reference for image in images._chosen(options, checked_deployment())}

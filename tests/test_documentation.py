@@ -16,7 +16,7 @@ from jsonschema import Draft202012Validator
 
 from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.cli.selection import select
-from dodo_dsl.report.pictures.trajectory import read_ground
+from dodo_dsl.report.trajectory import read_ground
 from dodo_dsl.spec.model import LEVEL_WORDS
 
 ROOT = Path(__file__).parents[1]

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from dodo_dsl.margins import with_margin, worst_margin
-from dodo_dsl.outcome import SLOW_ANSWERS, Outcome
+from dodo_dsl.outcome import SLOW_ANSWERS, Outcome, with_margin, worst_margin
 
 PASSED = Outcome("t", "t", "t.dodo.yml", "sil", "closed-loop", "passed", "so", 130, 0, "lockstep", "process")
 FAILED = replace(PASSED, outcome="failed")

@@ -9,16 +9,14 @@ import cv2
 import numpy as np
 
 from dodo_dsl import package_data
-from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.light import Light
-from services.scene.draw.raster import Image
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.camera import CameraMotion, CameraPose, Pinhole
 from services.scene.lens import Distortion
-from services.scene.motion import CameraMotion
+from services.scene.raster import Image
+from services.scene.render import Renderer
+from services.scene.scene import SceneOptions, load_scene
+from services.scene.shading import Light
 from services.scene.truth import SceneTruth, TruthLimits, classes_of
-from services.virtual_camera.image.optics import Optics
-from services.virtual_camera.image.sensor import Sensor
+from services.virtual_camera.optics import Optics, Sensor
 
 MAP = package_data.registry() / "maps" / "left-curve"
 SIZE, FOVY, COLUMNS = (288, 216), math.radians(48.8), 4

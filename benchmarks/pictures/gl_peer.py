@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from dodo_dsl.opendlv.inputs.map_file import BlockEntry, Instance, ModelEntry, read_map
+from dodo_dsl.opendlv.assets.map_file import BlockEntry, Instance, ModelEntry, read_map
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]

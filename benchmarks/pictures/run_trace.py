@@ -15,8 +15,9 @@ from typing import Any
 from unittest import mock
 
 from dodo_dsl import atomic
+from dodo_dsl.cli import progress
+from dodo_dsl.cli import run as cli_run
 from dodo_dsl.cli.main import main as dodo
-from dodo_dsl.cli.run import command, progress
 from dodo_dsl.outcome import Outcome
 
 COMMAND, OWN = "dodo run", "processor of dodo run, s"
@@ -84,7 +85,7 @@ def run(trace: Trace, words: Sequence[str]) -> int:
     with contextlib.ExitStack() as stack:
         stack.enter_context(mock.patch.object(progress, "choose", lambda stream, slugs, _: Traced(stream, slugs)))
         for name, phase in BEGINS.items():
-            stack.enter_context(mock.patch.object(command, name, entering(phase, getattr(command, name))))
+            stack.enter_context(mock.patch.object(cli_run, name, entering(phase, getattr(cli_run, name))))
         code = dodo(["run", *words], sys.stdout, sys.stderr)
         trace.enter(COMMAND)
     return code

@@ -23,10 +23,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # this checkout
 
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.search.sampling_order import SamplingOrder, key
+from dodo_dsl.search.search_loop import SamplingOrder, key
 from dodo_dsl.search.space import Space, texts
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.instances.vary import Range
+from dodo_dsl.spec.vary import Range
 
 LEARNS_BELOW = 0.35
 _SPARE, _LEAST, FAILED = 0.5, 0.02, -0.4

@@ -17,9 +17,17 @@ from dodo_dsl.application.access.model import Look, diagnostic, place
 from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.host_access import is_true, references
 from dodo_dsl.application.interpolation import interpolated_node
-from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, environment, plain, text
+from dodo_dsl.application.model import (
+    KEYS,
+    SANDBOX,
+    ApplicationSource,
+    ComposeService,
+    environment,
+    image_variable,
+    plain,
+    text,
+)
 from dodo_dsl.application.mounts import missing_folders, nested_mounts
-from dodo_dsl.application.service_environment import image_variable
 from dodo_dsl.application.slips import cid_slips, missing_program
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix
 from dodo_dsl.source import Node

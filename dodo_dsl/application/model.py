@@ -1,7 +1,8 @@
 """The application as it is written, and the messages that its services declare to produce and to consume."""
 
 import functools
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,12 @@ from typing import Any
 from dodo_dsl import source
 from dodo_dsl.application.access.host_paths import HostPaths, repository
 from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.compose_files import variables_of
+from dodo_dsl.application.host_access import is_true
+from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 SANDBOX = "sandbox"
 FILES = "dodo-files"
@@ -164,3 +168,28 @@ def scalars(node: Node | None) -> list[Scalar]:
     """The strings of a list, or the single string."""
     nodes = node.items if isinstance(node, source.Sequence) else (node,)
     return [n for n in nodes if isinstance(n, Scalar) and isinstance(n.value, str)]
+
+
+def image_variable(service: str) -> str:
+    """The variable with which a pipeline sets a service's image."""
+    return "DODO_IMAGE_" + re.sub(r"[^A-Z0-9_]", "_", service.upper())
+
+
+def env_files(service: source.Mapping) -> Iterator[EnvFile]:
+    """The files of ``env_file``."""
+    node = service.get("env_file")
+    for item in node.items if isinstance(node, source.Sequence) else (node,):
+        path = item.get("path") if isinstance(item, source.Mapping) else item
+        required = item.get("required") if isinstance(item, source.Mapping) else None
+        if isinstance(path, Scalar) and isinstance(path.value, str):
+            optional = isinstance(required, Scalar) and not is_true(required.value)
+            yield EnvFile(path.text, path.span, not optional)
+
+
+def cid_variables(files: Iterable[EnvFile], folder: Path) -> tuple[str, ...]:
+    """The CID variables that files beside the compose file set."""
+    found: set[str] = set()
+    for file in files:
+        if not file.path.startswith(("/", "~", "$")):
+            found |= set(variables_of(folder / file.path))
+    return tuple(v for v in CID_VARIABLES if v in found)

@@ -14,17 +14,15 @@ from dodo_dsl.application.access.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.access.model import Access, Look, diagnostic
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import ComposeFiles
-from dodo_dsl.application.discovery import unread
 from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
-from dodo_dsl.application.load import load
-from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
-from dodo_dsl.application.service_environment import cid_variables, env_files
+from dodo_dsl.application.load import load, unread
+from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, declared, env_files, plain
 from dodo_dsl.application.slips import variable_problems
-from dodo_dsl.application.tunables import tunable_problems
+from dodo_dsl.application.variables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Reader
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.schema.validation import validate
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.validation import validate
 
 MAX_SERVICES = 256
 _OURS = ("services", "version", "name", "networks", "include")

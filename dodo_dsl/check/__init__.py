@@ -5,50 +5,33 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check import replayed
+from dodo_dsl.check import file_rules, resolve, service_rules, spec_rules, wiring_rules
 from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.check.rules import (
-    camera_sources,
-    clocks,
-    goals,
-    layers,
-    levels,
-    memories,
-    messages,
-    names,
-    parameters,
-    pools,
-    producers,
-    rigs,
-    services,
-    variables,
-)
-from dodo_dsl.check.rules.inputs import files, limits, references
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
 
 RULES: tuple[Rule, ...] = (
-    names.check,
-    levels.check,
-    clocks.check,
-    pools.check,
-    rigs.check,
-    camera_sources.check,
-    services.check,
-    layers.check,
-    parameters.check,
-    messages.check,
-    references.check,
-    files.check,
-    limits.check,
-    goals.check,
-    producers.check,
-    producers.check_hidden,
-    variables.check,
-    memories.check,
+    spec_rules.check_names,
+    spec_rules.check_levels,
+    spec_rules.check_clock_rates,
+    spec_rules.check_pools,
+    spec_rules.check_rigs,
+    service_rules.check_camera_sources,
+    service_rules.check_services,
+    service_rules.check_layers,
+    service_rules.check_parameters,
+    service_rules.check_messages,
+    file_rules.check_references,
+    file_rules.check_files,
+    file_rules.check_limits,
+    spec_rules.check_goals,
+    wiring_rules.check_producers,
+    wiring_rules.check_hidden_messages,
+    wiring_rules.check_variables,
+    wiring_rules.check_memories,
 )
 
 
@@ -88,7 +71,7 @@ def check(
 
 def forget_files() -> None:
     """What is kept of the files that tests name, which may have changed."""
-    for cache in (references.entries, files.problems, replayed.known_ids, replayed.holds):
+    for cache in (file_rules.entries, file_rules.problems, resolve.known_ids, resolve.holds):
         cache.cache_clear()
 
 

@@ -6,15 +6,14 @@ from pathlib import Path
 from typing import Protocol
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check.replayed import known_ids
-from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.resolve import ResolvedTest, known_ids
 from dodo_dsl.check.wiring import Wiring
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.arguments import ResolvedService
-from dodo_dsl.spec.deployment.deployment import Deployment
-from dodo_dsl.spec.deployment.rig import Rig
+from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.rig import Rig
 
 
 @dataclass(frozen=True)

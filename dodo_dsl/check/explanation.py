@@ -4,15 +4,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.senders import told
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
-from dodo_dsl.check.world import told
 from dodo_dsl.diagnostics import Span, shown_path
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.arguments import Argument
-from dodo_dsl.spec.deployment.rig import EMULATED_FILE
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.rig import EMULATED_FILE
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Scalar
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.arguments import ResolvedService
-from dodo_dsl.spec.goals import Goal
+from dodo_dsl.spec.model import Goal
 
 _OF_THE_TEST = {
     "slow-answers": "",

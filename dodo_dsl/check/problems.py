@@ -1,13 +1,17 @@
 """What is wrong, by what it is of: the deployment, a service, a test; and what of it a selection of tests has."""
 
 import itertools
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from dodo_dsl import source
+from dodo_dsl.check import file_rules
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.check.rules.inputs import files
+from dodo_dsl.check.service_rules import unknown_message
 from dodo_dsl.diagnostics import Diagnostic, Span, ordered
+from dodo_dsl.source import Reader, Scalar, walk
 from dodo_dsl.spec.model import Spec
 
 _OF_ALL = "name-taken"
@@ -74,7 +78,7 @@ def _having(
         for problem in found:
             is_of_all = titles <= set(problem.tests)
             is_told = (problem.span.file == str(path) and is_of_all) or problem.span in ends
-            if is_told or files.is_own(problem):
+            if is_told or file_rules.is_own(problem):
                 at_home.add(problem)
             names.setdefault(problem, []).extend([name] if is_of_all else problem.tests)
     return {problem: tuple(dict.fromkeys(those)) for problem, those in names.items() if problem not in at_home}
@@ -108,3 +112,21 @@ def _of_services(path: Path, problems: Sequence[Diagnostic]) -> Iterator[Diagnos
     """What a test says twice or too little, as an extended one has a service in the wrong layer."""
     if any(d.rule == "wrong-layer" and d.span.file != str(path) for d in problems):
         yield from (d for d in problems if d.rule in _OF_BASE)
+
+
+_NAME = re.compile(r"[\w.]+")
+
+
+def problems(folders: tuple[Path, ...], reader: Reader, known: Collection[str]) -> Iterator[Diagnostic]:
+    """The messages that are not ``known`` in ``<folder>/<service>/service.yml``; a placeholder is for the test to name.
+
+    Loading these files reports whatever else is wrong with them.
+    """
+    for folder in folders:
+        for path in sorted(folder.glob("*/service.yml")):
+            node, _ = reader(path)
+            ports = node.get("messages") if isinstance(node, source.Mapping) else None
+            for scalar in walk(ports) if ports is not None else ():
+                name = scalar.text.partition("/")[0].removesuffix("?") if isinstance(scalar, Scalar) else ""
+                if _NAME.fullmatch(name):
+                    yield from unknown_message(name, known, scalar.span)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from dodo_dsl.application.model import Declared
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.opendlv.bus.address import is_of_the_world
+from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Ports
 

@@ -4,8 +4,8 @@ import argparse
 import dataclasses
 from typing import TextIO
 
-from dodo_dsl.cli.exits import Exit
-from dodo_dsl.run.capabilities import examine
+from dodo_dsl.cli.errors import Exit
+from dodo_dsl.run import capabilities
 from dodo_dsl.run.work_folder import reap_folders
 from dodo_dsl.terminal import json_text, printable
 
@@ -25,10 +25,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.clean:
         reap_folders()
-        reaped = examine.clean()
+        reaped = capabilities.clean()
         stderr.writelines(f"removed: {printable(line)}\n" for line in reaped.removed)
         stderr.writelines(f"cannot be removed: {printable(line)}\n" for line in reaped.left)
-    findings = examine.examine()
+    findings = capabilities.examine()
     if options.json:
         stdout.write(json_text([dataclasses.asdict(f) for f in findings]))
     else:

@@ -2,10 +2,23 @@
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from enum import IntEnum
 
-from dodo_dsl.cli.exits import Exit
+
+class Exit(IntEnum):
+    OK = 0
+    PROBLEMS = 1
+    USAGE = 2
+    ERROR = 3
+    INTERRUPTED = 130
+
+
+def of_outcomes(outcomes: Iterable[str]) -> Exit:
+    """The exit code for tests that passed, failed or ended in error."""
+    kinds = set(outcomes)
+    return Exit.ERROR if "error" in kinds else Exit.PROBLEMS if "failed" in kinds else Exit.OK
 
 
 class UsageError(Exception):
@@ -66,19 +79,18 @@ def _of_no_utf8(error: UnicodeEncodeError) -> str:
 
 def _usage_errors() -> tuple[type[Exception], ...]:
     """Errors of the user's files and words."""
-    from dodo_dsl.atomic import NotReplaceable
+    from dodo_dsl.atomic import NotReplaceable, OutputExists
     from dodo_dsl.images.names import NoSuchImage
-    from dodo_dsl.opendlv.odvd.parser import OdvdError
-    from dodo_dsl.opendlv.recordings.recording import RecordingError
+    from dodo_dsl.opendlv.odvd import OdvdError
+    from dodo_dsl.opendlv.recording import RecordingError
     from dodo_dsl.opendlv.regular_file import NotAFile
     from dodo_dsl.plan.test_files import FilesError
     from dodo_dsl.rec.coco import LabelError
     from dodo_dsl.rec.excerpt import NothingSelected
     from dodo_dsl.rec.frames import FramesError
-    from dodo_dsl.rec.outputs import OutputExists
-    from dodo_dsl.rec.parts import SplitError
+    from dodo_dsl.rec.steering import SplitError
     from dodo_dsl.rec.truth import TruthError
-    from dodo_dsl.report.joined.child_jobs import NoChildJobs
+    from dodo_dsl.report.child_jobs import NoChildJobs
     from dodo_dsl.report.results import ResultsError
     from dodo_dsl.spec.registry import RegistryTooLarge
 
@@ -99,9 +111,9 @@ def _usage_errors() -> tuple[type[Exception], ...]:
 
 def _machine_errors() -> tuple[type[Exception], ...]:
     """Errors of the machine, its engine, rigs and databases. ``usage`` of a rig's error makes it one of the user."""
+    from dodo_dsl.images.build_context import WheelsError
     from dodo_dsl.images.docker_command import DockerError
     from dodo_dsl.images.sbom import SbomError
-    from dodo_dsl.images.wheels import WheelsError
     from dodo_dsl.run.leases import LeaseTimeout
     from dodo_dsl.run.rigs.problems import RigProblem
     from dodo_dsl.search.postgres import StorageProblem

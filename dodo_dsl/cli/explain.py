@@ -7,11 +7,10 @@ from typing import TextIO
 
 from dodo_dsl.check import catalogue
 from dodo_dsl.check.explanation import ArgumentExplained, Asked, Explanation, Line, explain
-from dodo_dsl.check.world import told_in_words
+from dodo_dsl.check.senders import told_in_words
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.display.colours import write_diagnostics
-from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.display import write_diagnostics
+from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.spec.model import LEVEL_WORDS
 from dodo_dsl.terminal import json_text, printable

@@ -11,16 +11,15 @@ from typing import TextIO
 
 from dodo_dsl import compiler
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError
 from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import did_you_mean, has_errors
 from dodo_dsl.emit.output_folder import write
 from dodo_dsl.images import docker_command, remote
 from dodo_dsl.images.remote import UNPACKED, RemoteImage
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.docker import own_images
-from dodo_dsl.spec.deployment.rig import Rig
+from dodo_dsl.run.docker import pulls
+from dodo_dsl.spec.rig import Rig
 from dodo_dsl.terminal import printable
 
 
@@ -108,7 +107,7 @@ def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str], dic
             found, own = _of_application(plan, folder / plan.slug)
             wanted |= found | ({service.image for service in plan.services} if with_own else set())
             built |= own
-            hints |= own_images.hints(plan)
+            hints |= pulls.hints(plan)
     return sorted(wanted), sorted(built), hints
 
 

@@ -5,24 +5,71 @@ import json
 import shlex
 import shutil
 import tempfile
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
-from dodo_dsl import atomic, compiler
-from dodo_dsl.application import compose_paths, unseen
+from dodo_dsl import atomic, compiler, package_data
+from dodo_dsl.application import compose_paths, mounts
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
-from dodo_dsl.cli import image_pull, own_services, selection
-from dodo_dsl.cli.errors import NO_APPLICATION, UsageError, require_extra
-from dodo_dsl.cli.exits import Exit
-from dodo_dsl.diagnostics import format_text, has_errors
-from dodo_dsl.images import build_context, docker_command, sbom, wheels
+from dodo_dsl.cli import image_pull, selection
+from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError, require_extra
+from dodo_dsl.diagnostics import format_text, has_errors, shown_path
+from dodo_dsl.images import build_context, docker_command, sbom
+from dodo_dsl.images import names as images_names
 from dodo_dsl.images.names import DODO, PLATFORM, Image, choose, known, of_platforms, tagged
 from dodo_dsl.plan.rewrite.checked_builds import checked_builds
-from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
-from dodo_dsl.run.files_of_tests import files_of_tests
-from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.run.application_files import files_of_tests
+from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
+from dodo_dsl.spec.deployment import Deployment, build_command
 from dodo_dsl.spec.manifest import load_manifests
+
+Dockerfiles = Mapping[str, Path | None]
+
+
+def dockerfiles(deployment: Deployment) -> Dockerfiles:
+    """The Dockerfile of each own image, None where there is none; raises UsageError for manifests with problems."""
+    if not deployment.services:
+        return {}
+    manifests, problems = load_manifests(deployment.services)
+    if has_errors(problems):
+        files = sorted({shown_path(d.span.file) for d in problems if d.severity == "error"})
+        raise UsageError(f"problems in {', '.join(files)}; dodo compile --check shows them")
+    own = [m for m in manifests.values() if m.folder.parent != package_data.services()]
+    return images_names.dockerfiles(own, known(load_manifests()[0].values()))
+
+
+def require_dockerfiles(names: Collection[str], own: Dockerfiles, images: Sequence[Image]) -> None:
+    """Raises UsageError where an image is named that has no Dockerfile."""
+    for image in images:
+        if image.name in names and own.get(image.name, Path()) is None:
+            base = images_names.beside(image.reference, "base")
+            raise UsageError(
+                f"there is no Dockerfile beside the service.yml of '{image.name}': write one there, or build "
+                f"{image.reference} from your own Dockerfile on {base}"
+            )
+
+
+def build_own(image: Image, dockerfile: Path, stdout: TextIO) -> None:
+    """Builds an image; raises UsageError where the one below it is missing, and DockerError."""
+    base = images_names.base_of(image, dockerfile)
+    if base.startswith(f"{Deployment.image_prefix}/") and not docker_command.is_local(base):
+        prefix, _, last = base.rpartition("/")
+        name, _, tag = last.partition(":")
+        raise UsageError(f"{base} is not on this machine; build it first: {build_command(prefix, tag, name)}")
+    code, _ = docker_command.show(images_names.build_words(image, dockerfile), stdout)
+    if code:
+        file = shown_path(str(dockerfile))
+        raise docker_command.DockerError(f"{file} cannot be built on {base}; the output above says why")
+    say_built([image], stdout)
+
+
+def say_built(images: Sequence[Image], stdout: TextIO) -> None:
+    width = max(len(image.reference) for image in images)
+    for image in images:
+        stdout.write(f"built {image.reference:<{width}}  {docker_command.size(image.reference) / 1e6:.0f} MB\n")
+
 
 EXAMPLES = """examples:
   dodo images build                                   all images, named as in dodo.yml
@@ -116,15 +163,15 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.action == "push":
         return _push(options, images, stdout)
     docker_command.require_buildx()
-    own = own_services.dockerfiles(deployment)
-    own_services.require_dockerfiles(options.name, own, images)
+    own = dockerfiles(deployment)
+    require_dockerfiles(options.name, own, images)
     for platform in options.platform or [""]:
         wanted = [one for one in of_platforms(images, options.platform) if one.platform == platform]
         if stages := [image for image in wanted if image.name not in own]:
             _build(options, stages, stdout)
         for image in wanted:
             if dockerfile := own.get(image.name):
-                own_services.build(image, dockerfile, stdout)
+                build_own(image, dockerfile, stdout)
     return Exit.OK
 
 
@@ -156,7 +203,7 @@ def _own_contexts(
         folder.mkdir(parents=True, exist_ok=True)
         own = Path(tempfile.mkdtemp(dir=folder))
         written = compose_paths.unescaped(builds)
-        hidden = unseen.folders(source, deployment)
+        hidden = mounts.folders(source, deployment)
         for root in source.paths.roots:
             found = files_of_tests(root.resolve(), source.folder.resolve(), hidden)
             hidden += found.paths
@@ -173,7 +220,7 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     if options.action == "push" and prefix == Deployment.image_prefix:
         raise UsageError("no registry; name it with --prefix or as images.prefix in dodo.yml")
     names = known(load_manifests()[0].values())
-    own = own_services.dockerfiles(deployment)
+    own = dockerfiles(deployment)
     found = choose(options.name, (*names, *own), prefix, options.tag or deployment.image_tag)
     if options.name:
         return found
@@ -199,14 +246,14 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
     if code:
         hint = f"; {_INDEX_HINT}" if packages is None and (stdout.isatty() or "requirements/install" in output) else ""
         raise docker_command.DockerError(f"the images cannot be built; the output above says why{hint}")
-    own_services.say_built(images, stdout)
+    say_built(images, stdout)
 
 
 def _packages(base_image: str, platform: str, whole: bool, stdout: TextIO) -> Path:
-    python = wheels.python_of(base_image, platform)
+    python = build_context.python_of(base_image, platform)
     stdout.write(f"downloading packages for Python {python.tag} on {python.machine} with pip\n")
     stdout.flush()
-    return wheels.provide(python, wheels.cache_folder(), whole=whole)
+    return build_context.provide(python, build_context.cache_folder(), whole=whole)
 
 
 def _require_built(options: argparse.Namespace, images: list[Image]) -> None:

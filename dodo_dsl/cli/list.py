@@ -8,8 +8,7 @@ from typing import TextIO
 
 from dodo_dsl import package_data
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
 from dodo_dsl.spec.manifest import Manifest, Parameter

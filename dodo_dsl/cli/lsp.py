@@ -6,8 +6,7 @@ import os
 import sys
 from typing import TextIO
 
-from dodo_dsl.cli.errors import UsageError, require_extra
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit, UsageError, require_extra
 
 EXAMPLES = """examples:
   dodo lsp                  what an editor starts; it speaks the language server protocol on standard input and output
@@ -24,7 +23,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     require_extra("this", "lsp")
-    from dodo_dsl.lsp.listeners import serve
+    from dodo_dsl.lsp.server import serve
 
     if sys.stdin is None or sys.stdin.isatty():
         raise UsageError(

@@ -10,8 +10,7 @@ from typing import NamedTuple, TextIO
 
 from dodo_dsl import __version__
 from dodo_dsl.cli.arguments import Arguments
-from dodo_dsl.cli.errors import exit_code, sentence
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit, exit_code, sentence
 from dodo_dsl.terminal import harmless_stream
 
 
@@ -26,24 +25,24 @@ class Subcommand(NamedTuple):
 
 
 COMMANDS = {
-    "compile": Subcommand("compile.command", "check tests and write their compose files and child pipeline"),
-    "run": Subcommand("run.command", "run tests and judge the application"),
+    "compile": Subcommand("compile", "check tests and write their compose files and child pipeline"),
+    "run": Subcommand("run", "run tests and judge the application"),
     "search": Subcommand("search", "look for the conditions under which the application fails a test"),
     "tune": Subcommand("tune", "find values of the application's parameters with which it passes by more"),
     "list": Subcommand("list", "list the tests and services"),
     "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
-    "new": Subcommand("new.command", "write a new test, or what a repository with tests needs"),
+    "new": Subcommand("new", "write a new test, or what a repository with tests needs"),
     "report": Subcommand("report", "draw reports again, join them into one, and show what changed"),
-    "judge": Subcommand("judge.command", "judge the recording of a test again, also by other limits"),
-    "rank": Subcommand("rank.command", "rank applications by the goals of their tests"),
-    "stats": Subcommand("stats.command", "show how many services the tests share"),
-    "rec": Subcommand("rec.command", "inspect, cut and export recordings"),
+    "judge": Subcommand("judge", "judge the recording of a test again, also by other limits"),
+    "rank": Subcommand("rank", "rank applications by the goals of their tests"),
+    "stats": Subcommand("stats", "show how many services the tests share"),
+    "rec": Subcommand("rec", "inspect, cut and export recordings"),
     "lsp": Subcommand("lsp", "check and complete tests in an editor while they are written"),
     "completion": Subcommand(
-        "completion.command", "print what lets a shell complete commands, options, tests, services and rigs"
+        "completion", "print what lets a shell complete commands, options, tests, services and rigs"
     ),
     "images": Subcommand("images", "build, push and pull images, and say what they are made of"),
-    "rig": Subcommand("rig.command", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
+    "rig": Subcommand("rig", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }
 

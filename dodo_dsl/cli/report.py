@@ -8,14 +8,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
-from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.cli.exits import Exit, of_outcomes
+from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
-from dodo_dsl.report.changes import text
-from dodo_dsl.report.changes.comparison import compare
-from dodo_dsl.report.given_report import GivenReport, read
+from dodo_dsl.report.comparison import compare, lines
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.results import GivenReport, read_given
 from dodo_dsl.terminal import printable
 
 EXAMPLES = """examples:
@@ -44,20 +42,20 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    other = read(options.against) if options.against else None
+    other = read_given(options.against) if options.against else None
     with _child_reports(options.gitlab, stdout) as fetched:
         folders = [*options.folder, *fetched] or [REPORT]
         output = options.output or (REPORT if options.gitlab else None)
-        reports = [read(path) for path in folders]
+        reports = [read_given(path) for path in folders]
         target, outcomes = _drawn(reports, output, stdout)
-    from dodo_dsl.report.joined import other_ways
+    from dodo_dsl.report.join import write
 
     comparison = compare(outcomes, other) if other else None
     circumstances = results.joined([results.Results(one.outcomes, one.circumstances) for one in reports])
     write_summaries(target, outcomes, comparison, circumstances)
-    other_ways.write(target, comparison, other)
+    write(target, comparison, other)
     if comparison:
-        stdout.writelines(f"{line}\n" for line in text.lines(comparison))
+        stdout.writelines(f"{line}\n" for line in lines(comparison))
     stdout.write(f"report: {target / 'index.html'}\n")
     return of_outcomes(outcome.outcome for outcome in outcomes) if comparison else Exit.OK
 
@@ -68,7 +66,7 @@ def _child_reports(is_job: bool, stdout: TextIO) -> Iterator[list[Path]]:
     if not is_job:
         yield []
         return
-    from dodo_dsl.report.joined import child_jobs
+    from dodo_dsl.report import child_jobs
 
     with tempfile.TemporaryDirectory() as folder:
         found = list(child_jobs.fetch(child_jobs.of_job(os.environ), Path(folder)))
@@ -88,7 +86,7 @@ def _drawn(reports: Sequence[GivenReport], out: Path | None, stdout: TextIO) -> 
         if not report.is_whole:
             raise UsageError(f"'{report.file}' is not called {results.FILE_NAME}; name a folder for the report with -o")
         return report.folder, report.outcomes
-    from dodo_dsl.report.joined.join import join
+    from dodo_dsl.report.join import join
 
     outcomes, sentences = join(reports, out)
     stdout.writelines(f"{printable(sentence)}\n" for sentence in sentences)

@@ -9,18 +9,16 @@ from typing import TextIO
 
 from dodo_dsl import atomic, package_data
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.errors import UsageError, require_extra
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit, UsageError, require_extra
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.run.uninterrupted import undisturbed
 from dodo_dsl.cli.search_session import INTERRUPTED, Session, session
+from dodo_dsl.cli.uninterrupted import undisturbed
 from dodo_dsl.search import postgres
 from dodo_dsl.search.drives import Limits
 from dodo_dsl.search.findings import Findings, document, failures_of, lines
 from dodo_dsl.search.postgres import MAIN
-from dodo_dsl.search.sampling_order import SamplingOrder
-from dodo_dsl.search.search_loop import SearchLoop
+from dodo_dsl.search.search_loop import SamplingOrder, SearchLoop
 from dodo_dsl.search.shrinking import Shrinker
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.search.study import Study, refuse_search, search_study

@@ -10,24 +10,25 @@ from typing import Any, Self, TextIO, cast
 
 from dodo_dsl import compiler
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.display.colours import write_diagnostics
+from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
-from dodo_dsl.cli.run.forecast import expectation
-from dodo_dsl.cli.run.loading import Loading, loading
-from dodo_dsl.cli.run.progress import about, count
-from dodo_dsl.cli.run.uninterrupted import UninterruptedStream, more_descriptors
-from dodo_dsl.diagnostics import has_errors, ordered, told_once
+from dodo_dsl.cli.forecast import expectation
+from dodo_dsl.cli.progress import about, count
+from dodo_dsl.cli.run_jobs import Loading, loading
+from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
+from dodo_dsl.diagnostics import format_text, has_errors, ordered, told_once
+from dodo_dsl.emit.pipeline import SearchJobs
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.backends import Processes
-from dodo_dsl.run.rigs.attendance import RigSession
+from dodo_dsl.run.rigs.session import RigSession
+from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.schedule import schedule
-from dodo_dsl.run.standing import Standing
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.search.drives import Drives, KeptBackends, Limits, Machine, end_like_interrupt
 from dodo_dsl.search.store import Drive, Store
-from dodo_dsl.search.study import Study
+from dodo_dsl.search.study import Study, refuse_search
+from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.registry import SUFFIX
-from dodo_dsl.spec.settings import Settings
 from dodo_dsl.terminal import printable, unescaped
 
 INTERRUPTED = "interrupted: the same command goes on from here\n"
@@ -187,3 +188,23 @@ def _status(stream: TextIO) -> Any:
     status = Status("starting", console=Console(file=unescaped(stream)))
     status.start()
     return status
+
+
+MOST_WORKERS = 200
+"""GitLab's limit of ``parallel``."""
+
+
+def search_jobs(words: Sequence[str], workers: int, application: Sequence[Path]) -> tuple[SearchJobs, ...]:
+    """Jobs for each test once; raises UsageError for a word that is none that can be searched."""
+    if workers > MOST_WORKERS:
+        raise UsageError(f"--workers {workers} is more than the {MOST_WORKERS} jobs that GitLab runs in parallel")
+    files = tuple(path.as_posix() for path in application)
+    found: dict[str, SearchJobs] = {}
+    for word in words:
+        checked = selection.select([word], (), application, Settings("lockstep"))
+        if has_errors(checked.diagnostics):
+            raise UsageError(f"'{word}' cannot be searched:\n{format_text(ordered(checked.diagnostics))}")
+        refuse_search(word, checked.tests)
+        slug = checked.tests[0].spec.slug
+        found.setdefault(slug, SearchJobs(word, slug, workers, files))
+    return tuple(found.values())

@@ -11,10 +11,10 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.compiler import Checked, load, narrowed, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, format_text, has_errors
 from dodo_dsl.spec import parameters
-from dodo_dsl.spec.deployment.deployment import FILE_NAME, SHIPPED, Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment import FILE_NAME, SHIPPED, Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.model import LEVELS, Spec
 from dodo_dsl.spec.registry import SUFFIX, locate
-from dodo_dsl.spec.settings import Settings
 from dodo_dsl.terminal import printable
 
 

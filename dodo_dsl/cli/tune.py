@@ -8,12 +8,11 @@ from typing import TextIO
 
 from dodo_dsl import atomic
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.errors import require_extra
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit, require_extra
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.run.uninterrupted import undisturbed
 from dodo_dsl.cli.search_session import INTERRUPTED, Session, session
+from dodo_dsl.cli.uninterrupted import undisturbed
 from dodo_dsl.search.drives import Limits, RigFailure
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.search.study import Study, tune_study

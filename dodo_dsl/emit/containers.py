@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dodo_dsl.application.mounts import WAY_OUT
-from dodo_dsl.plan.clock_service import CLOCK, RUNNER_VARIABLE
+from dodo_dsl.plan.added_services import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Application, Flag, Plan, PlannedService
 from dodo_dsl.plan.test_files import SHARED
 

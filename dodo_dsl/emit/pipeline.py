@@ -1,24 +1,24 @@
 """The child pipeline: one job per instance or per batch, and GitLab's limits for it."""
 
+import heapq
 import math
 import shlex
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
-from dodo_dsl.emit.batches import packed
-from dodo_dsl.emit.job_options import NO_OPTIONS, JobOptions
-from dodo_dsl.emit.pipeline_job import SPARE_MINUTES, PipelineJob
+from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions, PipelineJob, packed
 from dodo_dsl.plan.model import Plan, Suite
-from dodo_dsl.plan.pools import by_test, named, pooled
+from dodo_dsl.plan.runs import by_test, named, pooled
 from dodo_dsl.plan.test_files import FileCopy
-from dodo_dsl.spec.deployment.rig import EMULATED_RIGS
 from dodo_dsl.spec.model import LEVELS
+from dodo_dsl.spec.rig import EMULATED_RIGS
 
 if TYPE_CHECKING:
     from dodo_dsl.plan.build import Compiled
+
 
 CHILD = "child.gitlab-ci.yml"
 RULE = "pipeline-limit"
@@ -210,3 +210,53 @@ def _largest(suite: Suite, message: str, hint: str, severity: Severity) -> Diagn
 def _place(plan: Plan) -> Span:
     place = plan.source_map.get("matrix") or plan.source_map.get("name")
     return Span(place.file, place.line, place.column) if place else Span(plan.spec)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Seconds until the last job has ended, seconds of all jobs together, and the job that ends last."""
+
+    seconds: float
+    work: float
+    last: str
+
+
+def forecast(pipeline: Pipeline, took: Callable[[str], float], runners: int, overhead: float) -> Forecast:
+    """Jobs in their order, each to the first runner that is free.
+
+    ``took`` gives a test's seconds by its slug; those of a job add up, and to them comes the ``overhead`` in s that a
+    runner needs for any job.
+    There are ``runners`` of the tag ``sil``, and one of each rig; of a pool, that which is free first takes the job.
+    Jobs behind the gate wait for all others and for the gate, which is a job, too.
+    """
+    free: dict[str, list[float]] = {"": [0.0] * runners}
+    before = [job for job in pipeline.jobs if not job.gated]
+    behind = [job for job in pipeline.jobs if job.gated]
+    ends = _ends(before, free, 0.0, took, overhead)
+    if behind:
+        opened = max(ends.values(), default=0.0) + overhead
+        ends |= _ends(behind, free, opened, took, overhead)
+    last = max(ends, key=lambda name: ends[name], default="")
+    return Forecast(ends.get(last, 0.0), sum(_seconds(job, took) + overhead for job in pipeline.jobs), last)
+
+
+def _seconds(job: PipelineJob, took: Callable[[str], float]) -> float:
+    return sum(took(test) for test in job.tests)
+
+
+def _ends(
+    jobs: Sequence[PipelineJob],
+    free: dict[str, list[float]],
+    begin: float,
+    took: Callable[[str], float],
+    overhead: float,
+) -> dict[str, float]:
+    """When each job ends; ``free`` has for each rig, and for all other runners as "", when they are free again."""
+    ends = {}
+    for job in jobs:
+        rigs = [free.setdefault(rig, [0.0]) for rig in job.pool or (job.rig,)]
+        runners = min(rigs, key=lambda one: one[0])
+        start = max(heapq.heappop(runners), begin)
+        ends[job.name] = start + overhead + _seconds(job, took)
+        heapq.heappush(runners, ends[job.name])
+    return ends

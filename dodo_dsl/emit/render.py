@@ -13,8 +13,8 @@ from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.containers import containers, copy_command
-from dodo_dsl.emit.job_options import NO_OPTIONS, JobOptions
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
+from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, JobOptions
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
 from dodo_dsl.plan.plan_json import json_text, to_json
 from dodo_dsl.source import resolve

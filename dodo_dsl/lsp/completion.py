@@ -1,22 +1,152 @@
 """Completion: the keys, services, parameters, values and units that may stand at the cursor."""
 
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+import yaml
 from lsprotocol import types
 
-from dodo_dsl.check.rules.inputs import references
-from dodo_dsl.lsp import schema_keys
+from dodo_dsl.check import file_rules
+from dodo_dsl.lsp import editor_schema
+from dodo_dsl.lsp.documents import Steps, below
+from dodo_dsl.lsp.editor_schema import is_offered, written
 from dodo_dsl.lsp.hover import parameter_text, service_text
-from dodo_dsl.lsp.incomplete import Cursor, cursor
-from dodo_dsl.lsp.scene import USES, WITH, DocumentContext
-from dodo_dsl.lsp.tree import Steps
-from dodo_dsl.spec import quantity
-from dodo_dsl.spec.deployment.rig import EMULATED_RIGS
-from dodo_dsl.spec.instances import matrix, vary
+from dodo_dsl.lsp.project import USES, WITH, DocumentContext
+from dodo_dsl.source import Mapping, Scalar, parse
+from dodo_dsl.spec import matrix, quantity, vary
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import LAYERS
-from dodo_dsl.spec.pool import ANY
-from dodo_dsl.spec.schema.editor_schema import is_offered, written
+from dodo_dsl.spec.model import ANY, LAYERS
+from dodo_dsl.spec.rig import EMULATED_RIGS
+
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_MARK = "xCursorx"
+_WORD = re.compile(r"(?:\$\{[\w.-]*|[^\s,{}\[\]\"':]*)\Z")
+_MAX_TEXT = 1 << 20
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """The keys that lead to a word that is being written.
+
+    ``word`` begins at ``start`` in the text; ``before`` is what its value has before it, as ``10`` in ``10 H``. For a
+    key, ``steps`` end with the mapping, whose other keys are ``keys``. ``values`` has scalars by their steps: those
+    before it, and those beside the keys that lead to it.
+    """
+
+    steps: Steps
+    is_key: bool
+    word: str
+    start: int
+    before: str = ""
+    keys: tuple[str, ...] = ()
+    values: dict[Steps, str] = field(default_factory=dict)
+
+
+@dataclass
+class _Open:
+    """A collection whose end has not been read yet."""
+
+    is_mapping: bool
+    is_flow: bool
+    key: str | None = None
+    line: int = 0
+    keys: list[str] = field(default_factory=list)
+    index: int = 0
+
+    def step(self) -> str | int | None:
+        return self.key if self.is_mapping else self.index
+
+    def filled(self) -> None:
+        """The value at the step is complete."""
+        self.key = None
+        self.index += 1
+
+
+def cursor(text: str, offset: int) -> Cursor | None:
+    """The cursor at an index of the text; None where nothing can be said of it."""
+    head = text[: min(offset, _MAX_TEXT)]
+    match = _WORD.search(head)
+    word = match[0] if match else ""
+    start = len(head) - len(word)
+    if head[:start].endswith(":"):
+        return None  # a value begins after a space
+    for ending in ("", ": "):
+        if found := _read(head[:start] + _MARK + ending, word, start):
+            return _with_rest(found, head[:start], text[offset:])
+    return None
+
+
+def _with_rest(found: Cursor, head: str, tail: str) -> Cursor:
+    """The cursor with what stands behind it, where the text is YAML but for the word."""
+    ending = ": " if found.is_key and not tail.startswith(":") else ""
+    root, _ = parse(head + _MARK + ending + tail, "")
+    values, keys = dict(found.values), found.keys
+    for depth in range(len(found.steps) + 1):
+        node = below(root, *map(str, found.steps[:depth]))
+        if isinstance(node, Mapping):
+            scalars = {key: entry.value for key, entry in node.entries.items() if isinstance(entry.value, Scalar)}
+            values |= {(*found.steps[:depth], key): scalar.text for key, scalar in scalars.items() if key != _MARK}
+            if depth == len(found.steps):
+                keys = tuple(key for key in node.entries if key != _MARK)
+    return replace(found, keys=keys, values=values)
+
+
+def _read(text: str, word: str, start: int) -> Cursor | None:
+    stack: list[_Open] = []
+    values: dict[Steps, str] = {}
+    for event in _events(text):
+        if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
+            stack.append(_Open(isinstance(event, yaml.MappingStartEvent), bool(event.flow_style)))
+        elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
+            stack.pop()
+            if stack:
+                stack[-1].filled()
+        elif isinstance(event, yaml.ScalarEvent):
+            if event.value.endswith(_MARK):
+                return _found(stack, event, Cursor((), True, word, start, values=values))
+            _scalar(stack, event, values)
+        elif isinstance(event, yaml.AliasEvent) and stack:
+            stack[-1].filled()
+    return None
+
+
+def _events(text: str) -> Iterator[Any]:
+    """The events of a text up to where it is no YAML."""
+    try:
+        yield from yaml.parse(text, Loader=_LOADER)
+    except (yaml.YAMLError, ValueError):
+        return
+
+
+def _steps(stack: list[_Open]) -> Steps:
+    return tuple(step for one in stack if (step := one.step()) is not None)
+
+
+def _scalar(stack: list[_Open], event: Any, values: dict[Steps, str]) -> None:
+    if not stack:
+        return
+    top = stack[-1]
+    if top.is_mapping and top.key is None:
+        top.key, top.line = event.value, event.start_mark.line
+        top.keys.append(event.value)
+    else:
+        values[_steps(stack)] = event.value
+        top.filled()
+
+
+def _found(stack: list[_Open], event: Any, about: Cursor) -> Cursor:
+    top = stack[-1] if stack else None
+    steps = _steps(stack)
+    if top is None or (top.is_mapping and top.key is None):
+        return Cursor(steps, True, about.word, about.start, keys=tuple(top.keys if top else ()), values=about.values)
+    begins_mapping = top.is_mapping and not top.is_flow and event.start_mark.line > top.line
+    if begins_mapping:
+        return Cursor(steps, True, about.word, about.start, values=about.values)
+    before = event.value.removesuffix(_MARK).strip()
+    return Cursor(steps, False, about.word, about.start, before, values=about.values)
+
 
 _KEY, _SERVICE, _VALUE, _UNIT = (
     types.CompletionItemKind.Property,
@@ -74,14 +204,14 @@ def _offers(scene: DocumentContext, at: Cursor) -> Iterator[Offer]:
 
 
 def _by_schema(scene: DocumentContext, at: Cursor) -> Iterator[Offer]:
-    part = schema_keys.at(scene.schema, at.steps) or {}
+    part = editor_schema.keys_at(scene.schema, at.steps) or {}
     if at.is_key:
         for name in part.get("properties", {}):
             if name not in at.keys:
-                about = schema_keys.at(scene.schema, (*at.steps, name)) or {}
+                about = editor_schema.keys_at(scene.schema, (*at.steps, name)) or {}
                 yield name, _KEY, "", about.get("description", "")
     else:
-        yield from ((value, _VALUE, "", "") for value in schema_keys.values(part))
+        yield from ((value, _VALUE, "", "") for value in editor_schema.schema_values(part))
 
 
 def _rigs(scene: DocumentContext, below: Steps) -> Iterator[Offer]:
@@ -147,5 +277,5 @@ def _named(scene: DocumentContext, at: Cursor, parameter: Parameter) -> list[str
     path = next((scene.path.parent / text for text in here if text), checked)
     if path is None:
         return []
-    found = references.entries(path / references.MAP if path.is_dir() else path, key)
+    found = file_rules.entries(path / file_rules.MAP if path.is_dir() else path, key)
     return [] if isinstance(found, str) else [name for name in found if name]

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from lsprotocol import types
 
 from dodo_dsl.check.wiring import End, Wiring
-from dodo_dsl.lsp import schema_keys
-from dodo_dsl.lsp.scene import USES, DocumentContext
-from dodo_dsl.lsp.tree import DocumentPlace, find
+from dodo_dsl.lsp import editor_schema
+from dodo_dsl.lsp.documents import DocumentPlace, find
+from dodo_dsl.lsp.editor_schema import description, written
+from dodo_dsl.lsp.project import USES, DocumentContext
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.schema.editor_schema import description, written
 from dodo_dsl.terminal import printable
 
 
@@ -27,10 +27,10 @@ def _text(scene: DocumentContext, place: DocumentPlace) -> str:
     manifest = scene.manifest(place.steps)
     if manifest and (len(place.steps) == 2 or (place.steps[2:] == (USES,) and not place.is_key)):
         return "\n\n".join([service_text(manifest), *_wires(scene, str(place.steps[1]))])
-    part = schema_keys.at(scene.schema, place.steps)
+    part = editor_schema.keys_at(scene.schema, place.steps)
     if part is None or "description" not in part:
         return ""
-    options = [f"`{value}`" for value in schema_keys.values(part)]
+    options = [f"`{value}`" for value in editor_schema.schema_values(part)]
     what = "One of" if "enum" in part else "For example"
     facts = [f"{what} {', '.join(options)}."] if options and "const" not in part else []
     if "default" in part:

@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dodo_dsl import package_data, source
-from dodo_dsl.application import unseen
+from dodo_dsl.application import mounts
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounts import large_folders
-from dodo_dsl.check import world
+from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.goals import resolved_goals
-from dodo_dsl.check.replayed import WITHOUT
-from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.resolve import WITHOUT, ResolvedTest
 from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.plan import addresses, clock_service, recorder_service
-from dodo_dsl.plan.clock_service import lockstep
-from dodo_dsl.plan.emulated_rig import DRAWN, hardware
+from dodo_dsl.plan import added_services, addresses
+from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.rewrite.service_copy import Setting
@@ -27,13 +25,12 @@ from dodo_dsl.plan.rewrite.volumes import too_long
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
-from dodo_dsl.spec.deployment.deployment import Deployment
-from dodo_dsl.spec.deployment.rig import EMULATED, EMULATED_FILE, PORT, Rig
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.instances.pools import of_test
+from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.settings import Settings
+from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, Rig
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.values import Value
 
 
@@ -67,7 +64,7 @@ def build(
         span = Span(str(deployment.file)) if deployment.file else ordered[-1].spec.span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
-    hidden = unseen.below(application, deployment)
+    hidden = mounts.below(application, deployment)
     shared = _Shared(
         manifests,
         deployment,
@@ -85,7 +82,7 @@ def build(
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
-    if more := unseen.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
+    if more := mounts.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
         plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
     of_copies = large_folders(application, [*deployment.registry, *deployment.services])
     of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
@@ -253,8 +250,8 @@ class _Builder:
             messages=messages,
             senders=senders(self.test),
             truth=truth(self.test),
-            world=world.services(self.test, tuple(service.name for service in automatic)),
-            told=tuple(dict.fromkeys(str(end.port) for end in world.told(self.test.wiring))),
+            world=check_senders.services(self.test, tuple(service.name for service in automatic)),
+            told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
             import_paths=self.shared.imports,
             source_map=self.places,
@@ -309,12 +306,12 @@ class _Builder:
 
     def _automatic(self) -> Iterator[PlannedService]:
         """The services that DoDo adds: the recorder, and in lockstep the clock."""
-        own = self.manifests[recorder_service.MANIFEST]
-        yield recorder_service.recorder(self.test, own, self._image(own.image), self.cid)
+        own = self.manifests[added_services.RECORDER_MANIFEST]
+        yield added_services.recorder(self.test, own, self._image(own.image), self.cid)
         if self.spec.clock == "lockstep":
-            own = self.manifests[clock_service.MANIFEST]
-            watch = (recorder_service.RECORDER,)
-            yield clock_service.clock(self.test, own, self._image(own.image), watch, self.cid)
+            own = self.manifests[added_services.CLOCK_MANIFEST]
+            watch = (added_services.RECORDER,)
+            yield added_services.clock(self.test, own, self._image(own.image), watch, self.cid)
 
     def _distinct_names(self, services: Sequence[PlannedService]) -> None:
         for service in services:

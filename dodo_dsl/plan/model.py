@@ -6,9 +6,8 @@ from typing import Any, Literal
 
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.spec import model as spec_model
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.goals import Goal
-from dodo_dsl.spec.resource_limits import ResourceLimits
+from dodo_dsl.spec.model import Goal, ResourceLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
 READY_S = 60.0

@@ -22,11 +22,9 @@ from dodo_dsl.plan.model import (
     is_device,
 )
 from dodo_dsl.plan.test_files import is_shared_name
-from dodo_dsl.spec.goals import is_goal
-from dodo_dsl.spec.instances.matrix import SLUG
-from dodo_dsl.spec.model import LEVELS
-from dodo_dsl.spec.resource_limits import is_valid
-from dodo_dsl.spec.settings import Settings
+from dodo_dsl.spec.load import Settings
+from dodo_dsl.spec.matrix import SLUG
+from dodo_dsl.spec.model import LEVELS, is_goal, is_valid
 
 FORMAT = 1
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")

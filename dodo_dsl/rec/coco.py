@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dodo_dsl.opendlv.inputs.truth_file import plain
-from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import DecodedFrame
+from dodo_dsl.opendlv.assets.truth_file import plain
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.video import DecodedFrame
+from dodo_dsl.rec import truth
 from dodo_dsl.rec.frames import Packet, decoded, write_picture
 
 ANNOTATIONS = "annotations.json"
@@ -168,3 +168,14 @@ def _add(result: DataSet, packet: Packet, frame: DecodedFrame, name: str, wanted
         x, y, width, height = detection.box or (0.0, 0.0, 0.0, 0.0)
         box = [x * frame.width, y * frame.height, width * frame.width, height * frame.height]
         result.boxes.append((number, detection.category, [round(value, 3) for value in box]))
+
+
+def of_truth(recording: Recording, images: Numbers, path: Path) -> Mapping[int, list[Detection]]:
+    """The boxes of a truth file for each image message, as of a rig where nothing moves; raises TruthError."""
+    (width, height), marks = truth.load(path)
+    truth.check(marks, width, height, ())
+    if not marks:
+        raise truth.TruthError(f"{path}: has no boxes")
+    boxes = [(m.label, (m.x / width, m.y / height, m.width / width, m.height / height)) for m in marks]
+    found = [Detection(box, label) for label, box in boxes]
+    return dict.fromkeys((e.sample_time for e in recording.envelopes(images)), found)

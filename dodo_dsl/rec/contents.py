@@ -2,14 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.recordings import timing
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec.frames import IMAGE, decoded
 
 
@@ -76,7 +77,7 @@ def look(
     found = streams(recording, messages)  # before the times are copied, for the sake of memory
     times = recording.index["time"]
     stamped = times[times != 0]
-    known = stamped[timing.together(stamped)]
+    known = stamped[recording_times.together(stamped)]
     return Contents(
         size=recording.size,
         envelopes=len(recording),
@@ -95,7 +96,7 @@ def streams(recording: Recording, messages: MessageSet) -> list[MessageStream]:
     """The messages of each id and sender."""
     index, known = recording.index, messages.ids()
     found = []
-    for rows in timing.streams(index, np.arange(len(index))):
+    for rows in recording_times.streams(index, np.arange(len(index))):
         id_, stamp = int(index["data_type"][rows[0]]), int(index["sender_stamp"][rows[0]])
         size = int(index["size"][rows].sum(dtype=np.int64))
         name = messages.name(id_) if id_ in known else None
@@ -120,3 +121,42 @@ def _frames(recording: Recording, progress: Callable[[int], None] | None, proble
         count += frame is not None
         progress(done)
     return Frames(len(rows), count)
+
+
+_SHOWN = 10
+_HEAD = ("id", "message", "sender", "count", "rate", "largest gap")
+
+
+def contents_text(found: Contents, recording: Recording) -> str:
+    """Some lines of facts and a table of messages."""
+    lines = [f"{recording.path}: {found.envelopes} messages in {found.duration:.1f} s, {found.size} bytes"]
+    if found.begin is not None:
+        lines.append(f"begins {datetime.fromtimestamp(found.begin, UTC):%Y-%m-%d %H:%M:%S} UTC")
+    if found.apart:
+        are = "1 message is" if found.apart == 1 else f"{found.apart} messages are"
+        lines.append(f"{are} more than a day away from these and not counted")
+    lines.append(f"message set {found.message_set}")
+    if found.frames.packets:
+        decoded = "not decoded" if found.frames.decoded is None else f"{found.frames.decoded} decoded"
+        lines.append(f"camera frames: {found.frames.packets} packets, {decoded}")
+    if found.unordered or found.untimed:
+        lines.append(f"{found.unordered} steps back in time, {found.untimed} messages without a sample time")
+    lines += [f"skipped {place}" for place in recording.damage.places[:_SHOWN]]
+    if recording.damage.count > _SHOWN:
+        lines.append(f"skipped {recording.damage.size} bytes at {recording.damage.count} places in all")
+    return "\n".join([*lines, "", *_table([_HEAD, *map(_row, found.streams)])]) + "\n"
+
+
+def _row(stream: MessageStream) -> tuple[str, ...]:
+    rate = "" if stream.rate is None else f"{stream.rate:.2f} Hz"
+    gap = "" if stream.largest_gap is None else f"{stream.largest_gap:.3f} s"
+    return str(stream.id), stream.name or "(unknown)", str(stream.sender_stamp), str(stream.count), rate, gap
+
+
+def _table(rows: list[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
+    return ["  ".join(_cell(row, column, width) for column, width in enumerate(widths)).rstrip() for row in rows]
+
+
+def _cell(row: tuple[str, ...], column: int, width: int) -> str:
+    return row[column].ljust(width) if _HEAD[column] == "message" else row[column].rjust(width)

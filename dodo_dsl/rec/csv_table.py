@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from dodo_dsl.opendlv.messages import columns
-from dodo_dsl.opendlv.messages.columns import Column
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.messages.protobuf_classes import Layout
-from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.recordings.frame_table import Fact
-from dodo_dsl.opendlv.recordings.recording import Batch, Recording
+from dodo_dsl.opendlv import message_columns
+from dodo_dsl.opendlv.frame_table import Fact
+from dodo_dsl.opendlv.message_columns import Column, Numbers
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.protobuf_classes import Layout
+from dodo_dsl.opendlv.recording import Batch, Recording
 
 TIMES = tuple(
     f"{time}.{unit}" for time in ("sent", "received", "sampleTimeStamp") for unit in ("seconds", "microseconds")
@@ -59,7 +58,7 @@ def names(recording: Recording, messages: MessageSet, rows: Numbers) -> list[str
 
 
 def _header(layout: Layout) -> str:
-    return "".join(f"{name};" for name in (*TIMES, *(name for name, _ in columns.names(layout)))) + "\n"
+    return "".join(f"{name};" for name in (*TIMES, *(name for name, _ in message_columns.names(layout)))) + "\n"
 
 
 def _groups(batch: Batch) -> Iterator[tuple[int, int, Batch]]:
@@ -74,7 +73,7 @@ def _groups(batch: Batch) -> Iterator[tuple[int, int, Batch]]:
 def _lines(layout: Layout, batch: Batch) -> tuple[list[str], int]:
     """The rows of one message as text, and how many could not be decoded."""
     table = batch.table
-    decoded, good = columns.decode(layout, batch.data, table[Fact.PAYLOAD], table[Fact.PAYLOAD_END])
+    decoded, good = message_columns.decode(layout, batch.data, table[Fact.PAYLOAD], table[Fact.PAYLOAD_END])
     formats, cells = ["%d;"] * len(TIMES), [column.tolist() for column in table[Fact.SENT_S : Fact.SENDER_STAMP]]
     for column in decoded:
         format_, values = _cells(column)

@@ -1,14 +1,15 @@
 """The part of a recording that a command works on: some messages, and a time range."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
 
 ABSOLUTE_S = 1e8  # seconds from here on are counted since 1970
 
@@ -60,3 +61,14 @@ def _microseconds(seconds: float | None, begin: int) -> int | None:
     if seconds is None:
         return None
     return round(seconds * 1e6) + (0 if seconds >= ABSOLUTE_S else begin)
+
+
+def write(recording: Recording, rows: Numbers, path: Path, progress: Callable[[int], None]) -> None:
+    """Writes rows unchanged into a new file; ``progress`` gets the number of rows done.
+
+    Raises OSError and RecordingError.
+    """
+    with RecordingWriter(path) as writer:
+        for batch in recording.batches(rows):
+            writer.write_frames(batch.frames())
+            progress(writer.frames)

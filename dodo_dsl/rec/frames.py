@@ -4,11 +4,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import DecodedFrame, VideoDecoder, VideoError, refuse_large
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, refuse_large
 
 IMAGE = 1055
 MOST_DECODERS = 16

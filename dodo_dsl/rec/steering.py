@@ -5,6 +5,7 @@ application of DoDo's tests copies the frame's sample time, a person at the whee
 """
 
 import csv
+import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec.frames import decoded, write_picture
 
 TABLE = "steering.csv"
@@ -92,3 +92,26 @@ def _requests(recording: Recording, messages: MessageSet, rows: Numbers, name: s
             found.append((time, value))
     found.sort(key=lambda one: one[0])
     return RequestedValues(np.array([time for time, _ in found], np.int64), [value for _, value in found])
+
+
+TRAIN, VALIDATION = "train", "validation"
+
+
+class SplitError(ValueError):
+    """Recordings that cannot be split; one sentence."""
+
+
+def split(files: Sequence[Path], share: float, seed: int) -> dict[str, list[Path]]:
+    """The files by part, in their order; all in one part with the name "" where ``share`` is 0.
+
+    Whole recordings are chosen, as frames of one drive are alike; the same ones for the same number of files and seed.
+    Raises SplitError for fewer than two.
+    """
+    if not share:
+        return {"": list(files)}
+    if len(files) < 2:
+        raise SplitError("--validation needs two recordings or more, as frames of one drive are alike")
+    count = min(max(round(share * len(files)), 1), len(files) - 1)
+    chosen = set(random.Random(seed).sample(range(len(files)), count))  # noqa: S311  (repeatable, not secret)
+    parts = {TRAIN: [n for n in range(len(files)) if n not in chosen], VALIDATION: sorted(chosen)}
+    return {name: [files[number] for number in numbers] for name, numbers in parts.items()}

@@ -6,13 +6,17 @@ Reference: cocodataset.org, "Data format", object detection; boxes are in pixels
 import json
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+from dodo_dsl import atomic
 from dodo_dsl.opendlv import numbers, regular_file
+from dodo_dsl.opendlv.picture_size import problem_of
 
 if TYPE_CHECKING:
-    from dodo_dsl.opendlv.memory.pixels import Picture
+    from dodo_dsl.opendlv.pixels import Picture
+
 
 MOST_BYTES, MOST_BOXES, MOST_PIXELS = 16_000_000, 10_000, 100_000
 _SLACK = 0.01
@@ -86,7 +90,7 @@ def load(path: Path) -> tuple[tuple[int, int], list[Mark]]:
     return (width, height), [_read_one(entry, names, f"{path}: annotations[{index}]") for index, entry in boxes]
 
 
-def text(marks: Sequence[Mark], picture: str, width: int, height: int) -> str:
+def truth_text(marks: Sequence[Mark], picture: str, width: int, height: int) -> str:
     """COCO JSON of a picture's file name and size, and its boxes."""
     from dodo_dsl.rec.coco import DataSet
 
@@ -94,7 +98,7 @@ def text(marks: Sequence[Mark], picture: str, width: int, height: int) -> str:
     return DataSet(images, [(1, each.label, [round(number, 3) for number in each[1:]]) for each in marks]).text()
 
 
-def drawn(picture: "Picture", marks: Sequence[Mark]) -> "Picture":
+def drawn_boxes(picture: "Picture", marks: Sequence[Mark]) -> "Picture":
     """A picture (height, width, 3; B, G, R) with the boxes and their classes; twice as large where it is small."""
     import cv2
 
@@ -151,3 +155,63 @@ def _read_one(entry: dict[str, Any], names: dict[str, Any], place: str) -> Mark:
 def _key(number: Any) -> str:
     """Any JSON value of an id as a key for lookups."""
     return json.dumps(number)
+
+
+MOST_FILE_BYTES = 64_000_000
+
+
+@dataclass(frozen=True)
+class TruthFiles:
+    """The files of a truth: COCO, picture, and picture with boxes."""
+
+    truth: Path
+    picture: Path
+    marked: Path
+
+    @classmethod
+    def beside(cls, path: Path) -> Self:
+        """``FILE.json``, ``FILE.png`` and ``FILE-boxes.png``; raises TruthError for another ending."""
+        if path.suffix != ".json":
+            raise TruthError(f"--output is '{path}', expected a file that ends in .json")
+        return cls(path, path.with_suffix(".png"), path.with_name(f"{path.stem}-boxes.png"))
+
+    def wanted(self, has_boxes: bool, is_new: bool) -> list[Path]:
+        """The files that will be written, for a picture that is ``is_new``."""
+        return [*([self.truth, self.marked] if has_boxes else []), *([self.picture] if is_new else [])]
+
+    def write(self, picture: "Picture", marks: Sequence[Mark], is_new: bool) -> None:
+        """Writes the pictures first, so that whoever finds the truth finds them, too."""
+        height, width = picture.shape[:2]
+        if is_new:
+            _write_picture(self.picture, picture)
+        if marks:
+            _write_picture(self.marked, drawn_boxes(picture, marks))
+            atomic.write_text(self.truth, truth_text(marks, self.picture.name, width, height))
+
+
+def given(path: Path) -> bytes:
+    """The bytes of an existing picture; raises TruthError."""
+    try:
+        return regular_file.content(path, MOST_FILE_BYTES)
+    except OSError as error:
+        raise TruthError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def decoded(data: bytes, name: str) -> "Picture":
+    """The bytes of a picture as blue, green, red (height, width, 3); raises TruthError, which names it."""
+    import cv2
+    import numpy as np
+
+    if problem := problem_of(data):
+        raise TruthError(f"{name}: {problem}")
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise TruthError(f"{name}: not a picture")
+    return np.asarray(picture, np.uint8)
+
+
+def _write_picture(target: Path, picture: "Picture") -> None:
+    import cv2
+
+    _, png = cv2.imencode(".png", picture)
+    atomic.write_bytes(target, png.tobytes())

@@ -9,13 +9,15 @@ import fcntl
 import os
 import secrets
 import shutil
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
-from dodo_dsl.outcome import NEXT_REPORT
-from dodo_dsl.report import results
-from dodo_dsl.report.changes import markdown
-from dodo_dsl.report.report_folder import OF_MACHINE, forget
+from dodo_dsl.outcome import NEXT_REPORT, Outcome
+from dodo_dsl.report import comparison, results
+from dodo_dsl.report.report_folder import OF_MACHINE, Drawable, draw_test, forget
 
 
 class NextReport:
@@ -41,7 +43,7 @@ class NextReport:
         gone = forget(self.place, self._slugs, self._others)
         for name in OF_MACHINE:
             (self.place / name).unlink(missing_ok=True)
-        markdown.write(self.place, None)
+        comparison.write(self.place, None)
         entries = [entry for entry in self.folder.iterdir() if not entry.is_symlink()]
         for entry in sorted(entries, key=lambda entry: (entry.name == results.FILE_NAME, entry.is_file())):
             _move(entry, self.place / entry.name)
@@ -117,3 +119,29 @@ def _move(source: Path, target: Path) -> None:
             _move(entry, target / entry.name)
     else:
         source.replace(target)
+
+
+class Drawings:
+    """The pictures and pages of tests in a report's folder, drawn one after the other in a thread of their own.
+
+    What was begun is whole when the context ends; after an exception, no further one begins.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._pool = ThreadPoolExecutor(1, "drawing")
+        self._begun: dict[str, Future[list[str]]] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, _error: object, _trace: TracebackType | None) -> None:
+        self._pool.shutdown(cancel_futures=kind is not None)
+
+    def begin(self, outcome: Outcome, test: Drawable) -> None:
+        """Draws the test of this outcome, which is final."""
+        self._begun[outcome.slug] = self._pool.submit(draw_test, self._folder, outcome, test)
+
+    def problems(self) -> Mapping[str, Sequence[str]]:
+        """The slugs of all tests that were drawn, with sentences on what could not be."""
+        return {slug: future.result() for slug, future in self._begun.items()}

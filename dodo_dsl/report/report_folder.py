@@ -13,22 +13,21 @@ from types import MappingProxyType
 
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING, SNAPSHOT
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING, SNAPSHOT
-from dodo_dsl.report import junit, links, metrics, results
-from dodo_dsl.report.changes import markdown
-from dodo_dsl.report.changes.comparison import Comparison
-from dodo_dsl.report.pictures.duration_plot import Times
-from dodo_dsl.report.pictures.duration_plot import draw as draw_times
-from dodo_dsl.report.pictures.trajectory import Way, read_drive
-from dodo_dsl.report.suite import check_history, html
+from dodo_dsl.report import comparison as report_comparison
+from dodo_dsl.report import for_gitlab, overview, results
+from dodo_dsl.report.comparison import Comparison
+from dodo_dsl.report.duration_plot import Times
+from dodo_dsl.report.duration_plot import draw as draw_times
+from dodo_dsl.report.trajectory import Way, read_drive
 from dodo_dsl.report.viewer import names as viewer
-from dodo_dsl.spec.instances.matrix import SLUG
+from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.registry import SUFFIX
 
 TRAJECTORY = "trajectory.png"
 TIMES = "times.svg"
-OF_MACHINE = (TIMES, check_history.FILE_NAME)
+OF_MACHINE = (TIMES, overview.FILE_NAME)
 """Of earlier runs on one machine."""
 ATTEMPTS = "attempts"
 SANDBOX_LOG = "sandbox.log"
@@ -76,7 +75,7 @@ def write_report(
     outcomes: Sequence[Outcome],
     tests: Mapping[str, Drawable],
     times: Mapping[str, Sequence[Times]] | None = None,
-    past: check_history.Past | None = None,
+    past: overview.Past | None = None,
     circumstances: results.Circumstances = results.NO_CIRCUMSTANCES,
     place: Path | None = None,
     drawn: Mapping[str, Sequence[str]] = MappingProxyType({}),
@@ -100,7 +99,7 @@ def write_report(
     for name in OF_MACHINE:
         (folder / name).unlink(missing_ok=True)
     if past:
-        check_history.write(folder, past)
+        overview.write(folder, past)
     if times:
         try:
             atomic.write_text(folder / TIMES, draw_times(times, platform.node() or "this machine"))
@@ -184,8 +183,8 @@ def write_summaries(
     Without one, that of an earlier report is removed. ``place`` is where ``folder`` will be moved to. Raises OSError.
     """
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
-    atomic.write_text(folder / "metrics.txt", metrics.to_text(outcomes))
-    markdown.write(folder, comparison)
+    atomic.write_text(folder / "metrics.txt", for_gitlab.to_text(outcomes))
+    report_comparison.write(folder, comparison)
     _write_linked(folder, outcomes, comparison, circumstances, place)
 
 
@@ -201,29 +200,31 @@ def _write_linked(
     shown, pages = _shown(place or folder), _named(folder, outcomes, viewer.PAGE)
     with atomic.replacing(folder / "junit.xml") as part:
         attachments = {slug: f"{shown}/{found[0].path}" for slug, found in pictures.items() if found}
-        moments = links.to_moments(outcomes, pages, shown)
-        junit.write(part, outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
+        moments = for_gitlab.to_moments(outcomes, pages, shown)
+        for_gitlab.write(part, outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
     times = TIMES if (folder / TIMES).is_file() else ""
-    files = html.ReportFiles(
+    files = overview.ReportFiles(
         pictures,
         _logs(folder, outcomes),
         _named(folder, outcomes, RECORDING),
         _specs(place or folder, outcomes),
         pages,
         times,
-        check_history.read(folder),
+        overview.read(folder),
     )
-    atomic.write_text(folder / "index.html", html.render(outcomes, files, comparison, circumstances))
+    atomic.write_text(folder / "index.html", overview.render(outcomes, files, comparison, circumstances))
 
 
-def _pictures(folder: Path, outcome: Outcome) -> list[html.ReportPicture]:
+def _pictures(folder: Path, outcome: Outcome) -> list[overview.ReportPicture]:
     """The pictures of a test, the most informative first: GitLab shows one beside a test case."""
     known = (
         (TRAJECTORY, f"The drive of {outcome.name} from above"),
         (SNAPSHOT, f"What the camera of {outcome.name} saw"),
     )
     place = outcome.slug
-    return [html.ReportPicture(f"{place}/{name}", text) for name, text in known if (folder / place / name).is_file()]
+    return [
+        overview.ReportPicture(f"{place}/{name}", text) for name, text in known if (folder / place / name).is_file()
+    ]
 
 
 def _shown(folder: Path) -> str:
@@ -262,7 +263,7 @@ def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
     drive = read_drive(test.plan, test.folder, folder / RECORDING, way or Way())
     if drive is None:
         return
-    from dodo_dsl.report.pictures.trajectory_plot import draw
+    from dodo_dsl.report.trajectory_plot import draw
 
     with atomic.replacing(folder / TRAJECTORY) as part:
         draw(drive, outcome, part)

@@ -2,7 +2,9 @@
 
 import dataclasses
 import json
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +12,45 @@ from dodo_dsl import package_data
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import NotRun, Outcome
-from dodo_dsl.report.run_record import RunRecord
-from dodo_dsl.spec.goals import is_goal
+from dodo_dsl.spec.matrix import SLUG
+from dodo_dsl.spec.model import is_goal
+
+COMMIT = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
+_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Repository:
+    """A git repository at a commit; ``what`` is in it, the application or the tests.
+
+    ``changed`` tells whether it had changes or files that were in no commit.
+    """
+
+    what: str
+    commit: str
+    changed: bool
+
+    def in_words(self) -> str:
+        return f"{self.what} at commit {self.commit[:_SHOWN]}" + (" with uncommitted changes" if self.changed else "")
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """``date`` is ISO 8601 in UTC, ``dodo`` the version, ``command`` without what may be secret."""
+
+    date: str
+    host: str
+    dodo: str
+    command: str
+    repositories: tuple[Repository, ...] = ()
+
+    def in_words(self) -> str:
+        """All but the command."""
+        date = self.date[:16].replace("T", " ")
+        return ", ".join(
+            [f"{date} UTC on {self.host} with DoDo {self.dodo}", *(r.in_words() for r in self.repositories)]
+        )
+
 
 FILE_NAME = "results.json"
 VERSION = 1
@@ -100,10 +139,10 @@ def _rounded_value(name: str, value: Any) -> Any:
 
 def load(path: Path) -> list[Outcome]:
     """The outcomes of a ``results.json`` that its schema accepts; raises ResultsError."""
-    return list(read(path).outcomes)
+    return list(read_results(path).outcomes)
 
 
-def read(path: Path) -> Results:
+def read_results(path: Path) -> Results:
     """A ``results.json`` that its schema accepts; raises ResultsError."""
     import msgspec
 
@@ -150,3 +189,38 @@ def _sentence(problem: Any) -> str:
     hint = did_you_mean(name, known.keys() - problem.instance.keys())
     told = f"; {hint}" if hint.startswith("did") else ""
     return f"{problem.json_path}: unknown key '{name[:_MAX_PROBLEM_TEXT]}'{told}"
+
+
+MOST_SLUG = 240
+"""Characters of a slug, which names a folder."""
+_SHOWN_PATH = 60
+
+
+@dataclass(frozen=True)
+class GivenReport:
+    """The outcomes that a file holds; the files of its tests lie beside it where it is a report's."""
+
+    file: Path
+    outcomes: Sequence[Outcome]
+    circumstances: Circumstances = NO_CIRCUMSTANCES
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it may have files of its tests beside it, and not its outcomes alone."""
+        return self.file.name == FILE_NAME
+
+    @property
+    def folder(self) -> Path:
+        return self.file.parent
+
+
+def read_given(path: Path) -> GivenReport:
+    """The report in a folder, or of a file; raises ResultsError, also where a slug could leave its folder."""
+    is_file = not path.is_dir() and (path.is_file() or path.suffix == ".json")
+    file = path if is_file else path / FILE_NAME
+    found = read_results(file)
+    for outcome in found.outcomes:
+        if len(outcome.slug) > MOST_SLUG or not SLUG.fullmatch(outcome.slug):
+            shown = outcome.slug[:_SHOWN_PATH]
+            raise ResultsError(f"{file}: '{shown}' is no slug, expected lower-case letters, digits and hyphens")
+    return GivenReport(file, found.outcomes, found.circumstances)

@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.outcome import MachineLoad, Outcome
-from dodo_dsl.plan.recorder_service import PICTURES_FILE, RECORDING
+from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
-from dodo_dsl.run.load.judgement import too_busy
+from dodo_dsl.run.machine_load.judgement import too_busy
 from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
 from dodo_dsl.run.rigs.pool import opened
-from dodo_dsl.run.standing import Standing
+from dodo_dsl.run.run_state import Standing
 
 Phase = Callable[[str, str], None]
 """Shows what a test does, by its slug."""
@@ -103,8 +103,8 @@ class Attempts:
 
 def _silent(job: Job) -> str:
     """Which program of the application is to blame that it did not answer; empty where that is not known."""
-    from dodo_dsl.opendlv.odvd.tokens import OdvdError
-    from dodo_dsl.run.recorded.silent_consumers import silent_consumer
+    from dodo_dsl.opendlv.odvd import OdvdError
+    from dodo_dsl.run.test_recording import silent_consumer
 
     with contextlib.suppress(OSError, OdvdError):
         return silent_consumer(job.plan, job.folder, job.report / RECORDING)
@@ -113,8 +113,8 @@ def _silent(job: Job) -> str:
 
 def _paused(job: Job, load: MachineLoad) -> tuple[str, ...]:
     """A note on the longest pause of the application between two answers in real time, where that is long."""
-    from dodo_dsl.opendlv.odvd.tokens import OdvdError
-    from dodo_dsl.run.recorded.longest_pause import long_pause
+    from dodo_dsl.opendlv.odvd import OdvdError
+    from dodo_dsl.run.test_recording import long_pause
 
     paused = ""
     with contextlib.suppress(OSError, OdvdError):

@@ -12,10 +12,10 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import own_modules
-from dodo_dsl.run.process.forks.fork_server_client import ForkServer, serving
+from dodo_dsl.run.process.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.attendance import RigSession, attended, is_real, refuse_hardware
+from dodo_dsl.run.rigs.session import RigSession, attended, is_real, refuse_hardware
 
 Say = Callable[[str], None]
 

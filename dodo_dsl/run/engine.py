@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
-from dodo_dsl.run.load import shortage
-from dodo_dsl.run.load.meter import LoadMeter, add_up
-from dodo_dsl.run.load.use_series import UseMeter
+from dodo_dsl.run import start_order
+from dodo_dsl.run.machine_load import shortage
+from dodo_dsl.run.machine_load.meter import LoadMeter, UseMeter, add_up
 from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
     Backend,
@@ -24,9 +24,7 @@ from dodo_dsl.run.protocol import (
     Time,
     VerdictEvent,
 )
-from dodo_dsl.run.run_state import Ended, RunState
-from dodo_dsl.run.services import conditions
-from dodo_dsl.run.standing import Standing, standing
+from dodo_dsl.run.run_state import Ended, RunState, Standing, standing
 
 READY_PATIENCE_S = READY_S
 LAST_TIME_PATIENCE_S = 2.0
@@ -197,7 +195,7 @@ class Engine:
     def _longest_s(self, name: str) -> float:
         """For one that waits for others, and then for its own health: beyond what the backend gives it."""
         services = self.plan.application.services
-        return conditions.longest_s(services, name) + conditions.LONGEST_S + READY_PATIENCE_S
+        return start_order.longest_s(services, name) + start_order.LONGEST_S + READY_PATIENCE_S
 
     async def _next(self, deadline: float) -> Event | None:
         try:

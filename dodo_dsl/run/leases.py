@@ -6,19 +6,118 @@ what it covers, so that the next run can remove what a killed holder left.
 
 import asyncio
 import contextlib
+import contextvars
 import errno
 import fcntl
+import itertools
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.run import lease_queue
-from dodo_dsl.spec.deployment.machine import machine
+from dodo_dsl.spec.machine import machine
 from dodo_dsl.state_folder import secured
+
+PREFIX = "queue."
+_BORN_S = 10.0
+"""A ticket without content is being written, or was left half written when it is older."""
+_NUMBERS = itertools.count()
+_ARRIVAL: contextvars.ContextVar[int | None] = contextvars.ContextVar("arrival", default=None)
+_NO_TICKET = (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError)
+
+
+@dataclass(frozen=True)
+class Ticket:
+    """Somebody who waits since a time in ns for any of some leases; a ``shared`` one excludes only exclusive use.
+
+    Who has the ``turn`` has chosen a rig and is about to take all of its leases: those who choose later take another.
+    """
+
+    since: int
+    names: frozenset[str]
+    shared: bool
+    turn: bool
+
+    def precedes(self, since: int, names: Collection[str], shared: bool) -> bool:
+        """Whether one who came at a time may take none of the names before this one."""
+        return self.since < since and not (self.shared and shared) and not self.names.isdisjoint(names)
+
+
+def arrival_time() -> int:
+    """The time of arrival of who comes now: in ns, of a clock that all processes of a machine share.
+
+    Within ``arrived`` it is the time at which its block was entered.
+    """
+    return _ARRIVAL.get() or time.monotonic_ns()
+
+
+@contextlib.contextmanager
+def arrived() -> Iterator[None]:
+    """Everything that is waited for within the block keeps the place in the queue that its beginning has."""
+    before = _ARRIVAL.set(arrival_time())
+    try:
+        yield
+    finally:
+        _ARRIVAL.reset(before)
+
+
+@contextlib.contextmanager
+def ticket(
+    folder: Path, names: Sequence[str], since: int, *, shared: bool = False, turn: bool = False
+) -> Iterator[None]:
+    """Waits in the queue within the block; raises OSError where the folder cannot be written."""
+    path = folder / f"{PREFIX}{since:020d}.{os.getpid()}.{next(_NUMBERS)}"
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
+    try:
+        os.fchmod(descriptor, _MODE)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        os.write(descriptor, json.dumps({"names": list(names), "shared": shared, "turn": turn}).encode())
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def ahead_in_line(folder: Path, names: Collection[str], since: int, *, shared: bool = False) -> list[Ticket]:
+    """Who waits for one of the names and came before ``since``; tickets of dead processes are removed."""
+    return [one for one in _waiting(folder) if one.precedes(since, names, shared)]
+
+
+def remove_dead(folder: Path) -> None:
+    """Removes the tickets of processes that have ended."""
+    for _ in _waiting(folder):
+        pass
+
+
+def _waiting(folder: Path) -> Iterator[Ticket]:
+    for path in sorted(folder.glob(f"{PREFIX}*")):
+        with contextlib.suppress(*_NO_TICKET):
+            since = int(path.name.split(".")[1])
+            if _is_dead(path):
+                path.unlink(missing_ok=True)
+                continue
+            about = json.loads(regular_file.text(path))
+            yield Ticket(since, frozenset(map(str, about["names"])), bool(about["shared"]), bool(about["turn"]))
+
+
+def _is_dead(path: Path) -> bool:
+    """Whether nobody holds a ticket any more, and it is not being written; raises OSError where it cannot be opened."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    else:
+        status = os.fstat(descriptor)
+        return bool(status.st_size) or time.time() - status.st_mtime > _BORN_S
+    finally:
+        os.close(descriptor)
+
 
 FOLDER_VARIABLE = "DODO_LEASES"
 DEFAULT_PATIENCE_S = 600.0
@@ -165,11 +264,11 @@ async def lease_any(
     ``attempt`` takes one. ``waiting`` is called with a sentence whenever fewer are ahead. Raises LeaseTimeout when the
     queue has not moved for ``patience_s``. Times are of the event loop's clock, in s.
     """
-    place, since = folder(), lease_queue.now()
+    place, since = folder(), arrival_time()
 
     def may_take(name: str) -> bool:
         """Who is about to take all leases of a rig holds up nobody here, who may hold what that one still needs."""
-        return all(one.turn for one in lease_queue.ahead(place, (name,), since, shared=shared))
+        return all(one.turn for one in ahead_in_line(place, (name,), since, shared=shared))
 
     def take() -> Lease | None:
         free = (name for name in names if may_take(name))
@@ -177,7 +276,7 @@ async def lease_any(
 
     if lease := take():
         return lease
-    with lease_queue.ticket(place, names, since, shared=shared):
+    with ticket(place, names, since, shared=shared):
         return await in_turn(take, names, waiting, shared, patience_s, since)
 
 
@@ -193,7 +292,7 @@ async def in_turn(
     now = asyncio.get_running_loop().time
     deadline, known = now() + patience_s, -1
     while (taken := take()) is None:
-        before = sum(not one.turn for one in lease_queue.ahead(folder(), names, since, shared=shared))
+        before = sum(not one.turn for one in ahead_in_line(folder(), names, since, shared=shared))
         if before < known:
             deadline = now() + patience_s
         if now() > deadline:
@@ -241,7 +340,7 @@ def _about(record: Path) -> dict[str, Any]:
 
 def forget_dead() -> None:
     """Removes the records of machine leases, and the tickets, whose process has ended; their locks ended with it."""
-    lease_queue.remove_dead(folder())
+    remove_dead(folder())
     for record in folder().glob("machine.*.json"):
         with contextlib.suppress(OSError, *_NO_RECORD):
             if not Path("/proc", str(int(json.loads(regular_file.text(record))["pid"]))).exists():

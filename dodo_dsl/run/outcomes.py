@@ -11,8 +11,8 @@ from pathlib import Path
 from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
+from dodo_dsl.plan.added_services import FRAMES, RECORDER
 from dodo_dsl.plan.model import Plan, PlannedService
-from dodo_dsl.plan.recorder_service import FRAMES, RECORDER
 from dodo_dsl.run.protocol import BackendError, Flooded, MemoryTaken, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
 

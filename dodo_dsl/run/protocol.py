@@ -4,10 +4,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from dodo_dsl.opendlv.bus.address import Address
+from dodo_dsl.opendlv.address import Address
 from dodo_dsl.outcome import Response
-from dodo_dsl.run.load.service_use import Used
-from dodo_dsl.run.load.snapshot import Snapshot
+from dodo_dsl.run.machine_load.service_use import Used
+from dodo_dsl.run.machine_load.snapshot import Snapshot
 
 
 @dataclass(frozen=True)

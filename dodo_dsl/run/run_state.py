@@ -1,18 +1,18 @@
 """The state of one test while it runs, and what it decides."""
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dodo_dsl.check.world import told_in_words
+from dodo_dsl.check.senders import told_in_words
 from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse
-from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
-from dodo_dsl.plan.recorder_service import RECORDER
-from dodo_dsl.run.load import response, use_judgement
-from dodo_dsl.run.load.judgement import consider
-from dodo_dsl.run.load.shortage import Shortage
+from dodo_dsl.run import start_order
+from dodo_dsl.run.machine_load import judgement
+from dodo_dsl.run.machine_load.judgement import consider
+from dodo_dsl.run.machine_load.shortage import Shortage
 from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
@@ -45,7 +45,6 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
-from dodo_dsl.run.services import conditions
 
 MOST_NOTES = 100
 MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
@@ -184,14 +183,14 @@ class RunState:
         layer, when = self.layer_of.get(service, "application"), self._when()
         ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
         if layer == "application":
-            is_done = (code == 0 and self.input_ended) or conditions.may_end(
+            is_done = (code == 0 and self.input_ended) or start_order.may_end(
                 self.plan.application.services, service, code
             )
             if code in _KILLED and not out_of_memory and self.memory_kills() > self._killed_before:
                 self.notes.append(MEMORY_KILL)
             if not is_done and not self._all_verdicts_given():
                 reason = f"application service '{service}' {ended}, before the test was decided"
-                waits = conditions.waits(self.plan.application.services, service) if self.began is None else ""
+                waits = start_order.waits(self.plan.application.services, service) if self.began is None else ""
                 self._end_by_exit("failed", f"{reason}; {waits}" if waits else reason, service)
         elif code != 0:
             self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}", service)
@@ -260,8 +259,8 @@ class RunState:
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
-        answers = response.judged(self.response, plan.lockstep, [s.name for s in plan.application.services])
-        use = use_judgement.judged(self.resources, plan.resources)
+        answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
+        use = judgement.judged_use(self.resources, plan.resources)
         considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
         finding = self._with_told(self._explained(self._timed(considered.finding)))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
@@ -320,3 +319,32 @@ def pictured_by(plan: Plan) -> list[str]:
     """Services that show pictures to the application: those of the environment with shared memory."""
     kinds = ("memory", "memories")
     return [s.name for s in plan.layer("environment") if any(flag.kind in kinds for flag in s.flags)]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The ``seconds`` of its own time that a test has reached, and the check nearest to its limit, in words.
+
+    In real time its time goes on by itself, and this is that of its begin, 0. Checks are known when their evaluator has
+    judged, so that ``nearest`` is empty where there is only one.
+    """
+
+    seconds: float
+    is_lockstep: bool
+    nearest: str = ""
+
+
+def standing(state: RunState) -> Standing:
+    """Of what is known now."""
+    judged = (check for verdicts in state.facts.verdicts.values() for verdict in verdicts for check in verdict.checks)
+    seconds = state.time.seconds if state.time else 0.0
+    return Standing(seconds, state.plan.lockstep is not None, _nearest(judged))
+
+
+def _nearest(checks: Iterable[Mapping[str, Any]]) -> str:
+    known = [check for check in checks if check.get("margin_share") is not None]
+    if not known:
+        return ""
+    check = min(known, key=lambda each: float(each["margin_share"]))
+    unit = check.get("unit") or ""
+    return f"{check['name']} {check['value']:.4g} {unit}".rstrip() + f", margin {check['margin']:.4g} {unit}".rstrip()

@@ -17,20 +17,19 @@ from dodo_dsl import compiler
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.emit.output_folder import write
-from dodo_dsl.margins import failed_checks, worst_margin
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import Outcome, failed_checks, worst_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Backends, Job, Say
 from dodo_dsl.run.protocol import Backend
-from dodo_dsl.run.rigs.attendance import RigSession
+from dodo_dsl.run.rigs.session import RigSession
 from dodo_dsl.run.runner import Policy, Progress, Runner
 from dodo_dsl.run.schedule import Schedule
 from dodo_dsl.search.space import texts
 from dodo_dsl.search.store import Drive, Store, point_text
 from dodo_dsl.search.study import NotSearchable
 from dodo_dsl.source import Entry
-from dodo_dsl.spec.instances.vary import Values
 from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.vary import Values
 
 _ROUND = 8
 """Drives a core in a round, so that cores hardly wait for its last one; one where time or workers share the drives."""

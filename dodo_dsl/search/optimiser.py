@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.search.space import Point, Space
-from dodo_dsl.spec.instances.vary import Values
+from dodo_dsl.spec.vary import Values
 
 _BOLDNESS = (0.5, 1.0, 2.0, 3.0)
 """How many standard deviations below its mean a margin is hoped for, by turns."""

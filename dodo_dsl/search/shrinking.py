@@ -20,9 +20,9 @@ from dodo_dsl.search.space import Space, nominal, scalar, step_of, texts
 from dodo_dsl.search.store import Drive
 from dodo_dsl.search.study import Study
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.instances.vary import Range, Values
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX
+from dodo_dsl.spec.vary import Range, Values
 
 _REPEATS = 3
 MOST_KINDS, MOST_TRIED = 5, 3

@@ -8,9 +8,8 @@ from functools import cached_property
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.source import Mapping, Scalar, resolve
-from dodo_dsl.spec import quantity
-from dodo_dsl.spec.instances import vary
-from dodo_dsl.spec.instances.vary import PLACEHOLDERS, Range, Values
+from dodo_dsl.spec import quantity, vary
+from dodo_dsl.spec.vary import PLACEHOLDERS, Range, Values
 
 _STEPS = 3
 """A range of numbers has at least 10 to this power steps, so that values stay short."""

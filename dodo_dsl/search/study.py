@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import compiler
-from dodo_dsl.application.tunables import tunables
+from dodo_dsl.application.variables import tunables
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.compiler import Checked, Compilation
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.run.runner import default_backend
 from dodo_dsl.search.space import Space, space_of
-from dodo_dsl.spec.instances import vary
+from dodo_dsl.spec import vary
 from dodo_dsl.spec.model import Spec
 
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.search.drives import Drives, Point
-from dodo_dsl.search.sampling_order import Candidate, Margins, SamplingOrder, key
+from dodo_dsl.search.search_loop import Candidate, Margins, SamplingOrder, key
 from dodo_dsl.search.space import Space, nominal, space_of, sweep, texts
-from dodo_dsl.spec.instances import vary
-from dodo_dsl.spec.instances.vary import Values
+from dodo_dsl.spec import vary
 from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.vary import Values
 from dodo_dsl.terminal import printable
 
 FINALISTS = 5

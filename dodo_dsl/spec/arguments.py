@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Entry
-from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
 
 

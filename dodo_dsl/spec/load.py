@@ -1,17 +1,18 @@
 """A file's tests: read, merged over what it extends, and made into instances."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Mapping as Known
+from dataclasses import dataclass, replace
 
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Mapping, Node, Reader, Scalar, read, walk
-from dodo_dsl.spec import extends, slips
-from dodo_dsl.spec.instances import matrix, vary
-from dodo_dsl.spec.instances.matrix import Choice
-from dodo_dsl.spec.instances.placeholders import MATRIX, Placeholders, without
-from dodo_dsl.spec.model import LAYERS, Spec, spec_of
+from dodo_dsl.spec import extends, matrix, slips, vary
+from dodo_dsl.spec.matrix import Choice
+from dodo_dsl.spec.model import LAYERS, Pool, Spec, spec_of
+from dodo_dsl.spec.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.schema.validation import validate
+from dodo_dsl.spec.rig import Rig
+from dodo_dsl.spec.validation import validate
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
 """The instances of a file, and its problems."""
@@ -128,3 +129,59 @@ def _only_in_parameters(node: Mapping, placeholders: Placeholders) -> bool:
         elif key not in (placeholders.key, MATRIX) and placeholders.names(entry.value):
             return False
     return True
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Inputs of a compilation; None keeps the value of the specs.
+
+    ``wall_timeout_s`` limits the wall time of a test in lockstep, in seconds. ``repeat`` is how often each test runs.
+    """
+
+    clock: str | None = None
+    isolation: str | None = None
+    seed: int | None = None
+    wall_timeout_s: float | None = None
+    repeat: int = 1
+
+
+def applied(spec: Spec, settings: Settings) -> Spec:
+    """The spec with the settings; a test on hardware keeps its clock."""
+    if settings.clock and spec.level != "hil":
+        spec = replace(spec, clock=settings.clock)
+    if settings.isolation:
+        spans = {key: span for key, span in spec.spans.items() if key != "isolation"}
+        spec = replace(spec, isolation=settings.isolation, spans=spans)
+    return spec if settings.seed is None else replace(spec, seed=settings.seed)
+
+
+DIMENSION = "rig"
+
+
+def members(pool: Pool, rigs: Known[str, Rig]) -> list[Rig]:
+    """The rigs of a pool that the deployment has, in the order in which they are written there or in the test."""
+    if pool.kind:
+        return [rig for rig in rigs.values() if rig.kind == pool.kind.text]
+    return [rigs[name] for name in dict.fromkeys(word.text for word in pool.names) if name in rigs]
+
+
+def on_each(spec: Spec, rigs: Known[str, Rig]) -> list[Spec]:
+    """A spec with a pool on each of its rigs, any other as it is; rigs of another kind than the first are mistakes."""
+    found = members(spec.pool, rigs) if spec.pool else []
+    return [_on(spec, rig) for rig in found if rig.kind == found[0].kind] or [spec]
+
+
+def of_test(spec: Spec) -> Spec:
+    """The spec under the name that its test has whichever rig of its pool runs it."""
+    if not spec.pool:
+        return spec
+    values = list(spec.choice.values)
+    place = max(n for n, (name, _) in enumerate(values) if name == DIMENSION)  # a matrix may have one of that name, too
+    return replace(spec, choice=replace(spec.choice, values=(*values[:place], *values[place + 1 :])))
+
+
+def _on(spec: Spec, rig: Rig) -> Spec:
+    name = Scalar(spec.span(DIMENSION), rig.name, rig.name)
+    corners = tuple(_on(corner, rig) for corner in spec.corners)
+    choice = Choice((*spec.choice.values, (DIMENSION, name)))
+    return replace(spec, rig=rig.name, choice=choice, corners=corners)

@@ -5,16 +5,79 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Entry, Mapping, Node, Scalar
-from dodo_dsl.spec import quantity
-from dodo_dsl.spec.instances import matrix, vary
-from dodo_dsl.spec.instances.matrix import Choice
-from dodo_dsl.spec.pool import Pool, pool_of
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence
+from dodo_dsl.spec import matrix, quantity, vary
+from dodo_dsl.spec.matrix import Choice
+from dodo_dsl.spec.quantity import SHARE
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.resource_limits import KEYS, ResourceLimits
+
+ANY = "any"
+
+
+@dataclass(frozen=True)
+class Pool:
+    """A kind of rigs, all of which will do, or the names of those that will."""
+
+    kind: Scalar | None = None
+    names: tuple[Scalar, ...] = ()
+
+    @property
+    def text(self) -> str:
+        return self.kind.text if self.kind else f"[{', '.join(word.text for word in self.names)}]"
+
+
+def pool_of(node: Node | None) -> Pool | None:
+    """The pool that the value of ``rig`` is; None for a rig's name, and for what the schema refuses."""
+    written = node.get(ANY) if isinstance(node, Mapping) else None
+    if isinstance(written, Scalar) and isinstance(written.value, str):
+        return Pool(kind=written)
+    if isinstance(written, Sequence):
+        return Pool(names=tuple(item for item in written.items if isinstance(item, Scalar)))
+    return None
+
+
+@dataclass(frozen=True)
+class ResourceLimits:
+    """Millions of bytes of memory, its growth in such in a minute, seconds on processors, and these by the test's time.
+
+    None where there is no limit.
+    """
+
+    max_memory_mb: float | None = None
+    max_memory_growth: float | None = None
+    max_processor_time_s: float | None = None
+    max_processor_share: float | None = None
+
+
+class ResourceKey(NamedTuple):
+    """A key of ``resources``, the field that it sets, its unit and bounds, and these in words."""
+
+    name: str
+    field: str
+    unit: str
+    bounds: tuple[float, float]
+    expected: str
+
+
+KEYS = (
+    ResourceKey("max-memory", "max_memory_mb", "MB", (1, 1e6), "1 MB to 1000 GB"),
+    ResourceKey("max-memory-growth", "max_memory_growth", "MB/min", (0, 1e6), "0 MB/min to 1000000 MB/min"),
+    ResourceKey("max-processor-time", "max_processor_time_s", "s", (0.01, 1e6), "10 ms to 1000000 s"),
+    ResourceKey("max-processor-share", "max_processor_share", SHARE, (0.0001, 1000), "0.01 % to 100000 %"),
+)
+
+
+def is_valid(limits: ResourceLimits) -> bool:
+    """Whether what was read back is of the right types and within its bounds."""
+    values = ((getattr(limits, key.field), key.bounds) for key in KEYS)
+    return all(
+        value is None or (isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high)
+        for value, (low, high) in values
+    )
+
 
 LAYERS = ("environment", "action", "evaluation")
 """Of services, in the order in which they are set up; the application comes after them."""
@@ -229,3 +292,27 @@ def _uses(node: Mapping) -> Iterator[Use]:
             if isinstance(uses, Scalar) and isinstance(uses.value, str):
                 written = parameters.entries if isinstance(parameters, Mapping) else {}
                 yield Use(layer, name, entry.key, uses, written)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A check that scores 0 at ``zero``, 1 at ``one``, both in its unit, and linearly between; never beyond."""
+
+    check: str
+    zero: float
+    one: float
+    weight: float = 1.0
+
+    def score(self, value: float | None) -> float:
+        """Of a value, 0 to 1; a check without a value scores 0."""
+        if value is None:
+            return 0.0
+        return min(1.0, max(0.0, (value - self.zero) / (self.one - self.zero)))
+
+
+def is_goal(goal: Goal) -> bool:
+    """Whether its numbers make a score; those of a file may be anything."""
+    numbers = (goal.zero, goal.one, goal.weight)
+    if not all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):
+        return False
+    return goal.weight > 0 and goal.zero != goal.one

@@ -22,8 +22,8 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike, Rect
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
 TYPES = {"yellow": 1, "blue": 2}
 HSV_RANGES = {"yellow": ((22, 150, 45), (36, 255, 255)), "blue": ((102, 124, 20), (130, 255, 255))}

@@ -5,8 +5,7 @@ from services.base.evaluator import Evaluator, JudgedTime, UnjudgeableError
 from services.base.flags import Flags, FlagsError
 from services.base.judged import Judged, JudgedBoxes, Series
 from services.base.process import run
-from services.base.service import Context, Handler, Output, Service, period_of
-from services.base.verdict import Check, Verdict
+from services.base.service import Check, Context, Handler, Output, Service, Verdict, period_of
 
 __all__ = [
     "Check",

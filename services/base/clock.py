@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import Protocol
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 
 MICROSECONDS = 1_000_000
 LATEST = MICROSECONDS

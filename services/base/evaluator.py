@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.envelope import Envelope
 from services.base.clock import MICROSECONDS
 from services.base.judged import Judged
-from services.base.service import Output, Service
-from services.base.verdict import Verdict
+from services.base.service import Output, Service, Verdict
 
 EARLY = MICROSECONDS // 10
 """How much later than its arrival the time of a sample may be, in us, as clocks differ: nobody answers the future."""

@@ -3,21 +3,95 @@
 import json
 import logging
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.bus.session import Session, SessionError
-from dodo_dsl.opendlv.messages.codec import MessageError
-from services.base.clock import Clock
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageError
+from dodo_dsl.opendlv.session import Session, SessionError
+from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
-from services.base.identity.members import Members
-from services.base.identity.world import World
-from services.base.lateness import Lateness
+from services.base.members import Members, World
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
-from services.base.stamps import HeardStamps, with_strangers
+
+SHORTEST = 10_000
+"""Microseconds; less is no harm to a test, and usual on any machine."""
+
+
+class Lateness:
+    """Counts updates that end late from ``begin`` on. Times in microseconds of test time."""
+
+    def __init__(self, period: Fraction | int | None, late_after: float | None) -> None:
+        self._period = period or 0
+        self._late_after = max(float(self._period) / 2, SHORTEST) if late_after is None else late_after
+        self._last: int | None = None
+        self._has_begun = False
+        self._updates = self._late = self._reported = 0
+        self._worst = 0
+
+    def begin(self) -> None:
+        """The test begins."""
+        self._has_begun = True
+
+    def add(self, due: int, ended: int) -> None:
+        """The update of the instant ``due`` has ended. Instants between the last one and this were skipped, so late."""
+        skipped = round((due - self._last) / self._period) - 1 if self._last is not None and self._period else 0
+        self._last = due
+        if not self._has_begun:
+            return
+        late = ended - due
+        self._updates += 1 + max(skipped, 0)
+        self._late += (late > self._late_after) + max(skipped, 0)
+        self._worst = max(self._worst, late)
+
+    def news(self) -> dict[str, int | float] | None:
+        """What is to report, when more were late than at the last report."""
+        if self._late == self._reported:
+            return None
+        self._reported = self._late
+        return {"updates": self._updates, "late": self._late, "worst_s": round(self._worst / MICROSECONDS, 3)}
+
+
+@dataclass
+class HeardStamps:
+    """Counts messages by sender stamp; ``inputs`` are ids and stamps that the service takes, with their names."""
+
+    inputs: Mapping[tuple[int, int | None], str]
+    _heard: Counter[tuple[int, int]] = field(default_factory=Counter)
+
+    def take(self, envelope: Envelope) -> None:
+        """A message of a type that the service takes, whatever its stamp."""
+        self._heard[envelope.data_type, envelope.sender_stamp] += 1
+
+    def strangers(self) -> list[str]:
+        """A sentence for each input that never came, while others of its type did."""
+        return [
+            f"no {name}/{stamp} came, but {others(counts)}"
+            for (id_, stamp), name in self.inputs.items()
+            if stamp is not None and not self._heard[id_, stamp] and (counts := self._others(id_))
+        ]
+
+    def _others(self, id_: int) -> dict[int, int]:
+        """How often each stamp came that no input of a message has."""
+        known: Collection[int | None] = {stamp for other, stamp in self.inputs if other == id_}
+        if None in known:
+            return {}
+        return {stamp: count for (other, stamp), count in self._heard.items() if other == id_ and stamp not in known}
+
+
+def others(counts: Mapping[int, int]) -> str:
+    """``120 with sender stamp 99``, and so on, by stamp."""
+    return " and ".join(f"{count} with sender stamp {stamp}" for stamp, count in sorted(counts.items()))
+
+
+def with_strangers(reason: str, strangers: Iterable[str]) -> str:
+    """A reason with what was heard under other stamps."""
+    return "; ".join([reason, *strangers])
+
 
 TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
 REPORT_PERIOD = 1_000_000

@@ -1,32 +1,124 @@
 """A service as a process: flags, log, signals, readiness, and its exit code."""
 
+import contextlib
 import json
 import logging
 import os
 import signal
+import stat
 import sys
+import threading
+import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base import crash
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.session import Session, SessionError
+from dodo_dsl.opendlv.shared_memory import MemoryTakenError
 from services.base.clock import Clock, RealTimeClock
-from services.base.flags import Flags, FlagsError, parse
-from services.base.identity.key import take_key
-from services.base.identity.members import Members
-from services.base.identity.senders import SenderTable
-from services.base.identity.world import World
-from services.base.log_messages import published
+from services.base.flags import Flags, FlagsError, help_text, load_manifest, parse
 from services.base.loop import Loop
-from services.base.manifest import load_manifest
-from services.base.service import Build, Context, Service
-from services.base.usage import help_text
-from services.base.verdict import undeclared_checks
+from services.base.members import Members, SenderTable, World, take_key
+from services.base.service import Build, Context, Service, undeclared_checks
+
+_OURS = ("dodo_dsl.", "services.")
+_BASE = Path(__file__).resolve().parent
+
+
+def tell_crash(error: Exception, folder: Path, *, expected: bool, verbose: bool) -> None:
+    """Logs the error; the last line is one sentence. ``expected`` tells that its own text is one for users."""
+    if verbose:
+        logging.error("the whole traceback", exc_info=error)
+    elif not expected and (steps := short_traceback(error, folder)):
+        logging.error("%s", steps)
+    logging.critical("%s", " ".join(str(error).split()) if expected else sentence(error, folder))
+
+
+def sentence(error: Exception, folder: Path) -> str:
+    """The error in one line, with the innermost place in the service's own code; ``folder`` is the service's.
+
+    Where its own code only called ``run``, as when it made a verdict that cannot be sent, it is the place in the base.
+    """
+    text = f"{type(error).__name__}: {_unknown_field(error) or ' '.join(str(error).split())}"
+    places = [f"{file}:{frame.lineno}, in {frame.name}" for file, frame in _frames(error, folder)]
+    return f"{text} ({places[-1]})" if places else text
+
+
+def short_traceback(error: Exception, folder: Path) -> str:
+    """These frames as Python prints them; empty where there are none."""
+    lines = [f'  File "{file}", line {f.lineno}, in {f.name}\n    {f.line}' for file, f in _frames(error, folder)]
+    return "\n".join(["Traceback without libraries (most recent call last):", *lines]) if lines else ""
+
+
+def _frames(error: Exception, folder: Path) -> list[tuple[str, traceback.FrameSummary]]:
+    """The frames of the service's own code, or else of the base; none for errors whose text is a sentence for users."""
+    if type(error).__module__.startswith(_OURS):
+        return []
+    return list(_within(folder.resolve().parent, error)) or list(_within(_BASE.parent, error))
+
+
+def _within(services: Path, error: Exception) -> Iterator[tuple[str, traceback.FrameSummary]]:
+    """The frames below a folder of services but for the call of ``run``, with files relative to the folder above."""
+    for frame in traceback.extract_tb(error.__traceback__):
+        path = Path(frame.filename).resolve()
+        if path.is_relative_to(services) and frame.name != "<module>":
+            yield path.relative_to(services.parent).as_posix(), frame
+
+
+def _unknown_field(error: Exception) -> str:
+    """What is wrong where a message has no field of the name that was read; empty for anything else."""
+    if not isinstance(error, AttributeError) or not isinstance(error.obj, Message):
+        return ""
+    about = error.obj.DESCRIPTOR
+    fields = ", ".join(field.name for field in about.fields)
+    return f"{about.full_name} has no field '{error.name}'; it has {fields or 'no fields'}"
+
+
+LOG_MESSAGE = "opendlv.system.LogMessage"
+SEVERITIES = ((logging.CRITICAL, 2), (logging.ERROR, 3), (logging.WARNING, 4), (logging.INFO, 6), (logging.DEBUG, 7))
+"""The severity (RFC 5424, table 2) of lines from each level on; 6 is the message's default."""
+LONGEST = 1000
+
+
+@contextmanager
+def published(session: Session, sender_stamp: int | None) -> Iterator[None]:
+    """Send the log, and the error that ends the service, under a sender stamp; None sends nothing."""
+    if sender_stamp is None:
+        yield
+        return
+    handler = _LogSender(session, sender_stamp)
+    logging.getLogger().addHandler(handler)
+    try:
+        yield
+    except Exception as error:
+        handler.send(logging.CRITICAL, str(error) or type(error).__name__)
+        raise
+    finally:
+        logging.getLogger().removeHandler(handler)
+
+
+class _LogSender(logging.Handler):
+    """Sends log lines; one that cannot be sent is still in the log on stderr."""
+
+    def __init__(self, session: Session, sender_stamp: int) -> None:
+        super().__init__()
+        self._session, self._stamp = session, sender_stamp
+        self._type = session.messages.type(LOG_MESSAGE)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.send(record.levelno, record.getMessage())
+
+    def send(self, level: int, text: str) -> None:
+        severity = next((number for least, number in SEVERITIES if level >= least), 7)
+        description = " ".join(text.split())[:LONGEST]
+        with suppress(SessionError, MessageError):
+            self._session.send(self._type(level=severity, description=description), None, self._stamp)
+
 
 DONE, BROKEN, USAGE = 0, 1, 2
 
@@ -110,7 +202,7 @@ def _serve(
         if isinstance(error, MemoryTakenError):
             print(json.dumps({"dodo": "taken", "text": str(error)}), flush=True)
         expected = code == USAGE and isinstance(error, ValueError | OSError)
-        crash.tell(error, folder, expected=expected, verbose=bool(flags["verbose"]))
+        tell_crash(error, folder, expected=expected, verbose=bool(flags["verbose"]))
         return code if expected else BROKEN
     return DONE
 
@@ -137,7 +229,7 @@ def _recording() -> Path | None:
 def _session(cid: int) -> Session:
     if _recording() is None:
         return Session(cid, _messages())
-    from services.base.recorded.silent_session import SilentSession
+    from services.base.recorded_clock import SilentSession
 
     return SilentSession(cid, _messages())
 
@@ -145,12 +237,12 @@ def _session(cid: int) -> Session:
 def _clock(session: Session, role: str, key: bytes) -> Clock:
     """The test's clock, by ``DODO_CLOCK``."""
     if (recording := _recording()) is not None:
-        from services.base.recorded.clock import clock_of
+        from services.base.recorded_clock import clock_of
 
         return clock_of(recording, session, role)
     if os.environ.get("DODO_CLOCK") != "lockstep":
         return RealTimeClock()
-    from services.base.lockstep.lockstep_clock import LockstepClock
+    from services.base.lockstep_clock import LockstepClock
 
     return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1), key=key)
 
@@ -181,3 +273,30 @@ def _readiness(file: Path, session: Session) -> Iterator[None]:
         yield
     finally:
         file.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """A signal ends the service at once with code 0, and closes its resources; only in the main thread."""
+
+    def leave(_number: int, _frame: object) -> None:
+        raise SystemExit(0)
+
+    old = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield
+    finally:
+        for number, handler in old.items():
+            signal.signal(number, handler)
+
+
+def stop_without_master() -> None:
+    """From now on the end of standard input, where it is a pipe, is a SIGTERM: the process that held it has ended."""
+    if stat.S_ISFIFO(os.fstat(0).st_mode):
+        threading.Thread(target=_await_end, daemon=True).start()
+
+
+def _await_end() -> None:
+    while os.read(0, 4096):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)

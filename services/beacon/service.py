@@ -6,8 +6,14 @@ from pathlib import Path
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.inputs.trajectory import Trajectory, TrajectoryError, TrajectoryPose, straight
-from dodo_dsl.opendlv.inputs.way_points import read_points, read_table
+from dodo_dsl.opendlv.assets.trajectory import (
+    Trajectory,
+    TrajectoryError,
+    TrajectoryPose,
+    read_points,
+    read_table,
+    straight,
+)
 from services.base import Context, Flags, Output, Service, period_of
 
 MICROSECONDS = 1_000_000

@@ -14,13 +14,11 @@ from typing import Any, TextIO
 import numpy as np
 
 from services.base import Flags
-from services.base.flags import parse
-from services.base.manifest import load_manifest
-from services.base.signals import interruptible
-from services.camera.files import FileCamera
-from services.camera.grabber import FIRST, Grabber
+from services.base.flags import load_manifest, parse
+from services.base.process import interruptible
 from services.camera.picture import CameraError, SharedPicture
 from services.camera.service import open_camera
+from services.camera.sources import FIRST, FileCamera, Grabber
 
 BRIGHTNESS = 0.04, 0.97
 """Mean brightness of a lit picture, as a share of white."""

@@ -3,15 +3,41 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
-from services.base.signals import interruptible
-from services.camera.files import FileCamera
-from services.camera.grabber import FIRST, Camera, Grabber, longest_silence
+from services.base.process import interruptible
 from services.camera.picture import CameraError, Image, SharedPicture
-from services.camera.rpicam import RpiCamera
-from services.camera.telemetry import CameraTelemetry
-from services.camera.v4l2 import V4l2Camera
+from services.camera.sources import FIRST, Camera, FileCamera, Grabber, RpiCamera, V4l2Camera, longest_silence
+
+STATES = ("the camera gives pictures", "the camera gives no picture")
+"""Descriptions by code."""
+SHORTEST = 1_000_000
+"""us without a picture that never count as a loss."""
+
+
+class CameraTelemetry:
+    """A SystemStatusMessage at first and whenever the state changes; none without a sender stamp.
+
+    ``patience`` in us: for how long there may be no picture, if that is more than 1 s.
+    """
+
+    def __init__(self, messages: MessageSet, sender_stamp: int | None, patience: int) -> None:
+        self._type = messages.type("opendlv.system.SystemStatusMessage")
+        self._stamp, self._patience = sender_stamp, max(SHORTEST, patience)
+        self._seen: int | None = None
+        self._code: int | None = None
+
+    def update(self, has_picture: bool, now: int) -> tuple[Output, ...]:
+        """Messages at an instant (us) at which there was a picture or not."""
+        if has_picture or self._seen is None:
+            self._seen = now
+        code = int(now - self._seen > self._patience)
+        if self._stamp is None or code == self._code:
+            return ()
+        self._code = code
+        return (Output(self._type(code=code, description=STATES[code]), self._stamp),)
+
 
 EMULATED = "--source=emulated is the camera of 'rig: emulated', which virtual-camera replaces"
 

@@ -12,9 +12,8 @@ from typing import Any, TextIO
 
 import cv2
 
-from services.base.flags import parse
-from services.base.manifest import load_manifest
-from services.base.signals import interruptible
+from services.base.flags import load_manifest, parse
+from services.base.process import interruptible
 from services.camera.health_check import check, take_picture
 from services.camera.picture import CameraError
 

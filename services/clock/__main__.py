@@ -5,11 +5,11 @@ from pathlib import Path
 
 from services.base import Context, Service, run
 from services.base.clock import MICROSECONDS
-from services.base.identity.senders import SenderTable
-from services.base.lockstep.channel import ClockChannel
+from services.base.clock_link import ClockChannel
+from services.base.members import SenderTable
 from services.base.service import period_of
 from services.clock.answers import Answers, filters
-from services.clock.participants import Patience, Roles, Timing
+from services.clock.exchange import Patience, Roles, Timing
 from services.clock.service import CONSUMED, ClockService
 
 

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.numbers import is_whole, whole
 
 MOST_SURPLUS = 100

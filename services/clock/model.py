@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from services.base.lockstep.datagrams import EncodedEnvelope, encode
-from services.base.lockstep.lockstep_clock import EPOCH
+from dodo_dsl.opendlv.envelope import Envelope
+from services.base.clock_link import EncodedEnvelope, encode
+from services.base.lockstep_clock import EPOCH
 from services.clock.application import SteppedApplication
-from services.clock.exchange import StepCommand, StepResult
-from services.clock.participants import (
+from services.clock.exchange import (
     SLICE_S,
     ApplicationSilent,
     IsStopped,
     Roles,
     ServiceLink,
     ServiceSilent,
+    StepCommand,
+    StepResult,
     TimeOver,
 )
 

@@ -7,22 +7,20 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from dodo_dsl.opendlv.bus.address import Address
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.address import Address
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.numbers import is_whole, whole
+from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
-from services.base.identity.senders import SenderTable
-from services.base.lockstep.channel import ClockChannel
-from services.base.lockstep.lockstep_clock import EPOCH
+from services.base.clock_link import ClockChannel
+from services.base.lockstep_clock import EPOCH
+from services.base.members import SenderTable
 from services.base.service import Service
 from services.clock.answers import Answers
-from services.clock.application import SteppedApplication
-from services.clock.exchange import Exchange
+from services.clock.application import ResponseTimes, SteppedApplication
+from services.clock.exchange import Exchange, Roles, TestEnded, Timing
 from services.clock.model import Stepper
-from services.clock.participants import Roles, TestEnded, Timing
 from services.clock.processor_time import ApplicationProcesses
-from services.clock.response import ResponseTimes
 
 _FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
 """Seconds between reports at first and later, and their share of the time that passed.

@@ -1,17 +1,146 @@
 """The evaluator of a closed loop: gates and goal are to be reached in time, and no wall touched before."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import shapely
 
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
-from services.collision.gates import Gates
-from services.collision.geometry import VehicleBox, VehiclePose, between, outline, swept
-from services.collision.measures import DriveMeasures
-from services.collision.requests import Requests
-from services.collision.track import Track, fault_of_start, length_through, nearest, place, told, touched
+from services.collision.track import (
+    Gates,
+    Track,
+    VehicleBox,
+    VehiclePose,
+    between,
+    fault_of_start,
+    length_through,
+    nearest,
+    outline,
+    place,
+    swept,
+    told,
+    touched,
+)
+
+MICROSECONDS = 1_000_000
+
+
+@dataclass
+class DriveMeasures:
+    """Distance driven (m), highest speed (m/s), smallest distance to a wall (m), time to the goal (s)."""
+
+    distance: float = 0.0
+    max_speed: float | None = None
+    wall_margin: float | None = None
+    time_to_goal: float | None = None
+
+    def move(self, start: tuple[int, VehiclePose], end: tuple[int, VehiclePose]) -> float:
+        """The vehicle went from one pose to the next, each with its time in microseconds; returns its speed."""
+        length = math.hypot(end[1].x - start[1].x, end[1].y - start[1].y)
+        speed = length * MICROSECONDS / (end[0] - start[0])
+        self.distance += length
+        self.max_speed = max(self.max_speed or 0.0, speed)
+        return speed
+
+    def approach(self, margin: float) -> None:
+        """The vehicle came this close to a wall, in m; touching is a margin of zero."""
+        self.wall_margin = margin if self.wall_margin is None else min(self.wall_margin, margin)
+
+    def goal_check(self, max_time: float) -> Check:
+        """The time to the goal; null, and not ok, when it was not reached."""
+        is_reached = self.time_to_goal is not None
+        return Check(
+            "time-to-goal", self.time_to_goal, {"max": max_time}, "s", is_reached, parameters=("max-time", "goal")
+        )
+
+    @staticmethod
+    def rest_check(rest: float) -> Check:
+        """The way left to the goal in m; it says how far a drive that failed came, and decides nothing."""
+        return Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0, parameters=("goal", "gates"))
+
+    def wall_check(self, limit: float) -> Check:
+        """The margin, at least its limit, or more than a limit of zero: a wall touched is a wall hit."""
+        margin = self.wall_margin
+        is_kept = margin is not None and margin >= limit and margin > 0.0
+        flags = ("min-margin", "walls")
+        return Check("wall-margin", margin, {"min": limit}, "m", is_kept, exclusive=limit <= 0.0, parameters=flags)
+
+    @staticmethod
+    def gate_check(crossed: int, gates: int) -> Check:
+        """The gates crossed in order; all of them are required."""
+        return Check("gates", crossed, {"min": gates}, "", crossed == gates)
+
+    def drive_checks(self, max_speed: float | None = None) -> tuple[Check, Check]:
+        """The distance, and the speed with its limit in m/s, if there is one."""
+        speed = {} if max_speed is None else {"max": max_speed}
+        is_kept = max_speed is None or (self.max_speed is not None and self.max_speed <= max_speed)
+        return Check("distance", self.distance, {}, "m", True), Check(
+            "max-speed", self.max_speed, speed, "m/s", is_kept
+        )
+
+
+REQUESTS = ("opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest")
+
+
+class Requests:
+    """Requests by message names; ``max_silence`` s may pass between any two of them. Times in us.
+
+    Time before the first request is not silence: ``max_time`` limits that.
+    """
+
+    def __init__(self, names: Sequence[str] = REQUESTS, max_silence: float = math.inf) -> None:
+        self.names = tuple(names)
+        self.came: set[str] = set()
+        self._max_silence = max_silence
+        self._last: int | None = None
+        self._longest = 0
+
+    def take(self, name: str, now: int | None) -> None:
+        """The application sent a request; ``now`` is None while no time is known."""
+        self.came.add(name)
+        if now is not None:
+            self.elapse(now)
+            self._last = max(now, self._last or 0)
+
+    def elapse(self, now: int) -> None:
+        """Time passes without a request."""
+        if self.came and self._last is None:
+            self._last = now
+        if self._last is not None:
+            self._longest = max(self._longest, now - self._last)
+
+    def forget(self, now: int) -> None:
+        """The test begins: silence before it does not count."""
+        self._last, self._longest = now if self.came else None, 0
+
+    @property
+    def missing(self) -> list[str]:
+        """Those that never came, by their short names."""
+        return [name.rpartition(".")[2] for name in self.names if name not in self.came]
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether none came at all."""
+        return not self.came
+
+    def fault(self, now: int, zero: int) -> str | None:
+        """That no request came for too long up to now; None when that is not so."""
+        self.elapse(now)
+        if self._last is None or now - self._last <= self._max_silence * MICROSECONDS:
+            return None
+        begin, end = ((each - zero) / MICROSECONDS for each in (self._last, now))
+        return f"no request came between {begin:.2f} s and {end:.2f} s (at most {self._max_silence:g} s)"
+
+    def checks(self) -> tuple[Check, ...]:
+        """The longest silence in s, where that has a limit."""
+        if math.isinf(self._max_silence):
+            return ()
+        longest = self._longest / MICROSECONDS if self.came else None
+        is_kept = longest is not None and longest <= self._max_silence
+        return (Check("silence", longest, {"max": self._max_silence}, "s", is_kept),)
+
 
 PERIOD = 10_000  # us
 _CLOSE = 1e-3

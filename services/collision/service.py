@@ -9,11 +9,8 @@ from typing import Any
 from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
-from services.collision.geometry import VehicleBox, VehiclePose
-from services.collision.model import TrackEvaluator
-from services.collision.obstacles import load, pick
-from services.collision.requests import Requests
-from services.collision.track import Track
+from services.collision.model import Requests, TrackEvaluator
+from services.collision.track import Track, VehicleBox, VehiclePose, load, pick
 
 SILENCE, GAPS = 2.0, 3.0
 """s without a frame, and how often the longest time between two of them, after which their sender hangs."""

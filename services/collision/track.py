@@ -1,13 +1,129 @@
 """The track by which a vehicle is judged: the obstacles of a map by their purpose."""
 
-from collections.abc import Mapping, Sequence
+import difflib
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import shapely
 
-from services.collision.gates import Gate
-from services.collision.geometry import VehiclePose
+from dodo_dsl.opendlv.assets import map_file
+from dodo_dsl.opendlv.assets.json_file import MapError
+
+TURN = math.radians(5)  # within a turn of this size a hull is as good as the area driven over
+
+
+@dataclass(frozen=True)
+class VehiclePose:
+    """Where the centre of the vehicle is, and its heading counter-clockwise from the x axis."""
+
+    x: float
+    y: float
+    heading: float
+
+
+@dataclass(frozen=True)
+class VehicleBox:
+    """Outline of the vehicle: `length` along its heading, `width` across, both about the centre."""
+
+    length: float
+    width: float
+
+
+def outline(pose: VehiclePose, box: VehicleBox) -> shapely.Polygon:
+    """The rectangle that the vehicle covers at a pose."""
+    return shapely.Polygon(corners(pose, box))
+
+
+def corners(pose: VehiclePose, box: VehicleBox) -> list[tuple[float, float]]:
+    """The four corners, counter-clockwise from the front left."""
+    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+    along, across = box.length / 2, box.width / 2
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    return [
+        (pose.x + f * along * cos - s * across * sin, pose.y + f * along * sin + s * across * cos) for f, s in signs
+    ]
+
+
+def swept(start: VehiclePose, end: VehiclePose, box: VehicleBox) -> shapely.Geometry:
+    """The area that the vehicle covers from one pose to the next.
+
+    It moves straight and turns evenly the shorter way round, in parts of at most five degrees; each part is
+    the convex hull of its two rectangles, which is exact for a vehicle that does not turn.
+    """
+    change = math.remainder(end.heading - start.heading, math.tau)
+    parts = max(1, math.ceil(abs(change) / TURN))
+    shares = [index / parts for index in range(parts + 1)]
+    rings = [corners(between(start, end, share), box) for share in shares]
+    hulls = [shapely.convex_hull(shapely.linestrings(a + b)) for a, b in pairwise(rings)]
+    return hulls[0] if parts == 1 else shapely.union_all(hulls)
+
+
+def between(start: VehiclePose, end: VehiclePose, share: float) -> VehiclePose:
+    """The pose after a share of the path from one pose to the next, turned the shorter way round."""
+    change = math.remainder(end.heading - start.heading, math.tau)
+    x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
+    return VehiclePose(x, y, start.heading + share * change)
+
+
+Gate = tuple[str, shapely.MultiLineString]
+
+
+class Gates:
+    """Counts the gates crossed, in either direction and in their order; a gate out of turn does not count.
+
+    A gate may appear more than once, for several laps.
+    """
+
+    def __init__(self, gates: Sequence[Gate]) -> None:
+        self._gates = gates
+        self.crossed = 0
+
+    def __len__(self) -> int:
+        return len(self._gates)
+
+    @property
+    def next(self) -> Gate | None:
+        """The next gate; None when all were crossed."""
+        return self._gates[self.crossed] if self.crossed < len(self) else None
+
+    def move(self, start: VehiclePose, end: VehiclePose) -> float | None:
+        """The centre moved straight from one pose to the next.
+
+        Returns the share of this path after which all gates were crossed, None while some are left.
+        """
+        reached = 0.0 if self.next is None else -1.0
+        while self.next is not None:
+            ahead = [share for share in crossings(self.next[1], start, end) if share > reached]
+            if not ahead:
+                return None
+            reached = min(ahead)
+            self.crossed += 1
+        return reached
+
+
+def crossings(lines: shapely.MultiLineString, start: VehiclePose, end: VehiclePose) -> Iterator[float]:
+    """The shares of the path from one pose to the next at which it crosses lines.
+
+    Every point is on one side of a line: one that lies on it counts as left of it. So a path of several
+    moves crosses a line exactly as often as its ends say, wherever the moves begin and end.
+    """
+    for (x1, y1), (x2, y2) in (segment for line in lines.geoms for segment in _segments(line)):
+        before = (x2 - x1) * (start.y - y1) - (y2 - y1) * (start.x - x1)
+        after = (x2 - x1) * (end.y - y1) - (y2 - y1) * (end.x - x1)
+        if (before >= 0) != (after >= 0) and _is_left(start, end, x1, y1) != _is_left(start, end, x2, y2):
+            yield before / (before - after)
+
+
+def _segments(line: shapely.LineString) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+    return zip(line.coords[:-1], line.coords[1:], strict=True)
+
+
+def _is_left(start: VehiclePose, end: VehiclePose, x: float, y: float) -> bool:
+    return (end.x - start.x) * (y - start.y) - (end.y - start.y) * (x - start.x) >= 0
+
 
 Obstacles = Mapping[str, shapely.MultiLineString]
 
@@ -66,3 +182,38 @@ def told(value: float, limit: float) -> str:
 def place(pose: VehiclePose) -> str:
     """The vehicle's position for sentences."""
     return f"at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"
+
+
+class ObstaclesError(ValueError):
+    """A map that cannot be read, or that lacks an obstacle; the message names file and place."""
+
+
+def load(path: Path) -> dict[str, shapely.MultiLineString]:
+    """The obstacles of the map in a folder (its `map.json`) or of the map file itself, by name, in metres.
+
+    Obstacles of one name are one. Raises ObstaclesError.
+    """
+    try:
+        found = map_file.read(path)
+    except MapError as error:
+        raise ObstaclesError(str(error)) from None
+    return {name: shapely.MultiLineString(lines) for name, lines in found.items()}
+
+
+def pick(
+    known: dict[str, shapely.MultiLineString], names: Sequence[str], parameter: str, path: Path
+) -> dict[str, shapely.MultiLineString]:
+    """Those obstacles that a parameter names, prepared for many queries; MapError for an unknown name."""
+    chosen = {}
+    for name in names:
+        if name not in known:
+            raise ObstaclesError(f"--{parameter}: {_unknown(name, list(known), path)}")
+        shapely.prepare(known[name])
+        chosen[name] = known[name]
+    return chosen
+
+
+def _unknown(name: str, known: list[str], path: Path) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(sorted(known)) or 'none'}"
+    return f"the map {path} has no obstacle {name!r}; {hint}"

@@ -2,15 +2,111 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.base import Check
-from services.continuous_signal.coverage import Coverage, cover, holds
-from services.continuous_signal.shape import RepeatedValue, lag, likeness, longest_run
+from services.base.evaluator import EARLY
 from services.continuous_signal.target import MICROSECONDS, Target, Times, Values
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """The judged time, which share of it samples hold, and its longest gap without one; all times in s.
+
+    Without samples the gap is the whole time.
+    """
+
+    begin: float
+    end: float
+    share: float
+    gap_begin: float
+    gap_end: float
+
+    @property
+    def gap(self) -> float:
+        """The length of the longest gap, in s."""
+        return self.gap_end - self.gap_begin
+
+
+def holds(times: Times, end: int, longest: int) -> Values:
+    """How long each sample holds, in us: until the next or the `end`, and at most `longest`; `times` ascend."""
+    found: Values = np.minimum(np.diff(np.append(times, end)), longest).astype(np.float64)
+    return found
+
+
+def cover(times: Times, begin: int, end: int, longest: int) -> Coverage:
+    """What samples cover of the time from `begin` to `end`; `times` ascend and are inside it, all in us."""
+    edges = np.concatenate([[begin], times, [end]])
+    gaps = np.diff(edges)
+    at = int(np.argmax(gaps))
+    share = float(holds(times, end, longest).sum()) / (end - begin)
+    return Coverage(*(float(each) for each in (
+        begin / MICROSECONDS, end / MICROSECONDS, share, edges[at] / MICROSECONDS, edges[at + 1] / MICROSECONDS,
+    )))  # fmt: skip
+
+
+LONGEST_LAG, LAG_STEP = MICROSECONDS, MICROSECONDS // 100
+"""The lags that are tried, in microseconds."""
+EXPLAINS = 0.75
+"""A lag counts when the mean distance to the target that much earlier is at most this share of that without a lag."""
+HALF = 0.5
+FEWEST = 10
+"""Samples of which anything can be said."""
+
+
+def lag(target: Target, times: Times, values: Values) -> float:
+    """The time in s by which the signal follows its target late; 0 where no lag explains its distance."""
+    plain = _mean_distance(target, times, values)
+    lags = range(LAG_STEP, LONGEST_LAG + 1, LAG_STEP)
+    best, late = min(((_mean_distance(target, times - late, values), late) for late in lags), default=(plain, 0))
+    return late / MICROSECONDS if best <= EXPLAINS * plain and best < plain else 0.0
+
+
+@dataclass(frozen=True)
+class RepeatedValue:
+    """Samples in a row with one and the same value, from a time in s on."""
+
+    samples: int
+    value: float
+    time: float
+
+
+def longest_run(times: Times, values: Values) -> RepeatedValue:
+    """The first of the longest runs; samples in any order."""
+    order = np.argsort(times, kind="stable")
+    ordered = values[order]
+    begins = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
+    lengths = np.diff(np.append(begins, len(ordered)))
+    longest = int(np.argmax(lengths))
+    first = begins[longest]
+    return RepeatedValue(int(lengths[longest]), float(ordered[first]), float(times[order][first]) / MICROSECONDS)
+
+
+def likeness(target: Target, times: Times, values: Values) -> str:
+    """How the signal is like its target, such as ``about -1 times its target``; empty where neither a factor nor an
+    offset explains half of the distance. Samples are finite and inside the target.
+    """
+    expected = target.at(times)
+    plain, squares = float(np.abs(values - expected).mean()), float((expected**2).sum())
+    if len(values) < FEWEST or not plain or not squares:
+        return ""
+    factor, offset = float((values * expected).sum()) / squares, float((values - expected).mean())
+    scaled, moved = (float(np.abs(values - fit).mean()) for fit in (factor * expected, expected + offset))
+    if min(scaled, moved) > HALF * plain:
+        return ""
+    if scaled <= moved:
+        return f"about {factor:.2g} times its target"
+    return f"about {abs(offset):.2g} {'above' if offset > 0 else 'below'} its target"
+
+
+def _mean_distance(target: Target, times: Times, values: Values) -> float:
+    distances = np.abs(values - target.at(times))
+    known = distances[~np.isnan(distances)]
+    return float(known.mean()) if len(known) >= FEWEST else np.inf
+
 
 _DIGITS = 12
 
@@ -189,3 +285,61 @@ def _check(
     ok = value is not None and (value <= limit if side == "max" else value >= limit)
     bounds: Mapping[str, float] = {side: limit}
     return Check(name, value, bounds, unit, ok, parameters=parameters)
+
+
+class Arrival(NamedTuple):
+    """A sample's time and when it arrived, both in us."""
+
+    time: int
+    arrival: int
+
+
+class LateFacts(NamedTuple):
+    """How many samples were late, and the first of them: its time in s, and when it arrived where that says more."""
+
+    samples: int = 0
+    time: float = 0.0
+    arrival: float | None = None
+
+
+class LateSamples:
+    """Samples are late whose time is more than ``delay`` us before their arrival; None believes all.
+
+    Those of more than EARLY us after it are not believed, either.
+
+    Where sample times are not those of the test (``is_test_time``), they are late when one came before them
+    that is so much newer.
+    """
+
+    def __init__(self, delay: int | None, is_test_time: bool) -> None:
+        self._delay, self._is_test_time = delay, is_test_time
+        self._count = 0
+        self._first: Arrival | None = None
+        self.newest: Arrival | None = None
+        """The newest sample that was believed."""
+
+    def take(self, time: int, arrival: int | None) -> bool:
+        """Whether a sample is late; nothing is before the time of the test is known (``arrival`` is None)."""
+        if arrival is None:
+            return False
+        if self._is_late(time, arrival):
+            self._count += 1
+            self._first = self._first or Arrival(time, arrival)
+            return True
+        if self.newest is None or time >= self.newest.time:
+            self.newest = Arrival(time, arrival)
+        return False
+
+    def facts(self, zero: int) -> LateFacts:
+        """What was late, its times counted from ``zero`` us."""
+        if self._first is None:
+            return LateFacts()
+        time, arrival = ((each - zero) / MICROSECONDS for each in self._first)
+        return LateFacts(self._count, time, arrival if self._is_test_time else None)
+
+    def _is_late(self, time: int, arrival: int) -> bool:
+        if self._delay is None:
+            return False
+        if self._is_test_time:
+            return arrival - time > self._delay or time - arrival > min(EARLY, self._delay)
+        return self.newest is not None and self.newest.time - time > self._delay

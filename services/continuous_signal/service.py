@@ -3,14 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context, Flags
-from services.continuous_signal.csv_target import read_table
 from services.continuous_signal.measures import SignalLimits
 from services.continuous_signal.model import SignalEvaluator
-from services.continuous_signal.recorded_target import read_recording
-from services.continuous_signal.signals import Signal, check
-from services.continuous_signal.target import MICROSECONDS, Target
+from services.continuous_signal.target import MICROSECONDS, Signal, Target, check, read_recording, read_table
 
 RECORDING = ".rec"
 REQUIRED = ("max-mean", "max-std", "max-distance", "min-share")

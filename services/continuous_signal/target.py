@@ -1,11 +1,20 @@
 """The target of a signal: samples in the order of their times, and straight lines between them."""
 
+import difflib
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from google.protobuf.descriptor import FieldDescriptor
 from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.inputs.target_table import MICROSECONDS, TargetError
+from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.assets import target_table
+from dodo_dsl.opendlv.assets.target_table import MICROSECONDS, TargetError
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import OWN_IDS, MessageError, MessageSet
+from dodo_dsl.opendlv.recording import Recording, RecordingError
 
 __all__ = ["MICROSECONDS", "Target", "TargetError", "Times", "Values", "in_order"]
 
@@ -44,3 +53,84 @@ def in_order(times: Times, values: Values, start: int = 0) -> Target:
     times, values = times[order], values[order]
     last = np.append(times[1:] != times[:-1], True)[: len(times)]
     return Target(times[last], values[last], start)
+
+
+def read_table(path: Path, field: str, from_first: bool) -> Target:
+    """The target in a table: the column named `field`, or else `value`, over `time`.
+
+    Times count from zero, or `from_first` row on. Raises TargetError.
+    """
+    samples = target_table.read(path, field)
+    times = np.array([time for time, _ in samples], np.int64)
+    start = int(times[0]) if from_first else 0
+    return Target(times - start, np.array([value for _, value in samples]), start)
+
+
+_NO_NUMBERS = (FieldDescriptor.CPPTYPE_STRING, FieldDescriptor.CPPTYPE_MESSAGE)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A number in a message: the message's full name, its sender stamp, and the field."""
+
+    message: str
+    sender: int
+    field: str
+
+    def value(self, message: Any) -> float:
+        """The number that a message carries."""
+        return float(getattr(message, self.field))
+
+    def __str__(self) -> str:
+        return f"{self.message}/{self.sender}"
+
+
+def check(signal: Signal, messages: MessageSet) -> Signal:
+    """The signal itself; raises UnknownMessage, and ValueError for a field that is unknown or not a number."""
+    fields = {field.name: field for field in messages.type(signal.message).DESCRIPTOR.fields}
+    field = fields.get(signal.field)
+    if field is None:
+        close = difflib.get_close_matches(signal.field, fields, n=1)
+        hint = f"did you mean '{close[0]}'?" if close else f"it has {', '.join(fields) or 'none'}"
+        raise ValueError(f"{signal.message} has no field '{signal.field}'; {hint}")
+    if field.cpp_type in _NO_NUMBERS:
+        raise ValueError(f"the field {signal.field} of {signal.message} is not a number")
+    return signal
+
+
+def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
+    """The target in a `.rec` file, its times from the first of all its messages. Raises TargetError.
+
+    Messages are put in the order of their times; of those with one and the same time the last counts.
+    """
+    id_ = messages.id(signal.message)
+    try:
+        with Recording(path) as recording:
+            index = recording.index
+            others = np.flatnonzero(~np.isin(index["data_type"], list(OWN_IDS)))
+            rows = recording.rows([id_], sender_stamps=[signal.sender])
+            if not len(rows):
+                senders = np.unique(index["sender_stamp"][index["data_type"] == id_]).tolist()
+                found = f", but of {', '.join(map(str, senders))}" if senders else ""
+                raise TargetError(f"{path}: has no {signal.message} of sender {signal.sender}{found}")
+            if fault := recording_times.fault(recording, others) or recording_times.fault(recording, rows):
+                raise TargetError(f"{path} cannot be a target: {fault}")
+            times, first = index["time"][rows], int(recording_times.within(recording, others).min())
+            return in_order(times - first, _values(path, list(recording.envelopes(rows)), signal, messages), first)
+    except OSError as error:
+        raise TargetError(f"{path}: cannot be read as a recording: {error.strerror}") from None
+    except RecordingError as error:
+        raise TargetError(str(error)) from None
+
+
+def _values(path: Path, envelopes: list[Envelope], signal: Signal, messages: MessageSet) -> Values:
+    values = np.empty(len(envelopes))
+    for number, envelope in enumerate(envelopes):
+        place = f"{path}: {signal} number {number + 1}"
+        try:
+            values[number] = signal.value(messages.decode(envelope.data_type, envelope.payload))
+        except MessageError as error:
+            raise TargetError(f"{place}: {error}") from None
+        if not np.isfinite(values[number]):
+            raise TargetError(f"{place}: {signal.field} is {values[number]}, expected a finite number")
+    return values

@@ -8,7 +8,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
-from dodo_dsl.opendlv.inputs.car import KIWI, Car
+from dodo_dsl.opendlv.assets.car import KIWI, Car
 
 MICROSECONDS = 1_000_000
 

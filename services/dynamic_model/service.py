@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.inputs.car import KIWI, read_car
+from dodo_dsl.opendlv.assets.car import KIWI, read_car
 from services.base import Context, Output, Service, period_of
 from services.dynamic_model.model import Condition, Vehicle
 

@@ -8,26 +8,158 @@ at every exit, unless a fault has stopped it: that is kept to be seen, and ``cal
 
 import json
 import math
+import statistics
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
 from dodo_dsl.opendlv.numbers import number
 from services.base import Flags
-from services.base.flags import parse
-from services.base.manifest import load_manifest
-from services.base.signals import interruptible, stop_without_master
-from services.gantry import health_check, memory, start
-from services.gantry.conversion import BUILT_IN, Conversion
+from services.base.flags import load_manifest, parse
+from services.base.process import interruptible, stop_without_master
+from services.gantry import memory, start
 from services.gantry.emulator import EmulatedRig
-from services.gantry.link import Link, RigError
-from services.gantry.motion import MotionLimits
-from services.gantry.port import SerialPort, checked
-from services.gantry.protocol import Position, Status
-from services.gantry.rig_limits import conversion_of, is_circle, kept_limits, true_box
+from services.gantry.link import REQUEST_STATE, Link, RigError, SerialPort, checked
+from services.gantry.memory import conversion_of, is_circle, kept_limits, true_box
+from services.gantry.motion import BUILT_IN, Conversion, MotionLimits
+from services.gantry.protocol import Position, Status, Word
 from services.gantry.service import EMULATED, describe, place
+
+ROUNDS = 20
+ANSWER = 0.25
+"""s within which position and status have to come, each time."""
+LATENCY = 0.05
+"""s that the median answer may take; the firmware needs 5 ms and the line as much."""
+DISTANCES = {"x": 0.04, "y": 0.04, "yaw": 0.15}
+"""How far from home (m, m, rad) each axis looks for home, and from twice as far."""
+CIRCLE_DISTANCES = {"x": 0.08, "y": 0.08, "yaw": math.radians(14.4)}
+"""The same where the yaw turns without end: farther, as from index to index it takes longer than the others at home.
+Motors jump to a pole first; eight full steps are the same between poles."""
+SPEEDS = {"x": 0.1, "y": 0.1, "yaw": 0.35}
+"""Of homing (m/s, m/s, rad/s), as firmware/protocol.yml has them."""
+REPEATS = {"x": 0.005, "y": 0.005, "yaw": math.radians(2.5)}
+"""By how much the switch may have moved (m, m, rad)."""
+DECIMAL = 1e-4
+INDEX = -math.pi
+"""rad, the heading at the index of a yaw that turns without end, by its firmware."""
+TRIES = 3
+"""For each axis, as a busy machine sometimes measures late."""
+BESIDE = 0.5
+"""rad beside the index, from where a turn begins and ends."""
+_POLL = 0.005
+
+Check = dict[str, Any]
+
+
+def find_home(limits: MotionLimits, conversion: Conversion) -> Position:
+    """The true place at the switches, as far as the limits reach, that the line's decimals do not round outside."""
+    return replace(limits.low, yaw=_index(conversion) if _endless(limits) else limits.low.yaw + DECIMAL)
+
+
+def _index(conversion: Conversion) -> float:
+    return conversion.to_true(Position(0.0, 0.0, INDEX)).yaw
+
+
+def _endless(limits: MotionLimits) -> bool:
+    return math.isinf(limits.low.yaw)
+
+
+def read_state(link: Link) -> tuple[Position | None, Status]:
+    """Position and status; a rig that is not calibrated has no position. Raises RigError when no answer comes."""
+    for _ in range(ROUNDS):
+        at, status, refusals, *_ = link.exchange(REQUEST_STATE, ANSWER)
+        if status is not None and (at is not None or refusals):
+            return at, status
+    raise RigError(f"the rig at {link.name} does not report its position")
+
+
+def run_checks(link: Link, limits: MotionLimits, kept: Mapping[str, float], patience: float) -> dict[str, Any]:
+    """``ok``, the ``reason`` when it is not, and the ``checks``; the rig moves, and ends at home.
+
+    A rig that cannot move, or still reports an old fault, is not fit. Its memory gets the limits ``kept``.
+    """
+    checks: list[Check] = []
+    try:
+        status = start.find(link)
+        start.check_kind(link, _endless(limits))
+        start.settle(link, status)
+        memory.agree(link, kept, write=True)
+        start.calibrate(link, patience)
+        checks += _answers(link)
+        if all(check["ok"] for check in checks):
+            checks += _homing(link, limits, patience)
+            if _endless(limits):
+                _turn_around(link, limits, patience)
+    except RigError as error:
+        return {"ok": False, "reason": str(error), "checks": checks}
+    bad = [check for check in checks if not check["ok"]]
+    return {"ok": not bad, "reason": _reason(bad[0]) if bad else "", "checks": checks}
+
+
+def _reason(check: Check) -> str:
+    (kind, bound), *_ = check["limit"].items()
+    than = "at most" if kind == "max" else "at least"
+    return f"{check['name']} is {check['value']:g} {check['unit']}, expected {than} {bound:g}".replace("  ", " ")
+
+
+def _check(name: str, value: float, unit: str, **limit: float) -> Check:
+    ok = limit.get("min", -math.inf) <= value <= limit.get("max", math.inf)
+    return {"name": name, "value": round(value, 3), "limit": limit, "unit": unit, "ok": ok}
+
+
+def _answers(link: Link) -> list[Check]:
+    took = []
+    for _ in range(ROUNDS):
+        begin = time.monotonic()
+        at, status, *_ = link.exchange(REQUEST_STATE, ANSWER)
+        if at is not None and status is not None:
+            took.append(time.monotonic() - begin)
+    middle = statistics.median(took) if took else ANSWER
+    return [
+        _check("answers", len(took), f"of {ROUNDS}", min=ROUNDS),
+        _check("latency", 1000 * middle, "ms", max=1000 * LATENCY),
+    ]
+
+
+def _homing(link: Link, limits: MotionLimits, patience: float) -> list[Check]:
+    """Homes from two places of each axis: the times differ by the distance between them, unless home has moved.
+
+    Positions mean nothing while homing, and agree with themselves afterwards whatever steps were lost.
+    """
+    checks = []
+    for axis, unit in (("x", "mm"), ("y", "mm"), ("yaw", "deg")):
+        scale = math.degrees(1) if unit == "deg" else 1000
+        off = math.inf
+        for _ in range(TRIES):
+            if off > REPEATS[axis]:
+                off = min(off, _difference(link, limits, axis, patience))
+        checks.append(_check(f"homing {axis}", scale * off, unit, max=scale * REPEATS[axis]))
+    return checks
+
+
+def _turn_around(link: Link, limits: MotionLimits, patience: float) -> None:
+    """Turn once around, past the index, and back past it: the firmware notices where it is not. Raises RigError."""
+    at = find_home(limits, link.conversion)
+    ways = (1, Word.GOTO), (-1, Word.GOTOLEFT), (1, Word.GOTOLEFT), (-1, Word.GOTORIGHT)
+    for side, word in ways:
+        start.go(link, replace(at, yaw=at.yaw + side * BESIDE), patience, word)
+
+
+def _difference(link: Link, limits: MotionLimits, axis: str, patience: float) -> float:
+    """By how much an axis' switch seems to have moved the second time (m or rad)."""
+    low: float = _index(link.conversion) if axis == "yaw" and _endless(limits) else getattr(limits.low, axis)
+    high: float = getattr(limits.high, axis)
+    distance = min((CIRCLE_DISTANCES if _endless(limits) else DISTANCES)[axis], (high - low) / 2)
+    took = []
+    for times in (1, 2):
+        start.go(link, replace(find_home(limits, link.conversion), **{axis: low + times * distance}), patience)
+        took.append(start.calibrate(link, patience, _POLL))
+    return abs((took[1] - took[0]) * SPEEDS[axis] * link.conversion.scale[axis] - distance)
+
 
 ACTIONS = {"status": 0, "home": 0, "goto": 3, "calibrate": 0, "check": 0}
 """How many numbers each takes."""
@@ -90,7 +222,7 @@ def _limits(flags: Flags) -> MotionLimits:
 def _goal(action: str, numbers: Sequence[float], limits: MotionLimits, conversion: Conversion) -> Position | None:
     """Where an action leads; raises UsageError for a place out of the rig's ranges, before anything moves."""
     if action == "home":
-        return health_check.home(limits, conversion)
+        return find_home(limits, conversion)
     if action != "goto":
         return None
     yaw = math.radians(numbers[2])
@@ -118,7 +250,7 @@ def _done(
         link = Link(target, lambda: SerialPort(target), conversion=conversion_of(flags))
         resources.callback(link.close)
         if action == "check":
-            health = health_check.run_checks(link, limits, kept, patience)
+            health = run_checks(link, limits, kept, patience)
             return {**health, **(_where(link, limits) if health["ok"] else {})}, DONE if health["ok"] else BROKEN
         status = start.find(link)
         start.check_kind(link, is_circle(flags))
@@ -140,7 +272,7 @@ def _where(link: Link, limits: MotionLimits) -> dict[str, Any]:
 
     Yaw is in degrees but in ``limits``, which are those that the rig's memory has.
     """
-    at, status = health_check.read_state(link)
+    at, status = read_state(link)
     return {
         "status": int(status),
         "word": status.name.lower().replace("_", " "),

@@ -1,8 +1,109 @@
 """Position and orientation of a body from its velocities, exactly, whatever the step."""
 
+import math
 from dataclasses import dataclass
 
-from services.integrator.rotation import Quaternion, Vector, displacement, multiply, rotate, turn
+from dodo_dsl.opendlv.attitude import heading_of
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+SERIES = 0.05  # rad; below it the series is more exact than the quotient
+UPRIGHT = 1 - 1e-12  # sine of a pitch at which roll and yaw cannot be told apart
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Attitude from angles in rad: yaw about z, then pitch about the new y, then roll about the new x."""
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def angles(q: Quaternion) -> Vector:
+    """Roll, pitch and yaw in rad of an attitude, as `quaternion` takes them; pitch is within +-pi/2.
+
+    Where the body looks straight up or down, roll and yaw are one turn: all of it counts as yaw.
+    """
+    x, y, z, w = q
+    sine = max(-1.0, min(1.0, 2 * (w * y - z * x)))
+    if abs(sine) > UPRIGHT:
+        return 0.0, math.copysign(math.pi / 2, sine), math.remainder(2 * math.atan2(z, w), math.tau)
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    return roll, math.asin(sine), heading_of(*q) or 0.0
+
+
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation `b` done in the frame that `a` made; the product is scaled to length one."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    x = aw * bx + ax * bw + ay * bz - az * by
+    y = aw * by - ax * bz + ay * bw + az * bx
+    z = aw * bz + ax * by - ay * bx + az * bw
+    w = aw * bw - ax * bx - ay * by - az * bz
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return x / length, y / length, z / length, w / length
+
+
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """The vector `v` of the body frame, in the frame that `q` turns it to."""
+    axis = q[:3]
+    t = cross(axis, v)
+    return _sum(v, (2 * q[3], t), (2.0, cross(axis, t)))
+
+
+def turn(rates: Vector, dt: float) -> Quaternion:
+    """The rotation made in `dt` seconds by constant `rates` (rad/s) about the body's axes."""
+    angle = dt * math.hypot(*rates)
+    scale = dt / 2 * _sinc(angle / 2)
+    return scale * rates[0], scale * rates[1], scale * rates[2], math.cos(angle / 2)
+
+
+def displacement(velocity: Vector, rates: Vector, dt: float) -> Vector:
+    """Where the body comes in `dt` seconds, in the body frame of the start (m).
+
+    Exact for constant `velocity` (m/s) and `rates` (rad/s), both held in the moving body frame: the closed
+    form of the exponential of a rigid motion, so that a circle stays a circle whatever the step.
+    """
+    phi = (dt * rates[0], dt * rates[1], dt * rates[2])
+    angle = math.hypot(*phi)
+    once = cross(phi, velocity)
+    bent = _sum(velocity, (_half(angle), once), (_sixth(angle), cross(phi, once)))
+    return dt * bent[0], dt * bent[1], dt * bent[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product of `a` and `b`."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _sinc(angle: float) -> float:
+    return math.sin(angle) / angle if angle else 1.0
+
+
+def _half(angle: float) -> float:
+    """(1 - cos a) / a^2, which tends to 1/2."""
+    return 0.5 * _sinc(angle / 2) ** 2
+
+
+def _sixth(angle: float) -> float:
+    """(a - sin a) / a^3, which tends to 1/6."""
+    if angle < SERIES:
+        return 1 / 6 - angle**2 / 120 + angle**4 / 5040
+    return (angle - math.sin(angle)) / angle**3
+
+
+def _sum(v: Vector, *terms: tuple[float, Vector]) -> Vector:
+    x, y, z = v
+    for scale, term in terms:
+        x, y, z = x + scale * term[0], y + scale * term[1], z + scale * term[2]
+    return x, y, z
+
 
 MICROSECONDS = 1_000_000
 AHEAD = 1_000_000  # us; a stamp further ahead than this is of another clock

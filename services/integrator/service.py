@@ -5,12 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.odvd import parser
+from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context, Flags, Output, Service, period_of
-from services.integrator.model import BodyPose, Integrator, Twist
-from services.integrator.rotation import angles, quaternion
+from services.integrator.model import BodyPose, Integrator, Twist, angles, quaternion
 
 FRAME, RESET = "opendlv.sim.Frame", "reset"
 OLD_FRAME = Path(__file__).with_name("frame-0.9.odvd")
@@ -26,7 +25,7 @@ class Integration(Service):
         self.body = Integrator(start(flags))
         self.rejected = 0
         self._frame = context.messages.type(FRAME)
-        self._old = MessageSet(parser.load(OLD_FRAME)) if flags["euler"] else None
+        self._old = MessageSet(odvd.load(OLD_FRAME)) if flags["euler"] else None
         self._stamps = [stamp for stamp in (flags["frame-id"], flags["copy-id"]) if stamp is not None]
         self.inputs = {
             ("opendlv.sim.KinematicState", flags["frame-id"]): self._take_state,

@@ -1,10 +1,15 @@
 """Boxes in a picture, and how well two of them agree."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dodo_dsl.opendlv.assets import truth_file
+from dodo_dsl.opendlv.assets.truth_file import Frames, TruthFileError, plain
 
 Scores = NDArray[np.float64]
 
@@ -56,3 +61,165 @@ def _real(corners: Scores) -> NDArray[np.bool_]:
     facts = np.concatenate([np.isfinite(corners), corners[..., 2:] > corners[..., :2]], axis=-1)
     real: NDArray[np.bool_] = np.logical_and.reduce(facts, axis=-1)
     return real
+
+
+Pair = tuple[int, int]
+
+
+def best_pairs(scores: Scores, threshold: float) -> list[Pair]:
+    """Pairs (row, column) of scores above a threshold: as many as can be, and of those the largest sum.
+
+    Each row and column is in one pair at most. `scores` are from 0 to 1; a score equal to the threshold is no pair.
+    """
+    allowed = scores > threshold
+    rows, columns = np.flatnonzero(allowed.any(1)), np.flatnonzero(allowed.any(0))
+    if not len(rows):
+        return []
+    part, may = scores[np.ix_(rows, columns)], allowed[np.ix_(rows, columns)]
+    more_than_all = min(part.shape) + 1.0
+    gains = np.where(may, part + more_than_all, 0.0)
+    turned = len(rows) > len(columns)
+    chosen = _assigned(-gains.T if turned else -gains)
+    pairs = [(int(b), a) if turned else (a, int(b)) for a, b in enumerate(chosen)]
+    return sorted((int(rows[a]), int(columns[b])) for a, b in pairs if may[a, b])
+
+
+def _assigned(costs: Scores) -> NDArray[np.int64]:
+    """The column of each row so that the sum of costs is smallest; there are no more rows than columns.
+
+    Rows join one by one, each along the shortest path of changes that frees a column (Kuhn 1955, in the form of
+    Jonker and Volgenant 1987). Prices of rows and columns keep all reduced costs from being negative.
+    """
+    rows, columns = costs.shape
+    row_price, column_price = np.zeros(rows), np.zeros(columns)
+    column_of, row_of = np.full(rows, -1), np.full(columns, -1)
+    for newcomer in range(rows):
+        reduced = costs - row_price[:, None] - column_price
+        lengths, came_from, settled, free = _shortest_path(reduced, row_of, newcomer)
+        slack = np.where(settled, lengths[free] - lengths, 0.0)
+        column_price -= slack
+        row_price[newcomer] += lengths[free]
+        moved = np.flatnonzero(settled & (row_of >= 0))
+        row_price[row_of[moved]] += slack[moved]
+        column = free
+        while column >= 0:
+            row = came_from[column]
+            row_of[column] = row
+            column_of[row], column = column, column_of[row]
+    return column_of
+
+
+def _shortest_path(
+    reduced: Scores, row_of: NDArray[np.int64], start: int
+) -> tuple[Scores, NDArray[np.int64], NDArray[np.bool_], int]:
+    """Dijkstra's search from a row to the nearest column without a row.
+
+    Gives each column's distance, the row before it, whether its distance is final, and the column that was found.
+    """
+    count = reduced.shape[1]
+    lengths, came_from, settled = np.full(count, np.inf), np.full(count, -1), np.zeros(count, np.bool_)
+    row, behind = start, 0.0
+    while True:
+        through = behind + reduced[row]
+        shorter = ~settled & (through < lengths)
+        lengths[shorter], came_from[shorter] = through[shorter], row
+        column = int(np.argmin(np.where(settled, np.inf, lengths)))
+        settled[column], behind = True, lengths[column]
+        if row_of[column] < 0:
+            return lengths, came_from, settled, column
+        row = row_of[column]
+
+
+class FrameKey(NamedTuple):
+    """Which frame a message is about: its sample time (microseconds), and the sampleId that came with it."""
+
+    time: int
+    number: int
+
+
+class TypeNumber(NamedTuple):
+    """The class of a detection by its DetectionType alone."""
+
+    number: int
+
+
+Value = Box | str | TypeNumber
+"""The content of a message: DetectionBoundingBox, DetectionProperty or DetectionType."""
+
+
+@dataclass
+class Detections:
+    """One sender's messages on a frame, by detectionId; the first of each kind counts."""
+
+    boxes: dict[int, Box] = field(default_factory=dict)
+    labels: dict[int, str] = field(default_factory=dict)
+    types: dict[int, TypeNumber] = field(default_factory=dict)
+    repeated: int = 0
+
+    def add(self, number: int, value: Value) -> None:
+        """One message; boxes under a detectionId that is in use are counted in ``repeated``."""
+        if isinstance(value, Box):
+            self.repeated += number in self.boxes
+            self.boxes.setdefault(number, value)
+        elif isinstance(value, TypeNumber):
+            self.types.setdefault(number, value)
+        else:
+            self.labels.setdefault(number, plain(value))
+
+    def labelled(self) -> list[LabelledBox]:
+        """The boxes, each with its property as class, or else ``type N``, or else none."""
+        return [LabelledBox(self._label(number), box) for number, box in self.boxes.items()]
+
+    def _label(self, number: int) -> str:
+        if label := self.labels.get(number):
+            return label
+        return f"type {self.types[number].number}" if number in self.types else ""
+
+    def __bool__(self) -> bool:
+        return bool(self.boxes or self.labels or self.types)
+
+
+@dataclass
+class DetectedFrame:
+    """A frame with at least one message, the first at ``since`` (microseconds of test time).
+
+    ``has_truth``: its truth is known to be complete, even if empty; ``answered``: when the application first sent
+    something, in s of the test.
+    """
+
+    key: FrameKey
+    since: int
+    found: Detections = field(default_factory=Detections)
+    true: Detections = field(default_factory=Detections)
+    has_truth: bool = False
+    answered: float | None = None
+
+
+__all__ = ["Truth", "TruthFileError", "load"]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The true boxes of each picture; ``frames`` says how a frame finds its picture."""
+
+    frames: Frames
+    pictures: Mapping[int, tuple[LabelledBox, ...]]
+
+    def picture_of(self, key: FrameKey) -> int:
+        """The picture that a frame would have."""
+        return {"one": 0, "sample-time": key.time, "number": key.number}[self.frames]
+
+    def of(self, key: FrameKey) -> tuple[LabelledBox, ...] | None:
+        """The true boxes of a frame; None where the file does not have it."""
+        return self.pictures.get(self.picture_of(key))
+
+    def labels(self) -> list[str]:
+        """All its classes, sorted."""
+        return sorted({each.label for boxes in self.pictures.values() for each in boxes})
+
+
+def load(path: Path, frames: Frames) -> Truth:
+    """The truth in a file; raises TruthFileError."""
+    found = truth_file.read(path, frames)
+    pictures = {key: tuple(LabelledBox(label, Box(*area)) for label, area in boxes) for key, boxes in found.items()}
+    return Truth(frames, pictures)

@@ -1,12 +1,246 @@
 """How frames are judged, what is counted over all of them, and the checks made of it."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby, pairwise
 from types import MappingProxyType
+from typing import NamedTuple
 
-from services.base import Check
-from services.object_detection.counts import Counts, CountsByClass
-from services.object_detection.silence import Gap, Unanswered
+from services.base import Check, JudgedBoxes
+from services.base.judged import LabelledArea, ScoredArea
+from services.object_detection.boxes import Box, LabelledBox, best_pairs, overlaps
+
+OUTSIDE = 2.0
+"""Fraction of the picture from which on a box is far outside of it."""
+SMALL = 0.6
+"""Mean height of the missed objects to that of the found ones, below which size is the matter."""
+KINDS = {
+    "far": "far outside the picture (are they in pixels?)",
+    "misnamed": "on objects of another class",
+    "doubled": "on objects that others found",
+    "loose": "beside objects or around them",
+    "nowhere": "where nothing is",
+}
+
+
+@dataclass
+class Mistakes:
+    """False detections by KINDS, and heights of missed and found objects in fractions of the picture."""
+
+    kinds: Counter[str] = field(default_factory=Counter)
+    missed: list[float] = field(default_factory=list)
+    found: list[float] = field(default_factory=list)
+
+    def add(self, other: "Mistakes") -> None:
+        """Add those of another frame."""
+        self.kinds.update(other.kinds)
+        self.missed.extend(other.missed)
+        self.found.extend(other.found)
+
+    @property
+    def sentence(self) -> str:
+        """Where the false detections are, and whether small objects are missed; empty without mistakes."""
+        places = [f"{count} {KINDS[kind]}" for kind, count in self.kinds.most_common()]
+        where = f"false detections: {', '.join(places)}" if places else ""
+        missed, found = (sum(heights) / max(1, len(heights)) for heights in (self.missed, self.found))
+        sizes = f"{missed:.2g} of the picture's height on average, and found ones {found:.2g}"
+        size = f"missed objects are small: {sizes}" if 0.0 < missed < SMALL * found else ""
+        return "; ".join(part for part in (where, size) if part)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The boxes of a frame: false detections, and true ones that were hit or missed."""
+
+    false: Sequence[LabelledBox]
+    hit: Sequence[LabelledBox]
+    missed: Sequence[LabelledBox]
+
+
+def mistakes(frame: Frame, threshold: float) -> Mistakes:
+    """The mistakes of one frame; ``threshold`` is the overlap that a hit needs."""
+    kinds = Counter(_kind(each, frame, threshold) for each in frame.false)
+    return Mistakes(kinds, [each.box.height for each in frame.missed], [each.box.height for each in frame.hit])
+
+
+def _kind(detection: LabelledBox, frame: Frame, threshold: float) -> str:
+    if max(abs(value) for value in detection.box) > OUTSIDE:
+        return "far"
+    true = [*frame.hit, *frame.missed]
+    others = [each.box for each in true if each.label != detection.label]
+    if _overlap(detection.box, others) > threshold:
+        return "misnamed"
+    if _overlap(detection.box, [each.box for each in frame.hit if each.label == detection.label]) > threshold:
+        return "doubled"
+    return "loose" if _overlap(detection.box, [each.box for each in true]) > 0.0 else "nowhere"
+
+
+def _overlap(box: Box, others: Collection[Box]) -> float:
+    return float(overlaps([box], list(others)).max(initial=0.0))
+
+
+@dataclass
+class Counts:
+    """True positives with the sum of their intersections over union, false positives, false negatives."""
+
+    hits: int = 0
+    false: int = 0
+    missed: int = 0
+    overlap: float = 0.0
+
+    def add(self, other: "Counts") -> None:
+        """Add other counts."""
+        self.hits += other.hits
+        self.false += other.false
+        self.missed += other.missed
+        self.overlap += other.overlap
+
+    @property
+    def precision(self) -> float | None:
+        """Equation 4.3, TP / (TP + FP); None where nothing was detected."""
+        return _ratio(self.hits, self.hits + self.false)
+
+    @property
+    def recall(self) -> float | None:
+        """Equation 4.4, TP / (TP + FN); None where there was nothing to detect."""
+        return _ratio(self.hits, self.hits + self.missed)
+
+    @property
+    def f1(self) -> float | None:
+        """Equation 4.5, 2 TP / (2 TP + FP + FN); None where there was neither."""
+        return _ratio(2 * self.hits, 2 * self.hits + self.false + self.missed)
+
+    @property
+    def mean_overlap(self) -> float | None:
+        """The mean intersection over union of the hits."""
+        return _ratio(self.overlap, self.hits)
+
+
+@dataclass
+class CountsByClass:
+    """Counts by class, in the order in which classes came, and what kinds of mistakes they contain.
+
+    Those of one frame have its ``boxes``.
+    """
+
+    by_label: dict[str, Counts] = field(default_factory=dict)
+    mistakes: Mistakes = field(default_factory=Mistakes)
+    boxes: JudgedBoxes = field(default=JudgedBoxes((), (), ()), compare=False, repr=False)
+
+    def add(self, label: str, counts: Counts) -> None:
+        """Add counts of a class."""
+        self.by_label.setdefault(label, Counts()).add(counts)
+
+    def __iter__(self) -> Iterator[tuple[str, Counts]]:
+        return iter(self.by_label.items())
+
+    def total(self) -> Counts:
+        """The counts of all classes together."""
+        total = Counts()
+        for counts in self.by_label.values():
+            total.add(counts)
+        return total
+
+
+def compare(
+    found: Sequence[LabelledBox], true: Sequence[LabelledBox], threshold: float, labels: Collection[str]
+) -> CountsByClass:
+    """The counts of one frame. Boxes of a class pair up where they overlap by more than ``threshold``.
+
+    Only classes in ``labels`` count, or all where it is empty.
+    """
+    result = CountsByClass()
+    false, hit, missed = list[LabelledBox](), list[LabelledBox](), list[LabelledBox]()
+    right = list[ScoredArea]()
+    for label in dict.fromkeys(each.label for each in (*true, *found)):
+        if labels and label not in labels:
+            continue
+        mine = [each for each in found if each.label == label]
+        real = [each for each in true if each.label == label]
+        scores = overlaps([each.box for each in mine], [each.box for each in real])
+        pairs = best_pairs(scores, threshold)
+        overlap = float(sum(scores[pair] for pair in pairs))
+        result.add(label, Counts(len(pairs), len(mine) - len(pairs), len(real) - len(pairs), overlap))
+        rows, columns = {row for row, _ in pairs}, {column for _, column in pairs}
+        false += [each for row, each in enumerate(mine) if row not in rows]
+        right += [(label, *mine[row].box, float(scores[row, column])) for row, column in pairs]
+        for column, each in enumerate(real):
+            (hit if column in columns else missed).append(each)
+    result.mistakes = mistakes(Frame(false, hit, missed), threshold)
+    result.boxes = JudgedBoxes(right, areas(false), areas(missed))
+    return result
+
+
+def areas(boxes: Sequence[LabelledBox]) -> list[LabelledArea]:
+    """Boxes as they are recorded."""
+    return [(label, *box) for label, box in boxes]
+
+
+def _ratio(part: float, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+class JudgedFrame(NamedTuple):
+    """A frame by its ``order`` among others, and its ``place`` in sentences.
+
+    ``answered`` in s of the test, None for no answer; ``expects`` one: it has true boxes that count.
+    """
+
+    order: int
+    place: str
+    answered: float | None
+    expects: bool = True
+
+
+class Unanswered(NamedTuple):
+    """How many of the frames that expect an answer have none, and the longest run of those, by its ends."""
+
+    frames: int
+    silent: int
+    longest: tuple[JudgedFrame, ...] = ()
+
+    @property
+    def share(self) -> float | None:
+        """Of all frames that expect an answer; None where none does."""
+        return self.silent / self.frames if self.frames else None
+
+
+class Gap(NamedTuple):
+    """A time without an answer, in s of the test."""
+
+    begin: float
+    end: float
+
+
+@dataclass
+class Silence:
+    """Collects judged frames and the times (s) of answers; the first may come within ``start_up`` s."""
+
+    start_up: float = 0.0
+    frames: list[JudgedFrame] = field(default_factory=list)
+    answers: list[float] = field(default_factory=list)
+
+    def unanswered(self) -> Unanswered:
+        """Frames without an answer; those from before a first answer within the start-up are left out."""
+        frames = sorted(self.frames, key=lambda frame: frame.order)
+        first = next((i for i, frame in enumerate(frames) if frame.answered is not None), None)
+        if first is not None and (frames[first].answered or 0.0) <= self.start_up:
+            frames = frames[first:]
+        frames = [frame for frame in frames if frame.expects or frame.answered is not None]
+        groups = groupby(frames, key=lambda frame: frame.answered is None)
+        runs = [tuple(group) for is_silent, group in groups if is_silent]
+        return Unanswered(len(frames), sum(map(len, runs)), max(runs, key=len, default=()))
+
+    def gap(self, begin: float, end: float) -> Gap:
+        """The longest time without an answer, of that from ``begin`` to ``end`` in s."""
+        times: Sequence[float] = sorted(time for time in self.answers if begin <= time <= end)
+        if times and times[0] <= self.start_up:
+            begin = times[0]
+        return max(
+            (Gap(a, b) for a, b in pairwise([begin, *times, max(begin, end)])), key=lambda gap: gap.end - gap.begin
+        )
+
 
 MEASURES = ("precision", "recall", "f1")
 

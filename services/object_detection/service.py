@@ -4,13 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.inputs.truth_file import no_box
+from dodo_dsl.opendlv.assets.truth_file import no_box
 from services.base import Context, Flags, Handler
-from services.object_detection.boxes import Box
-from services.object_detection.frames import FrameKey, TypeNumber, Value
+from services.object_detection.boxes import Box, FrameKey, Truth, TypeNumber, Value, load
 from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import MEASURES, DetectionLimits, Rules
-from services.object_detection.truth import Truth, load
 
 LOGIC = "opendlv.logic.perception.Detection"
 ANNOUNCEMENT = "opendlv.proxy.ImageReadingShm"

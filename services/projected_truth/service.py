@@ -9,14 +9,12 @@ from pathlib import Path
 import cv2
 
 from services.base import Context, Flags, Output, Service
-from services.projected_truth.followed import FollowedMemory
-from services.projected_truth.path import MICROSECONDS, MeasuredPath
-from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.projected_truth.path import MICROSECONDS, FollowedMemory, MeasuredPath
+from services.scene.camera import CameraFrame, CameraPose, Pinhole, body_pose, mount
 from services.scene.lens import Alignment, Distortion, Lens, lens_of
-from services.scene.truth_sender import TruthSender, truth_sender
-from services.scene.vehicle import CameraFrame, body_pose, mount
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
+from services.scene.truth import TruthSender, truth_sender
 
 PATIENCE = 250_000
 """us after a picture in which a pose measured later has to come; then the vehicle counts as moving on evenly."""

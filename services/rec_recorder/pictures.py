@@ -7,11 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.memory import pixels
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.video.decoder import VideoError
-from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder
+from dodo_dsl.opendlv import pixels
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.video import FORMAT, VideoEncoder, VideoError
 from services.rec_recorder.source import PictureSource, SourceError
 
 MESSAGE = "opendlv.proxy.ImageReading"

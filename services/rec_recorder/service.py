@@ -3,13 +3,12 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.envelope import Envelope
 from services.base import Context, Service
-from services.base.recorded.step_marks import RECORDING_END
+from services.base.lockstep_clock import RECORDING_END
 from services.base.service import period_of
-from services.rec_recorder.model import RecordingFile
+from services.rec_recorder.model import RecordingFile, Traffic
 from services.rec_recorder.source import MemorySpec, PictureSource, parse
-from services.rec_recorder.traffic import Traffic
 
 if TYPE_CHECKING:
     from services.rec_recorder.pictures import Cameras, RecordedCamera
@@ -140,7 +139,7 @@ def _cameras(context: Context, sources: list[PictureSource], recording: Recordin
 
 def _pictures_alone(context: Context, cameras: "list[RecordedCamera]", recording: RecordingFile) -> "Cameras":
     """Pictures in a recording of their own, of which the newest stay."""
-    from services.rec_recorder.newest import NewestPictures
+    from services.rec_recorder.model import NewestPictures
     from services.rec_recorder.pictures import Cameras, Later
 
     size = round(context.flags["pictures-size"] * MEGABYTE)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import cv2
 
-from dodo_dsl.opendlv.memory import pixels
+from dodo_dsl.opendlv import pixels
 from services.rec_recorder.source import PictureSource
 
 _log = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
 RETRY = 200_000
 PATIENCE, STEPPED_PATIENCE = 0.05, 2.0

@@ -9,15 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages import versions
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import Recording
 from services.base import Context, Service
 from services.base.service import Output, period_of
-from services.rec_replay.pictures import PictureMemories, first_frame
-from services.rec_replay.player import Player
-from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Selection, SelectionError, select
-from services.rec_replay.stream import EntryStream
+from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Player, Selection, SelectionError, select
+from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
 
 LOOKS_HZ = 1000.0
 LARGEST_PAYLOAD = 65_400
@@ -150,7 +148,7 @@ def _half_period(part: Part) -> float | None:
 
 def _part(context: Context, recording: Recording) -> Part:
     flags = context.flags
-    version = flags["message-set"] if flags["message-set"] != "auto" else versions.version_of(recording)
+    version = flags["message-set"] if flags["message-set"] != "auto" else message_versions.version_of(recording)
     own = (Path(path) for path in os.environ.get("DODO_ODVD", "").split(os.pathsep) if path)
     selection = Selection(
         start=flags["start"],
@@ -161,7 +159,7 @@ def _part(context: Context, recording: Recording) -> Part:
         send_video=flags["send-video"],
     )
     max_gap = round(flags["max-gap"] * MICROSECONDS)
-    part = select(recording, selection, versions.load(version, *own), max_gap, flags["timemod"])
+    part = select(recording, selection, message_versions.load(version, *own), max_gap, flags["timemod"])
     seconds = part.due[-1] / MICROSECONDS
     _log.info("playing %d messages and %d pictures in %.1f s", part.sent.sum(), part.shown.sum(), seconds)
     return part

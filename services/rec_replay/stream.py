@@ -1,15 +1,122 @@
 """The entries of a part in order, read in blocks, pictures decoded ahead."""
 
+import logging
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import VideoError
-from services.rec_replay.pictures import Decoder, RecordedPicture, lead_in, pixels
-from services.rec_replay.selection import Part
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, has_key_frame, refuse_large
+from services.rec_replay.selection import IMAGE, Part
+
+FARTHEST = 3000
+"""Pictures that are searched for a key frame before a place in the recording."""
+
+_log = logging.getLogger(__name__)
+
+
+class RecordedPicture(NamedTuple):
+    """A picture as B, G, R, A (height, width, 4) and as I420 (height * 3 / 2, width; None for odd sizes)."""
+
+    argb: NDArray[np.uint8]
+    i420: NDArray[np.uint8] | None
+
+
+class Decoder:
+    """Decodes one camera's ImageReading messages in their order; `undecoded` counts those that gave no picture."""
+
+    def __init__(self) -> None:
+        self.undecoded = 0
+        self._messages = MessageSet.standard()
+        self._format = ""
+        self._codec: VideoDecoder | None = None
+
+    def restart(self) -> None:
+        """The next picture does not follow the last one."""
+        self._codec = None
+
+    def frame(self, envelope: Envelope) -> DecodedFrame | None:
+        """The picture of a message; raises VideoError for a format that is not known, and a size that is too large."""
+        image = self._image(envelope)
+        frame = None
+        if image is not None:
+            refuse_large(image.width, image.height)
+            if self._codec is None or image.format != self._format:
+                self._codec, self._format = VideoDecoder(image.format), image.format
+            frame = self._codec.decode(image.data)
+        self.undecoded += frame is None
+        return frame
+
+    def is_key_frame(self, envelope: Envelope) -> bool:
+        """Whether decoding can begin here."""
+        image = self._image(envelope)
+        return image is not None and has_key_frame(image.data)
+
+    def _image(self, envelope: Envelope) -> Any:
+        """The decoded message; set 0.9 has the same fields under other names."""
+        try:
+            return self._messages.decode(IMAGE, envelope.payload)
+        except MessageError:
+            return None
+
+
+def pixels(frame: DecodedFrame) -> RecordedPicture:
+    """The picture in both formats of a camera."""
+    even = frame.width % 2 == 0 and frame.height % 2 == 0
+    return RecordedPicture(frame.pixels("argb"), frame.pixels("i420") if even else None)
+
+
+def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
+    """The first picture of the rows that can be decoded; raises VideoError where none can."""
+    decoder = Decoder()
+    for envelope in recording.envelopes(rows):
+        frame = decoder.frame(envelope)
+        if frame is not None:
+            return frame
+    raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded")
+
+
+def lead_in(recording: Recording, rows: Numbers, before: int) -> Iterator[Envelope]:
+    """The messages to decode before row number ``before`` of the rows: from the last key frame."""
+    decoder, first = Decoder(), max(0, before - FARTHEST)
+    for number in range(before, first - 1, -1):
+        if number < len(rows) and decoder.is_key_frame(recording.envelope(int(rows[number]))):
+            yield from recording.envelopes(rows[number:before])
+            return
+    yield from recording.envelopes(rows[first:before])
+
+
+class PictureMemories:
+    """Memories for pictures: each is copied and stamped under the lock, then announced.
+
+    A picture of another size than the first is skipped, and counted in ``misfits``.
+    """
+
+    def __init__(self, argb: SharedMemory, i420: SharedMemory | None) -> None:
+        self.shown = self.misfits = 0
+        self._argb, self._i420 = argb, i420
+
+    def show(self, picture: RecordedPicture, sample_time: int) -> None:
+        """Publish a picture; raises SharedMemoryError when a reader keeps the lock."""
+        if picture.argb.nbytes != self._argb.size:
+            if not self.misfits:
+                _log.warning("skipped the picture of %d us, which has another size than the first", sample_time)
+            self.misfits += 1
+            return
+        for memory, array in ((self._argb, picture.argb), (self._i420, picture.i420)):
+            if memory is not None and array is not None:
+                with memory.lock():
+                    memory.buffer[: array.nbytes] = np.ascontiguousarray(array).data.cast("B")
+                    memory.stamp(sample_time)
+                    memory.notify_all()
+        self.shown += 1
+
 
 READ_AHEAD = 256
 

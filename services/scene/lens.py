@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from services.scene.camera import Array, Pinhole
-from services.scene.draw.raster import Image
+from services.scene.raster import Image
 
 _STEPS = 60
 _CLOSE = 0.02

@@ -6,12 +6,10 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from services.scene.camera import CameraPose
-from services.scene.draw.raster import Image
-from services.scene.draw.render import Renderer
-from services.scene.motion import LONGEST_GAP, between, still
-from services.scene.vehicle import CameraFrame, body_pose
-from services.virtual_camera.image.optics import Optics
+from services.scene.camera import LONGEST_GAP, CameraFrame, CameraPose, between, body_pose, still
+from services.scene.raster import Image
+from services.scene.render import Renderer
+from services.virtual_camera.optics import Optics
 
 Publish = Callable[[Image, Image, int], None]
 """Takes a picture as ARGB (height, width, 4) and as I420 (height * 3 / 2, width), and its sample time in us.

@@ -7,20 +7,17 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
-from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.light import Light
-from services.scene.draw.raster import Image
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import Scene, SceneOptions, load_scene
+from services.scene.camera import CameraPose, Pinhole, mount
 from services.scene.lens import Alignment, Distortion
-from services.scene.truth_sender import TruthSender, truth_sender
-from services.scene.vehicle import mount
-from services.virtual_camera.image.optics import Optics
-from services.virtual_camera.image.overlays import load_overlays
-from services.virtual_camera.image.sensor import Sensor
+from services.scene.raster import Image
+from services.scene.render import Renderer
+from services.scene.scene import Scene, SceneOptions, load_scene
+from services.scene.shading import Light
+from services.scene.truth import TruthSender, truth_sender
 from services.virtual_camera.model import Publish, VirtualCamera
+from services.virtual_camera.optics import Optics, Sensor, load_overlays
 
 Memories = list[tuple[SharedMemory, str]]
 """Shared memory and what it holds: argb, i420 or bgr."""

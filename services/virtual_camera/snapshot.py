@@ -15,11 +15,9 @@ from typing import Any, TextIO
 import cv2
 
 from services.base import Flags
-from services.base.flags import parse
-from services.base.manifest import load_manifest
-from services.scene.draw.raster import Image
-from services.scene.truth import TrueBox
-from services.scene.truth_sender import open_truth
+from services.base.flags import load_manifest, parse
+from services.scene.raster import Image
+from services.scene.truth import TrueBox, open_truth
 from services.virtual_camera.service import mounted_camera, open_scene
 
 OUTPUT = "--output="

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from dodo_dsl.application.application_problems import application_problems
-from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, plain
-from dodo_dsl.application.service_environment import env_files
+from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, env_files, plain
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Mapping
 from tests.source.nodes import mapping

@@ -11,7 +11,7 @@ from dodo_dsl.application.mounts import large_folders
 from dodo_dsl.application.read import read_application
 from dodo_dsl.emit.containers import copy_command
 from dodo_dsl.plan.model import Application
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.application.applications import problems
 
 LIMITS = SandboxLimits(copies=100_000, copied_files=10)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dodo_dsl.application.service_environment import cid_variables, env_files, image_variable
+from dodo_dsl.application.model import cid_variables, env_files, image_variable
 from tests.source.nodes import mapping
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl.application.interpolation import interpolate, with_values
 from dodo_dsl.application.read import read_application
-from dodo_dsl.application.test_variables import owner
+from dodo_dsl.application.variables import owner
 from dodo_dsl.plan.model import Application, Plan
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.rewrite.service_copy import Setting

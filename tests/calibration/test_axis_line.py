@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.calibration.axis_line import AXES, AxisLine, Reading, ReadingOff, fit
-from dodo_dsl.calibration.problem import CalibrationProblem
+from dodo_dsl.run.rigs.axis_calibration import AXES, AxisLine, CalibrationProblem, Reading, ReadingOff, fit
 
 X, YAW = AXES["x"], AXES["yaw"]
 PLACES = (-0.7, -0.35, 0.0, 0.35, 0.7)

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl.calibration import board
-from dodo_dsl.calibration.intrinsics import BoardView, intrinsics, view
-from dodo_dsl.calibration.problem import CalibrationProblem
+from dodo_dsl.run.rigs import camera_calibration
+from dodo_dsl.run.rigs.axis_calibration import CalibrationProblem
+from dodo_dsl.run.rigs.camera_calibration import BoardView, intrinsics, view
 from tests.calibration.board_pictures import HEIGHT, LENS, MATRIX, WIDTH, pictures
 
 
@@ -53,10 +53,10 @@ def test_pictures_that_are_not_enough_are_refused() -> None:
 
 
 def test_the_board_is_drawn_in_true_size() -> None:
-    root = ET.fromstring(board.svg())
+    root = ET.fromstring(camera_calibration.svg())
     assert (root.get("width"), root.get("height"), root.get("viewBox")) == ("297mm", "210mm", "0 0 297 210")
     ink = sum(
         float(part[part.index("h") + 1 : part.index("v")]) * float(part[part.index("v") + 1 :].split("h")[0])
         for part in root.findall("{*}path")[0].get("d", "").split("z")[:-1]
     )
-    assert ink == pytest.approx((board.picture(2) == 0).sum() / 4)
+    assert ink == pytest.approx((camera_calibration.picture(2) == 0).sum() / 4)

@@ -2,8 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.calibration.axis_line import AXES, Reading
-from dodo_dsl.calibration.readings import ReadingsError, as_text, of_file, of_flag, place
+from dodo_dsl.run.rigs.axis_calibration import AXES, Reading, ReadingsError, as_text, of_file, of_flag, place
 
 
 def test_places_have_units() -> None:

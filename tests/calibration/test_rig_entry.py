@@ -8,7 +8,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.calibration.rig_entry import NotWritten, changed, write
+from dodo_dsl.run.rigs.rig_entry import NotWritten, changed, write
 
 X, OFFSET = ("axes", "x", "steps"), ("axes", "x", "offset")
 VALUES = {X: "3223.3 steps/m", OFFSET: "2965.4 steps", ("axes", "yaw", "steps"): "0.55 steps/deg"}

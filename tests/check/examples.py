@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from dodo_dsl import compiler
-from dodo_dsl.cli.compile import pipeline_file
+from dodo_dsl.cli import pipeline_file
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.emit.render import File, render_plan
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.cli.compile import pipeline_file
+from dodo_dsl.cli import pipeline_file
 from tests.emit.readers import run
 
 FOLDER = Path(__file__).parent / "bad"

@@ -28,7 +28,7 @@ def without(rule: str, patch: pytest.MonkeyPatch) -> None:
 
     COMMANDS["compile"].load()
     collectors = [m for m in sys.modules.values() if getattr(m, "ordered", None) is _ordered]
-    assert {"dodo_dsl.compiler", "dodo_dsl.cli.compile.command"} <= {m.__name__ for m in collectors}
+    assert {"dodo_dsl.compiler", "dodo_dsl.cli.compile"} <= {m.__name__ for m in collectors}
     for module in collectors:
         patch.setattr(module, "ordered", kept)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.compiler import Sources, load
-from dodo_dsl.spec.goals import Goal
+from dodo_dsl.spec.model import Goal
 from tests.check import examples
 
 OWN = """

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.check import replayed
+from dodo_dsl.check import resolve
 from dodo_dsl.check.wiring import message
 from tests.run.recorded.made import MESSAGES, begin, write
 from tests.run.recorded.made import message as envelope
@@ -18,7 +18,7 @@ IDS = frozenset((name, MESSAGES.id(name)) for name in (STEERING, PEDAL))
 def may_send(path: Path, port: str, **texts: str) -> bool:
     argument = SimpleNamespace(parameter=SimpleNamespace(format="recording"), value=SimpleNamespace(path=path))
     service: Any = SimpleNamespace(arguments={"rec": argument}, texts=texts)
-    return replayed.may_send(service, message(port, None), IDS)
+    return resolve.may_send(service, message(port, None), IDS)
 
 
 @pytest.mark.parametrize(

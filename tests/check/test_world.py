@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dodo_dsl.check.world import services, told, told_in_words
+from dodo_dsl.check.senders import services, told, told_in_words
 from tests.check.contexts import resolved
 
 APPLICATION = """\

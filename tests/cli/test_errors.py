@@ -7,20 +7,20 @@ from typing import TextIO
 
 import pytest
 
+from dodo_dsl.atomic import OutputExists
 from dodo_dsl.cli import errors
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.cli.selection import NoSuchTest
+from dodo_dsl.images.build_context import WheelsError
 from dodo_dsl.images.docker_command import DockerError
 from dodo_dsl.images.names import NoSuchImage
-from dodo_dsl.images.wheels import WheelsError
-from dodo_dsl.opendlv.bus.session import SessionError
-from dodo_dsl.opendlv.odvd.parser import OdvdError
-from dodo_dsl.opendlv.recordings.recording import RecordingError
+from dodo_dsl.opendlv.odvd import OdvdError
+from dodo_dsl.opendlv.recording import RecordingError
+from dodo_dsl.opendlv.session import SessionError
 from dodo_dsl.plan.plan_json import json_text
 from dodo_dsl.plan.test_files import FilesError
 from dodo_dsl.rec.excerpt import NothingSelected
-from dodo_dsl.rec.outputs import OutputExists
 from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.report.results import ResultsError
 from dodo_dsl.run.leases import LeaseTimeout

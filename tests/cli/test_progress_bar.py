@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from dodo_dsl.cli.progress_bar import progress_bar
+from dodo_dsl.cli.display import progress_bar
 from tests.cli.terminal import SAID, Terminal, shown, wide
 
 

@@ -18,9 +18,9 @@ from dodo_dsl import advice, compiler
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.main import main
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.search import sampling_order
+from dodo_dsl.search import search_loop
 from dodo_dsl.search.drives import Limits
-from dodo_dsl.search.sampling_order import FIRST
+from dodo_dsl.search.search_loop import FIRST
 from tests.check import examples
 from tests.run.scripted import ScriptedBackend
 from tests.search.scripted_drives import LIMIT, SPEC, scripted_commands, stages, start_of
@@ -193,7 +193,7 @@ def test_what_a_killed_search_left_of_a_drive_is_gone_when_it_drives_again(searc
 def test_a_search_is_interrupted_between_drives_too(
     search: Search, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
-    monkeypatch.setattr(sampling_order, "propose", lambda *_: os.kill(os.getpid(), number))
+    monkeypatch.setattr(search_loop, "propose", lambda *_: os.kill(os.getpid(), number))
     code, out = search("example", "--runs", "18")
     assert (code, "the same command goes on" in out, len(set(search.driven))) == (130, True, FIRST + 1)
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.margins import with_margin
+from dodo_dsl.outcome import with_margin
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
 from tests.check import examples

@@ -9,11 +9,11 @@ from typing import Literal
 
 import pytest
 
-from dodo_dsl.cli.run.jobs import compile_tests
+from dodo_dsl.cli.run_jobs import compile_tests
 from dodo_dsl.cli.selection import select
 from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import Diagnostic, Span, format_gitlab, format_json, format_text, has_errors, told_once
-from dodo_dsl.spec.settings import Settings
+from dodo_dsl.spec.load import Settings
 from tests.check import examples
 
 GOOD = """\

@@ -7,9 +7,8 @@ import pytest
 import yaml
 
 from dodo_dsl import __version__
-from dodo_dsl.images.names import Image
-from dodo_dsl.images.own_images import base_of
-from dodo_dsl.report.joined.drive_page import read_document
+from dodo_dsl.images.names import Image, base_of
+from dodo_dsl.report.join import read_document
 from dodo_dsl.report.viewer.encoded import unpacked
 from tests.contributing.tutorial import New, follow, steps
 

@@ -12,12 +12,12 @@ import pytest
 
 from dodo_dsl.plan.model import ApplicationService
 from dodo_dsl.plan.plan_json import to_json
+from dodo_dsl.run import start_order
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.docker.containers import Containers
-from dodo_dsl.run.mixed.backends import Mixed
+from dodo_dsl.run.mixed import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
-from dodo_dsl.run.services import conditions
 from tests.docker.compose import SUBNETS, Crate
 from tests.docker.test_mixed import separate
 from tests.run.helpers import BEGUN, PASS, READY, STARTED, WAIT
@@ -126,7 +126,7 @@ FEW = {"docker": ("come-true", "unhealthy", "own-health"), "mixed": ("come-true"
 )
 def test_conditions(backend: str, names: tuple[str, ...], crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that cannot come true ends the test, and names who waits for what."""
-    monkeypatch.setattr(conditions, "LONGEST_S", 9.0)
+    monkeypatch.setattr(start_order, "LONGEST_S", 9.0)
     chosen = {name: TABLE[name] for name in names}
     scripts = Path("/scripts") if backend == "docker" else crate.bench.folder
     jobs = [waiting(crate, slug, scripts, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]

@@ -20,7 +20,7 @@ import pytest
 import yaml
 
 from dodo_dsl import __version__
-from dodo_dsl.opendlv.bus.address import group
+from dodo_dsl.opendlv.address import group
 from dodo_dsl.outcome import differs_each_run
 from tests.docker.compose import MARK
 from tests.realtime import wait_for_nobody

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.capabilities import programs
+from dodo_dsl.run import capabilities
 from tests.docker.compose import Crate
 from tests.docker.engine_port import engine_port
 from tests.docker.engine_proxy import engine_socket
@@ -25,7 +25,7 @@ def test_both_sides_of_a_verdict(tls: bool, crate: Crate, tmp_path: Path, monkey
     with engine_port(engine, certificates) as variables, monkeypatch.context() as patch:
         for name, value in variables.items():
             patch.setenv(name, value)
-        (found, *rest) = programs.docker_engine()
+        (found, *rest) = capabilities.docker_engine()
         assert (found.text.endswith(" with TLS"), variables["DOCKER_HOST"] in found.text) == (tls, True)
         assert [finding.state for finding in rest] == ["ok"], "the engine is on this machine"
         outcomes = crate.run(*jobs)

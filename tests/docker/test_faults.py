@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import engine, work_folder
-from dodo_dsl.run.capabilities import examine
+from dodo_dsl.run import capabilities, engine, work_folder
 from tests.docker.broken_registry import BrokenRegistry
 from tests.docker.compose import IMAGE, Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
@@ -124,4 +123,4 @@ def test_kept_project_stays_until_it_is_taken_down(crate: Crate) -> None:
     subprocess.run(line.removeprefix("take it down: ").split(), capture_output=True, check=True)
     assert not any(crate.mark in name for name in crate.left())
     work_folder.reap_folders()  # with the record of the run
-    examine.clean()
+    capabilities.clean()

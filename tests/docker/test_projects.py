@@ -8,10 +8,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.run import leases
-from dodo_dsl.run.capabilities import examine
-from dodo_dsl.run.docker.archive import copy_out
-from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, reap_projects
+from dodo_dsl.run import capabilities, leases
+from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, copy_out, reap_projects
 from dodo_dsl.run.docker.client import connect
 
 pytestmark = pytest.mark.engine
@@ -45,12 +43,12 @@ def test_a_strangers_container_on_a_leftover_network_blocks_nothing_else(client:
         assert reaped.removed == ["b-free: 2 containers, networks and volumes"]
         (left,) = reaped.left
         assert left.startswith(f"a-blocked: project {blocked.name}: ") and "has active endpoints" in left
-        assert examine.clean().left == reaped.left, "it is tried again, and said again"
+        assert capabilities.clean().left == reaped.left, "it is tried again, and said again"
         stranger.reload()
         assert stranger.status == "running"
     finally:
         stranger.remove(force=True)
-    assert examine.clean().removed == ["a-blocked: 1 containers, networks and volumes"]
+    assert capabilities.clean().removed == ["a-blocked: 1 containers, networks and volumes"]
     assert list(leases.folder().glob("*.json")) == []
 
 

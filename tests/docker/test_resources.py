@@ -6,7 +6,7 @@ import os
 import pytest
 
 from dodo_dsl.run.docker.containers import Containers
-from dodo_dsl.run.mixed.backends import Mixed
+from dodo_dsl.run.mixed import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.docker.compose import SUBNETS, Crate

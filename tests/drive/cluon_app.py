@@ -9,7 +9,7 @@ import threading
 
 import pycluon
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
 
 MESSAGES = MessageSet.standard()
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])

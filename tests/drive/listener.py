@@ -5,8 +5,8 @@ python listener.py --cid=111
 
 import sys
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 

@@ -17,8 +17,8 @@ import os
 import sys
 import time
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 MANNERS = FLAGS["manner"].split(",")

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base.lockstep.observer import EPOCH
-from services.base.recorded.recorded_steps import read_steps
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from services.base.lockstep_clock import EPOCH
+from services.base.recorded_clock import read_steps
 from tests.drive.applications import dodo, results
 
 MESSAGES = MessageSet.standard()

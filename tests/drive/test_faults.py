@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
 from tests.drive.applications import ROOT, results
 from tests.faults import Book
 from tests.realtime import hurry
@@ -38,7 +38,7 @@ evaluation:
 """
 APPLICATION = """
 import os, subprocess, sys, time
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.session import Session
 if os.environ.get("DODO_TEST_NETEM"):
     subprocess.run(os.environ["DODO_TEST_NETEM"].split(), check=True)
 with Session(int(sys.argv[1].partition("=")[2])) as bus:

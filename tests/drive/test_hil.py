@@ -19,8 +19,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
 from services.gantry.rig_table import ACCELERATION, BOUNDS, MICROSTEP
 from tests.drive.applications import KIWI, ROOT, dodo, kiwi, results
 from tests.drive.rig import Hardware, Pose, on_its_way, running

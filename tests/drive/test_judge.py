@@ -16,7 +16,7 @@ from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS
 from tests.drive.applications import ROOT
 from tests.drive.recordings import MESSAGES, Runs, judged, run

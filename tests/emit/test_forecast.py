@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.emit.forecast import forecast
-from dodo_dsl.emit.pipeline import Pipeline
-from dodo_dsl.emit.pipeline_job import PipelineJob
+from dodo_dsl.emit.pipeline import Pipeline, forecast
+from dodo_dsl.emit.pipeline_jobs import PipelineJob
 
 
 def job(name: str, level: str = "sil", rig: str = "", gated: bool = False) -> PipelineJob:

@@ -11,17 +11,14 @@ from typing import Any
 import pytest
 
 from services.base import Verdict
-from services.collision.geometry import VehicleBox, VehiclePose
 from services.collision.model import TrackEvaluator
-from services.collision.obstacles import load, pick
-from services.collision.track import Track
+from services.collision.track import Track, VehicleBox, VehiclePose, load, pick
 from services.dynamic_model.model import Vehicle
 from services.integrator.model import BodyPose as Attitude
-from services.integrator.model import Integrator, Twist
-from services.integrator.rotation import quaternion
+from services.integrator.model import Integrator, Twist, quaternion
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 MAPS = ROOT / "tests_registry" / "maps"

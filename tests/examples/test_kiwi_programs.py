@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 
 FOLDER = Path(__file__).parents[2] / "examples" / "kiwi"
 WIDTH, HEIGHT = 640, 480

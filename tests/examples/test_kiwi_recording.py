@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from dodo_dsl.opendlv.video.decoder import VideoDecoder
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.video import VideoDecoder
 
 SEEN = {
     20: [("yellow", 0.391, 0.87)],

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
 from tests.faulty import of_conduct
 from tests.faulty.kiwi import PERCEPTION, STEERING, Make, program
 from tests.faulty.makes import MAKES, NAMES, fault_of

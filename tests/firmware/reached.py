@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator
 
-from dodo_dsl.calibration.axis_line import AXES, Reading, fit
-from dodo_dsl.cli.rig.axis_session import SHARE
+from dodo_dsl.cli.rig_measure import SHARE
+from dodo_dsl.run.rigs.axis_calibration import AXES, Reading, fit
 from services.gantry.rig_table import BOUNDS, OFFSETS, STEPS
 
 SHOWN = {"x": 0.001, "y": 0.001, "yaw": 0.5}

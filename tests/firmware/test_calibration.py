@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl.calibration.axis_line import AXES, AxisLine, Reading, fit
 from dodo_dsl.cli.main import main
+from dodo_dsl.run.rigs.axis_calibration import AXES, AxisLine, Reading, fit
 from services.gantry.rig_table import MICROSTEP, OFFSETS, STEPS
 from tests.firmware.programs import ROOT, Rig
 from tests.firmware.reached import SHOWN, edges

@@ -12,7 +12,7 @@ import pytest
 
 from dodo_dsl.cli import doctor
 from dodo_dsl.cli.main import main
-from dodo_dsl.spec.deployment.deployment import load_deployment
+from dodo_dsl.spec.deployment import load_deployment
 from firmware.drawings import measures as of
 from firmware.drawings import side_view
 from services.gantry.protocol import Status

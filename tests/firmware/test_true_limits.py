@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from services.gantry.conversion import AxisConstants, Conversion
 from services.gantry.memory import wanted
+from services.gantry.motion import AxisConstants, Conversion
 from services.gantry.protocol import Position
 from services.gantry.rig_table import BOUNDS, CIRCLE_OFFSET, CIRCLE_STEPS, LIMITS, OFFSETS, STEPS
 from tests.firmware.programs import CIRCLE_ELF, Rig

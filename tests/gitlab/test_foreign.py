@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl.cli.compile.pipeline_rules import KINDS
+from dodo_dsl.cli.pipeline_rules import KINDS
 from tests.gitlab.inputs import TEMPLATES, included, listed, merged
 from tests.gitlab.test_local import PROGRAMS, commit, pipeline, run
 from tests.gitlab.test_rules import FOREIGN, foreign

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.emit.job_options import JobOptions
 from dodo_dsl.emit.pipeline import SearchJobs, artifact_problems, pipeline_problems
+from dodo_dsl.emit.pipeline_jobs import JobOptions
 from dodo_dsl.emit.render import render_pipeline
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.model import Place, Plan, Pooled, Suite

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl.cli.compile import pipeline_file
-from dodo_dsl.cli.compile.pipeline_rules import KINDS
+from dodo_dsl.cli import pipeline_file
+from dodo_dsl.cli.pipeline_rules import KINDS
 from tests.gitlab.inputs import TEMPLATES, Config, included, jobs, listed, merged, specified
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/gitlab.md"

@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from dodo_dsl import package_data
-from dodo_dsl.cli.compile.pipeline_rules import KINDS
 from dodo_dsl.cli.main import main
+from dodo_dsl.cli.pipeline_rules import KINDS
 from tests.gitlab.inputs import TEMPLATES, Refused, included, jobs, listed, merged, specified
 
 APPLICATION, DEPLOYMENT, RUN = TEMPLATES

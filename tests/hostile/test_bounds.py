@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.confined import process_group
-from dodo_dsl.run.process.confined.process_group import ProcessGroup
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.resource_limits import ResourceLimits
+from dodo_dsl.run.process import process_group
+from dodo_dsl.run.process.process_group import ProcessGroup
+from dodo_dsl.spec.model import ResourceLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.run.desk import gone, processes_with
 from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
 

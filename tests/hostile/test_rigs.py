@@ -16,20 +16,20 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.inputs.car import read_car
-from dodo_dsl.opendlv.inputs.way_points import read_points
-from dodo_dsl.opendlv.inputs.way_points import read_table as read_points_table
+from dodo_dsl.opendlv.assets.car import read_car
+from dodo_dsl.opendlv.assets.trajectory import read_points
+from dodo_dsl.opendlv.assets.trajectory import read_table as read_points_table
 from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run import leases
-from dodo_dsl.run.rigs import devices, permission, quarantine
-from dodo_dsl.run.rigs.devices import identity, key
-from dodo_dsl.run.rigs.motion import motion_of
+from dodo_dsl.run.rigs import leases as rigs_leases
+from dodo_dsl.run.rigs import permission
+from dodo_dsl.run.rigs.leases import device_key, device_leases, identity
+from dodo_dsl.run.rigs.permission import motion_of
 from dodo_dsl.run.rigs.problems import RigProblem
-from dodo_dsl.run.rigs.rig_leases import device_leases
-from dodo_dsl.spec.deployment import machine as operator
-from dodo_dsl.spec.deployment.machine import MachineError, machine
+from dodo_dsl.spec import machine as operator
+from dodo_dsl.spec.machine import MachineError, machine
 from services.base.flags import parse
-from services.continuous_signal.csv_target import read_table
+from services.continuous_signal.target import read_table
 from services.gantry import manual
 from services.gantry.protocol import answer
 from tests.run.helpers import Bench
@@ -115,7 +115,7 @@ def test_all_names_of_a_device_are_one(tmp_path: Path) -> None:
     (tmp_path / "again").symlink_to(tmp_path / "rig")
     names = ["/dev/null", "/dev/../dev/null", str(tmp_path / "rig"), str(tmp_path / "again")]
     assert {identity(name) for name in names} == {"path /dev/null"}
-    assert len({key(name) for name in names}) == len(device_leases(names)) == 1
+    assert len({device_key(name) for name in names}) == len(device_leases(names)) == 1
     assert {identity(f"socket://{host}:4242") for host in ("127.0.0.1", "localhost", "[::1]")} == {"socket 4242"}
     assert device_leases(["socket://127.0.0.1:4242"]) == device_leases(["socket://localhost:4242"]) != []
 
@@ -136,7 +136,7 @@ def test_a_serial_number_is_the_device_s_whatever_port_it_is_in(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["", "emulated", "a\0b", str(Path(__file__))])
 def test_what_is_no_hardware_has_no_identity(name: str) -> None:
     """What is no hardware is not taken for a device."""
-    assert (identity(name), key(name)) == ("", "")
+    assert (identity(name), device_key(name)) == ("", "")
 
 
 @pytest.fixture
@@ -146,7 +146,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("DODO_RIGS", str(tmp_path / "state"))
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
     answers = {"says": "the rig is idle", "x": None}
-    monkeypatch.setattr("dodo_dsl.cli.rig.command.query_exclusively", lambda *_: answers)  # what is behind permission
+    monkeypatch.setattr("dodo_dsl.cli.rig.query_exclusively", lambda *_: answers)  # what is behind permission
     return tmp_path
 
 
@@ -156,7 +156,7 @@ def rig(folder: Path, name: str = "fake", port: str = "/dev/null", **limits: str
 
 
 def test_a_rig_with_another_name_stays_in_quarantine(repository: Path) -> None:
-    quarantine.quarantine("fake", "it has lost steps", ["/dev/null"])
+    rigs_leases.quarantine("fake", "it has lost steps", ["/dev/null"])
     (repository / "link").symlink_to("/dev/null")
     for name, port in (("fake", "/dev/null"), ("renamed", "/dev/null"), ("linked", str(repository / "link"))):
         rig(repository, name, port)
@@ -167,27 +167,27 @@ def test_a_rig_with_another_name_stays_in_quarantine(repository: Path) -> None:
     assert dodo("rig", "clear", "renamed")[0] == 0
     rig(repository)
     assert "in quarantine" not in dodo("rig", "status", "--wait", "0")[1]
-    assert quarantine.all_quarantined() == {}
+    assert rigs_leases.all_quarantined() == {}
 
 
 def test_no_variable_moves_the_quarantine_of_hardware(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     account = pwd.struct_passwd(("a", "x", os.getuid(), 0, "", str(repository / "account"), ""))
-    monkeypatch.setattr(devices, "_SOFTWARE", set())  # the null device counts as hardware
+    monkeypatch.setattr(rigs_leases, "_SOFTWARE", set())  # the null device counts as hardware
     monkeypatch.setattr(pwd, "getpwuid", lambda _: account)
-    quarantine.quarantine("fake", "it has lost steps", ["/dev/null"])
+    rigs_leases.quarantine("fake", "it has lost steps", ["/dev/null"])
     assert list((repository / "account" / ".local" / "state" / "dodo" / "rigs").glob("device-*.json"))
     for name in ("DODO_RIGS", "XDG_STATE_HOME", "HOME"):
         monkeypatch.setenv(name, str(repository / "empty"))
-    assert quarantine.quarantined("renamed", ["/dev/null"]) == "it has lost steps"
-    assert quarantine.all_quarantined() == {"fake": "it has lost steps"}
-    assert quarantine.clear("renamed", ["/dev/null"])
-    assert quarantine.all_quarantined() == {}
+    assert rigs_leases.quarantined("renamed", ["/dev/null"]) == "it has lost steps"
+    assert rigs_leases.all_quarantined() == {"fake": "it has lost steps"}
+    assert rigs_leases.clear("renamed", ["/dev/null"])
+    assert rigs_leases.all_quarantined() == {}
 
 
 @pytest.mark.parametrize("name", ["/dev/null", "/dev/ptmx", "/dev/tty", "/none", "a\0b", "", "emulated", "0"])
 def test_what_is_no_hardware(name: str) -> None:
     """Files, pseudo-terminals and sockets are not taken for hardware."""
-    assert not devices.is_hardware(name)
+    assert not rigs_leases.is_hardware_device(name)
 
 
 # The operator
@@ -312,11 +312,11 @@ def test_places_come_from_the_operator_and_not_from_variables(
 ) -> None:
     places = {"leases": str(repository / "locks"), "quarantine": str(repository / "bad")}
     rules(rigs=permitted(repository), **places)
-    quarantine.quarantine("fake", "it has lost steps", ["/dev/null"])
+    rigs_leases.quarantine("fake", "it has lost steps", ["/dev/null"])
     monkeypatch.setenv("DODO_RIGS", str(repository / "empty"))
     monkeypatch.setenv("DODO_LEASES", str(repository / "mine"))
     monkeypatch.setenv("XDG_STATE_HOME", str(repository / "home"))
-    assert quarantine.quarantined("renamed", ["/dev/null"]) == "it has lost steps"
+    assert rigs_leases.quarantined("renamed", ["/dev/null"]) == "it has lost steps"
     lease = leases.try_lease("cid-121", {})
     assert lease is not None and lease.record.parent == repository / "locks"
     lease.release()
@@ -384,7 +384,7 @@ def test_without_a_file_there_is_nothing_to_permit(repository: Path, monkeypatch
 
 def test_identities_follow_their_own_folder_of_the_kernel() -> None:
     """A device that is not there is known by its path."""
-    assert devices.identity("/dev/does-not-exist") == "path /dev/does-not-exist"
+    assert rigs_leases.identity("/dev/does-not-exist") == "path /dev/does-not-exist"
 
 
 @pytest.mark.parametrize("rig_name", ["", "emulated"])

@@ -17,35 +17,34 @@ import numpy as np
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.inputs import obstacles
-from dodo_dsl.opendlv.inputs.json_node import MapError
-from dodo_dsl.opendlv.inputs.map_file import MAX_OVERLAYS, read_map
-from dodo_dsl.opendlv.inputs.mesh_text import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES
-from dodo_dsl.opendlv.memory.shared_memory import MemoryTakenError, SharedMemory, SharedMemoryError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.odvd.parser import OdvdError
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video import decoder
-from dodo_dsl.opendlv.video.decoder import VideoDecoder
-from dodo_dsl.opendlv.video.picture_size import MAX_PIXELS, picture_size
-from dodo_dsl.rec import truth_files
+from dodo_dsl.opendlv import video as opendlv_video
+from dodo_dsl.opendlv.assets import map_file
+from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.map_file import MAX_OVERLAYS, read_map
+from dodo_dsl.opendlv.assets.mesh_text import MAX_BYTES, MAX_TRIANGLES, MAX_VERTICES
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.odvd import OdvdError
+from dodo_dsl.opendlv.picture_size import MAX_PIXELS, picture_size
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.shared_memory import MemoryTakenError, SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.video import VideoDecoder
+from dodo_dsl.rec import truth
 from dodo_dsl.rec.frames import IMAGE, MOST_DECODERS, decoded
 from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.run.outcomes import Finding
 from dodo_dsl.run.protocol import Flooded, MemoryTaken, Noted
 from dodo_dsl.run.run_state import MOST_NOTES, Ended, RunState
-from dodo_dsl.run.services.service_protocol import read_line
+from dodo_dsl.run.service_protocol import read_line
 from dodo_dsl.spec import registry
 from dodo_dsl.spec.registry import RegistryTooLarge, locate
-from services.camera.files import FileCamera
-from services.rec_recorder import traffic
-from services.rec_recorder.model import RecordingFile
-from services.rec_recorder.traffic import FloodError, Traffic
-from services.scene.draw import scene
-from services.scene.map.meshes import load_obj
-from services.scene.map.textures import load_picture
-from services.virtual_camera.image.overlays import load_with_alpha
+from services.camera.sources import FileCamera
+from services.rec_recorder import model
+from services.rec_recorder.model import FloodError, RecordingFile, Traffic
+from services.scene import scene
+from services.scene.meshes import load_obj
+from services.scene.textures import load_picture
+from services.virtual_camera.optics import load_with_alpha
 from tests.drive.applications import results
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
 from tests.run.helpers import Bench
@@ -85,7 +84,7 @@ def test_pictures_that_unfold_are_refused_by_their_header(tmp_path: Path, kind: 
 
 def test_a_truth_of_such_a_picture_is_refused() -> None:
     with pytest.raises(TruthError, match=f"desk: {TOO_LARGE}"):
-        truth_files.decoded(BOMBS["png"], "desk")
+        truth.decoded(BOMBS["png"], "desk")
 
 
 @pytest.mark.parametrize(
@@ -140,11 +139,11 @@ def test_lines_of_obstacles_are_counted(tmp_path: Path, monkeypatch: pytest.Monk
     """Evaluators measure the distance to each line."""
     written = [{"name": name, "lines": [[0, 0, 1, 1]] * 5} for name in "ab"]
     (tmp_path / "map.json").write_text(json.dumps({"obstacles": written}))
-    monkeypatch.setattr(obstacles, "MAX_LINES", 10)
-    obstacles.read(tmp_path)
-    monkeypatch.setattr(obstacles, "MAX_LINES", 9)
+    monkeypatch.setattr(map_file, "MAX_LINES", 10)
+    map_file.read(tmp_path)
+    monkeypatch.setattr(map_file, "MAX_LINES", 9)
     with pytest.raises(MapError, match="10 lines of obstacles, expected at most 9"):
-        obstacles.read(tmp_path)
+        map_file.read(tmp_path)
 
 
 def test_overlays_are_counted(tmp_path: Path) -> None:
@@ -170,7 +169,7 @@ def test_frames_that_lie_about_their_size_are_not_decoded_either(monkeypatch: py
     packets = [image.payload for image in video(1)]
     data = message_data(packets[0])
     assert VideoDecoder("h264").decode(data) is not None
-    monkeypatch.setattr(decoder, "MAX_PIXELS", WIDTH * HEIGHT - 1)
+    monkeypatch.setattr(opendlv_video, "MAX_PIXELS", WIDTH * HEIGHT - 1)
     assert VideoDecoder("h264").decode(data) is None
 
 
@@ -262,18 +261,18 @@ def test_more_messages_than_a_second_may_have_end_the_recording() -> None:
     for second in range(3):
         clock.now = 5_000_000 + second * 1_000_000
         for stamp in (1, 2):
-            for _ in range(traffic.MOST_OF_A_KIND):
+            for _ in range(model.MOST_OF_A_KIND):
                 counter.add(envelope(5, stamp), 10)
     clock.now += 1_000_000
     counter.add(envelope(5), 10)
-    lost[0] = traffic.MOST_PER_SECOND
+    lost[0] = model.MOST_PER_SECOND
     with pytest.raises(FloodError, match="more than 20000 messages came within a second, most of it 5/0"):
         counter.add(envelope(5), 10)
 
 
 def test_one_kind_of_message_may_not_flood_alone() -> None:
     counter = Traffic(10**9, Clock(), lambda: 0, str)
-    for _ in range(traffic.MOST_OF_A_KIND):
+    for _ in range(model.MOST_OF_A_KIND):
         counter.add(envelope(5, 9), 10)
     with pytest.raises(FloodError, match="more than 10000 messages of a kind came within a second, most of it 5/9"):
         counter.add(envelope(5, 9), 10)
@@ -281,13 +280,13 @@ def test_one_kind_of_message_may_not_flood_alone() -> None:
 
 def test_in_lockstep_the_clock_counts_messages() -> None:
     counter = Traffic(10**9, None, lambda: 0, str)
-    for _ in range(traffic.MOST_PER_SECOND + 1):
+    for _ in range(model.MOST_PER_SECOND + 1):
         counter.add(envelope(5), 10)
 
 
 def test_senders_without_end_take_no_memory() -> None:
     counter = Traffic(10**9, Clock(), lambda: 0, str)
-    for stamp in range(traffic.MOST_OF_A_KIND):
+    for stamp in range(model.MOST_OF_A_KIND):
         counter.add(envelope(5, stamp), 10)
     assert len(counter._bytes) <= 1001
 
@@ -337,8 +336,8 @@ APPLICATIONS = {
 """What they do, and what becomes of their test."""
 BEGIN_OF_ALL = """
 import sys, time
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 cid, name = (word.partition("=")[2] for word in sys.argv[1:])
 session = Session(int(cid))
 reading = session.messages.type("opendlv.proxy.ImageReading")(format="h264", width=4, height=4, data=bytes(60000))

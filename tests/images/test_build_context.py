@@ -19,7 +19,7 @@ def files(folder: Path) -> set[str]:
 def test_context_has_the_bus_and_the_services_and_no_more(tmp_path: Path) -> None:
     build_context.assemble(tmp_path, None)
     found = files(tmp_path)
-    assert {"locks/base.txt", "dodo_dsl/__init__.py", "dodo_dsl/opendlv/odvd/messages.odvd"} <= found
+    assert {"locks/base.txt", "dodo_dsl/__init__.py", "dodo_dsl/opendlv/messages.odvd"} <= found
     assert {"services/base/process.py", "services/collision/service.yml", "services/Dockerfile.dockerignore"} <= found
     assert not [name for name in found if "__pycache__" in name or name.startswith(("dodo_dsl/cli", "wheels", "tests"))]
     assert (tmp_path / "services/base/loop.py").stat().st_mtime == (ROOT / "services/base/loop.py").stat().st_mtime

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit
 from dodo_dsl.cli.main import main
 from dodo_dsl.images.names import NoSuchImage, choose, known
 from dodo_dsl.spec.manifest import load_manifests

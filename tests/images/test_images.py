@@ -197,9 +197,7 @@ def test_camera_shares_memory_with_another_user(built: dict[str, str], volume: s
     words = ("camera", "--map-path=/dodo/files/maps/straight", "--cid=133")
     with started(built["virtual-camera"], volume, *words, flags=flags) as container:
         assert await_health(container) == "healthy"
-        look = (
-            "from dodo_dsl.opendlv.memory.shared_memory import SharedMemory as S; print(S.attach('video0.argb').size)"
-        )
+        look = "from dodo_dsl.opendlv.shared_memory import SharedMemory as S; print(S.attach('video0.argb').size)"
         application = ("--user", "0", "--ipc", f"container:{container}", "--volume", f"{volume}:/tmp")
         assert run(built["vision"], "python3", "-c", look, flags=(*HARDENED, *application)) == str(640 * 480 * 4)
 

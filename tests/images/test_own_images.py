@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import __version__
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit
 from dodo_dsl.cli.main import main
 
 MANIFEST = "layers: [evaluation]\ndescription: Judges.\nprocess: [python, -m, my_services.judge]\n"

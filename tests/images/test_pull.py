@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.cli.exits import Exit
+from dodo_dsl.cli.errors import Exit
 from dodo_dsl.cli.main import main
 from tests.check import examples
 from tests.images.conftest import docker, engine_answers

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.images import wheels
-from dodo_dsl.images.wheels import Python
+from dodo_dsl.images import build_context
+from dodo_dsl.images.build_context import Python
 
 ARM = Python((3, 11), "aarch64", (2, 36))
 
@@ -22,11 +22,11 @@ def test_platforms_go_from_the_base_images_glibc_down_to_manylinux2014() -> None
 
 @pytest.mark.slow
 def test_every_requirement_has_a_wheel_for_64_bit_arm(tmp_path: Path) -> None:
-    folder = wheels.provide(ARM, tmp_path)
+    folder = build_context.provide(ARM, tmp_path)
     names = [path.name for path in folder.iterdir()]
     assert len(names) >= 7
     assert all(name.endswith("aarch64.whl") or name.endswith("-any.whl") for name in names)
-    assert wheels.provide(ARM, tmp_path) == folder
+    assert build_context.provide(ARM, tmp_path) == folder
     assert [path.name for path in tmp_path.iterdir()] == [folder.name]  # nothing half done is left
 
 
@@ -36,6 +36,8 @@ def test_what_pip_cannot_download_is_one_sentence_and_leaves_nothing(
 ) -> None:
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.delenv("PIP_FIND_LINKS", raising=False)
-    with pytest.raises(wheels.WheelsError, match=r"cannot download wheels for Python 3\.11 on aarch64: ERROR: \S"):
-        wheels.provide(ARM, tmp_path)
+    with pytest.raises(
+        build_context.WheelsError, match=r"cannot download wheels for Python 3\.11 on aarch64: ERROR: \S"
+    ):
+        build_context.provide(ARM, tmp_path)
     assert list(tmp_path.iterdir()) == []

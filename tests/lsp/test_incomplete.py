@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.lsp.incomplete import cursor
-from dodo_dsl.lsp.tree import Steps
+from dodo_dsl.lsp.completion import cursor
+from dodo_dsl.lsp.documents import Steps
 from tests.lsp.conftest import SPEC
 
 HEAD = "name: x\nenvironment:\n  camera:"

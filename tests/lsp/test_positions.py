@@ -8,7 +8,7 @@ from lsprotocol.types import Position
 from pygls.workspace import PositionCodec
 
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.lsp.positions import Lines
+from dodo_dsl.lsp.documents import Lines
 
 TEXTS = st.text(st.sampled_from("ab: \n\r\x85\u2028ä€🚗"), max_size=30)
 CODECS = st.sampled_from([PositionCodec("utf-16"), PositionCodec("utf-8"), PositionCodec("utf-32")])

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.lsp.project import Projects
-from dodo_dsl.lsp.texts import Texts
+from dodo_dsl.lsp.project import Projects, Texts
 from tests.lsp.conftest import COMPOSE, DEPLOYMENT, LONGER, SPEC, Repository
 
 SPECS = (

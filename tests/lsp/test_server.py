@@ -11,7 +11,7 @@ import pytest
 
 from dodo_dsl import advice
 from dodo_dsl.cli.main import main
-from dodo_dsl.lsp import listeners, server
+from dodo_dsl.lsp import server
 from tests.lsp.conftest import LONGER, SPEC, Repository
 from tests.lsp.editor import PATIENCE_S, Editor, Message, editor
 
@@ -163,7 +163,7 @@ def test_an_internal_error_is_a_message_of_the_log(monkeypatch: pytest.MonkeyPat
     written = io.BytesIO()
 
     async def check() -> None:
-        one = listeners.build()
+        one = server.build()
         one.protocol.set_writer(written)  # type: ignore[arg-type]
         monkeypatch.setattr(one.protocol, "_workspace", server_workspace())
         one._stale.set()

@@ -12,17 +12,15 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import versions
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
-from dodo_dsl.opendlv.odvd.field_types import INTEGER_BITS, integer_range
-from dodo_dsl.opendlv.odvd.parser import Field, load
+from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.odvd import INTEGER_BITS, STANDARD, STANDARD_0_9, Field, integer_range, load
 
 pytestmark = pytest.mark.slow
 
 TOOLS = Path(sys.executable).parent
-FILES = {STANDARD: MessageSet.standard(), STANDARD_0_9: versions.load(versions.OLD)}
+FILES = {STANDARD: MessageSet.standard(), STANDARD_0_9: message_versions.load(message_versions.OLD)}
 each_file = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 
 

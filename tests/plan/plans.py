@@ -5,7 +5,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from dodo_dsl.plan.model import Application, ApplicationService, Flag, Lockstep, Place, Plan, PlannedService
-from dodo_dsl.spec.goals import Goal
+from dodo_dsl.spec.model import Goal
 
 BASE = Plan(
     name="drive[light=dark]",

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.plan.addresses import OutOfAddresses, cids, prefix, subnet, subnets
-from dodo_dsl.spec.deployment.deployment import Deployment
+from dodo_dsl.spec.deployment import Deployment
 
 RANGE = Deployment.cids
 

@@ -8,8 +8,8 @@ import pytest
 from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.plan.build import Compiled, build, isolation
 from dodo_dsl.plan.model import Flag, Place, Plan
-from dodo_dsl.spec.deployment.rig import Rig, emulated
-from dodo_dsl.spec.settings import Settings
+from dodo_dsl.spec.load import Settings
+from dodo_dsl.spec.rig import Rig, emulated
 from tests.check.contexts import checked, resolved
 from tests.source.nodes import mapping
 

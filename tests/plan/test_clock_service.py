@@ -6,7 +6,7 @@ import pytest
 
 from dodo_dsl.application.model import Declared
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.plan.clock_service import CLOCK, clock, lockstep
+from dodo_dsl.plan.added_services import CLOCK, clock, lockstep
 from dodo_dsl.plan.model import Lockstep
 from dodo_dsl.spec.manifest import load_manifests
 from tests.check.contexts import resolved

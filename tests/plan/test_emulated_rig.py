@@ -1,6 +1,6 @@
 """The virtual camera of an emulated rig."""
 
-from dodo_dsl.plan.emulated_rig import hardware
+from dodo_dsl.plan.added_services import hardware
 from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.spec.manifest import load_manifests
 

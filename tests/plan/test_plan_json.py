@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 from dodo_dsl.plan.model import Lockstep, Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json, to_json
-from dodo_dsl.spec.settings import Settings
+from dodo_dsl.spec.load import Settings
 from tests.plan.plans import BASE, plans
 
 

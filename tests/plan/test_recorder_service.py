@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.plan.added_services import recorder
 from dodo_dsl.plan.model import Flag
-from dodo_dsl.plan.recorder_service import recorder
 from dodo_dsl.spec.manifest import load_manifests
 from tests.check.contexts import resolved
 

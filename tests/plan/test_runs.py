@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from dodo_dsl.plan.model import Pooled
 from dodo_dsl.plan.plan_json import from_json, to_json
-from dodo_dsl.plan.pools import by_test, named, pooled
-from dodo_dsl.plan.runs import Run, runs
+from dodo_dsl.plan.runs import Run, by_test, named, pooled, runs
 from tests.plan.plans import BASE
 
 OTHER = replace(BASE, name="find", slug="find")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.plan.trace import trace, traced
+from dodo_dsl.run.docker.compose import trace, traced
 from tests.plan.plans import BASE
 
 

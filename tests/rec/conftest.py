@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
 
 MESSAGES = MessageSet.standard()
 BEGIN = 1_700_000_000_000_000

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.session import Session
 from tests.rec.conftest import BEGIN, dodo_rec, message, video
 
 pytestmark = pytest.mark.slow

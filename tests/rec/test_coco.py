@@ -5,8 +5,8 @@ from pathlib import Path
 import cv2
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.rec.truth import Mark, text
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.rec.truth import Mark, truth_text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 PREFIX = "opendlv.logic.perception.Detection"
@@ -65,7 +65,7 @@ def test_all_frames_as_jpeg(drive: Path, tmp_path: Path) -> None:
 def test_the_boxes_of_a_truth_for_every_frame(drive: Path, tmp_path: Path) -> None:
     truth = tmp_path / "truth.json"
     marks = [Mark("yellow", 0, 4, 8, 6), Mark("blue", 20, 10, 4, 4)]
-    truth.write_text(text(marks, "desk.png", 2 * WIDTH, 2 * HEIGHT))
+    truth.write_text(truth_text(marks, "desk.png", 2 * WIDTH, 2 * HEIGHT))
     answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--truth", truth)
     assert answer.stdout.endswith("12 frames with 24 boxes\n")
     found = json.loads((tmp_path / "set" / "annotations.json").read_text())
@@ -79,11 +79,15 @@ def test_the_boxes_of_a_truth_for_every_frame(drive: Path, tmp_path: Path) -> No
     ("content", "words", "sentence"),
     [
         ("{", (), "cannot be read as COCO JSON"),
-        (text([Mark("yellow", 0, 4, 8, 6)], "", 7, 7), (), "box 1 (yellow 0 4 8 6): lies outside"),
-        (text([], "", 7, 7).replace("7,", "0,"), (), "images[0].width: expected a whole number of pixels above 0"),
+        (truth_text([Mark("yellow", 0, 4, 8, 6)], "", 7, 7), (), "box 1 (yellow 0 4 8 6): lies outside"),
+        (
+            truth_text([], "", 7, 7).replace("7,", "0,"),
+            (),
+            "images[0].width: expected a whole number of pixels above 0",
+        ),
         ('{"images": []}', (), "has 0 images, expected one picture"),
-        (text([], "", 7, 7), ("--labels", "3"), "--truth and --labels exclude each other"),
-        (text([], "", 7, 7), (), "truth.json: has no box"),
+        (truth_text([], "", 7, 7), ("--labels", "3"), "--truth and --labels exclude each other"),
+        (truth_text([], "", 7, 7), (), "truth.json: has no box"),
     ],
 )
 def test_a_truth_that_is_none(drive: Path, tmp_path: Path, content: str, words: tuple[str, ...], sentence: str) -> None:

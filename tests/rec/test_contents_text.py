@@ -4,9 +4,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from dodo_dsl.opendlv.recordings.damage import Damage
-from dodo_dsl.rec.contents import Contents, Frames, MessageStream
-from dodo_dsl.rec.contents_text import contents_text
+from dodo_dsl.opendlv.recording import Damage
+from dodo_dsl.rec.contents import Contents, Frames, MessageStream, contents_text
 
 STREAMS = [MessageStream(19, "opendlv.Name", 0, 3, 30, 2.0, 0.75), MessageStream(8000, None, 12, 1, 10, None, None)]
 FOUND = Contents(900, 4, 1_700_000_000.5, 1.5, 0, 0, 0, "1.0", STREAMS, Frames(0, None))

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
-from dodo_dsl.opendlv.odvd.parser import load
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9, load
 from tests.opendlv.test_against_libcluon import some_value
 from tests.rec.conftest import BEGIN, MESSAGES, dodo_rec, message
 

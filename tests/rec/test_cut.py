@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.recording import read_envelopes
 from tests.rec.conftest import BEGIN, dodo_rec, message
 
 STEERING, DISTANCE = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.DistanceReading"

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.rec.parts import SplitError, split
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.rec.steering import SplitError, split
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 PREFIX = "opendlv.logic.perception.Detection"

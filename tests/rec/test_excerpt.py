@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec.excerpt import Excerpt, NothingSelected
 from tests.rec.conftest import BEGIN, MESSAGES, message
 

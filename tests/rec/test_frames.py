@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec.frames import IMAGE, decoded, packets
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, message, video
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.rec.truth import Mark, TruthError, check, drawn, mark, read, text
-from services.object_detection.truth import load
+from dodo_dsl.rec.truth import Mark, TruthError, check, drawn_boxes, mark, read, truth_text
+from services.object_detection.boxes import load
 
 WIDTH, HEIGHT = 640, 480
 starts = st.integers(0, 400).map(lambda thousandth: thousandth / 1.25)
@@ -36,7 +36,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.thorough
 def test_what_is_written_is_read_here_and_by_the_evaluator(path: Path, written: list[Mark]) -> None:
     check(written, WIDTH, HEIGHT, ())
-    path.write_text(text(written, "truth.png", WIDTH, HEIGHT))
+    path.write_text(truth_text(written, "truth.png", WIDTH, HEIGHT))
     assert read(path, WIDTH, HEIGHT) == written
     (things,) = load(path, "one").pictures.values()
     assert [thing.label for thing in things] == [each.label for each in written]
@@ -87,7 +87,7 @@ def test_a_file_too_deep_or_too_large(tmp_path: Path) -> None:
 def test_boxes_are_drawn_where_they_are(width: int) -> None:
     picture = np.zeros((48, width, 3), np.uint8)
     scale = 2 if width == 64 else 1
-    shown = drawn(picture, [mark("yellow", (10, 20, 30, 16), "box"), mark("blue", (50, 22, 9, 9), "box")])
+    shown = drawn_boxes(picture, [mark("yellow", (10, 20, 30, 16), "box"), mark("blue", (50, 22, 9, 9), "box")])
     assert shown.shape == (48 * scale, width * scale, 3)
     lit = shown.any(axis=2)
     assert lit[20 * scale, 10 * scale : 39 * scale].all() and lit[20 * scale : 35 * scale, 10 * scale].all()

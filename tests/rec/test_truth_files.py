@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dodo_dsl.atomic import OutputExists, refuse_existing
 from dodo_dsl.rec import truth
-from dodo_dsl.rec.outputs import OutputExists, refuse_existing
-from dodo_dsl.rec.truth import Mark, TruthError
-from dodo_dsl.rec.truth_files import TruthFiles, decoded, given
+from dodo_dsl.rec.truth import Mark, TruthError, TruthFiles, decoded, given
 
 PICTURE = np.full((48, 64, 3), 90, np.uint8)
 

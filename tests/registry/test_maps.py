@@ -12,8 +12,8 @@ import pytest
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
 
 MAPS = package_data.registry() / "maps"
 OPEN = ["left-curve", "rig-straight", "straight"]

@@ -14,8 +14,8 @@ import yaml
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
 
 REGISTRY = package_data.registry()
 KIWI = package_data.root() / "examples" / "kiwi"

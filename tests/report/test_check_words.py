@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.report.check_words import line, only_follows
+from dodo_dsl.report.comparison import line, only_follows
 
 
 def check(name: str, value: float | None, ok: bool, unit: str = "m", **limit: float) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.report.drawn import Drawings
+from dodo_dsl.report.next_report import Drawings
 from dodo_dsl.report.report_folder import Drawable, write_report
 from dodo_dsl.report.viewer import page
 from tests.report.test_report_folder import OUTCOME, frame, recording

@@ -2,9 +2,8 @@
 
 from dataclasses import replace
 
-from dodo_dsl.margins import with_margin
-from dodo_dsl.outcome import ServiceUse
-from dodo_dsl.report.metrics import to_text
+from dodo_dsl.outcome import ServiceUse, with_margin
+from dodo_dsl.report.for_gitlab import to_text
 from tests.report.test_report_folder import OUTCOME
 
 CHECKS = (

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.margins import with_margin
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.report import results
+from dodo_dsl.report.overview import MEANINGS
 from dodo_dsl.report.report_folder import Drawable, forget, write_report
-from dodo_dsl.report.suite.html import MEANINGS
 from tests.run.helpers import Bench
 
 OUTCOME = Outcome(

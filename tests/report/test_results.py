@@ -13,11 +13,10 @@ import pytest
 
 from dodo_dsl.outcome import MachineLoad, NotRun, Response, ServiceUse, Wait
 from dodo_dsl.report import results
-from dodo_dsl.report.changes.comparison import compare
-from dodo_dsl.report.given_report import GivenReport
+from dodo_dsl.report.comparison import compare
 from dodo_dsl.report.report_folder import forget, write_report, write_summaries
-from dodo_dsl.report.run_record import Repository, RunRecord
-from dodo_dsl.spec.goals import Goal
+from dodo_dsl.report.results import GivenReport, Repository, RunRecord
+from dodo_dsl.spec.model import Goal
 from tests.report.test_report_folder import OUTCOME
 
 
@@ -119,7 +118,7 @@ def test_tests_that_never_began_have_no_outcome_and_are_skipped(tmp_path: Path) 
         not_run=(replace(NOT_RUN, spec="b\udcff"), replace(NOT_RUN, name="<c>", slug="c"))
     )
     write_report(tmp_path, [OUTCOME], {}, circumstances=circumstances)
-    found = results.read(tmp_path / "results.json")
+    found = results.read_results(tmp_path / "results.json")
     assert [test.slug for test in found.circumstances.not_run] == ["b--light-1", "c"]
     assert results.load(tmp_path / "results.json") == [OUTCOME]
     cases = ElementTree.parse(tmp_path / "junit.xml").findall(".//testcase")
@@ -143,7 +142,7 @@ RUN = RunRecord(
 
 def test_results_and_page_say_of_which_run_they_are(tmp_path: Path) -> None:
     write_report(tmp_path, [OUTCOME], {}, circumstances=results.Circumstances((RUN,)))
-    assert results.read(tmp_path / "results.json").circumstances.runs == (RUN,)
+    assert results.read_results(tmp_path / "results.json").circumstances.runs == (RUN,)
     page = (tmp_path / "index.html").read_text()
     said = (
         f"2026-11-23 04:10 UTC on a-&lt;host&gt; with DoDo 0.1.0, tests at commit {'a' * 12} with uncommitted changes"
@@ -184,7 +183,7 @@ def objects(value: Any, path: str = "$") -> Iterator[tuple[str, dict[str, Any]]]
 def test_an_unknown_key_of_results_is_told_where_it_is(tmp_path: Path) -> None:
     text = results.to_json([WHOLE], results.Circumstances((RUN,), (NOT_RUN,)))
     (tmp_path / "results.json").write_text(text)
-    results.read(tmp_path / "results.json")
+    results.read_results(tmp_path / "results.json")
     document = json.loads(text)
     places = [place for place in objects(document) if not place[0].endswith(NAMES)]
     assert len(places) >= 14
@@ -192,11 +191,11 @@ def test_an_unknown_key_of_results_is_told_where_it_is(tmp_path: Path) -> None:
         inner["zzq"] = 1
         (tmp_path / "results.json").write_text(json.dumps(document))
         with pytest.raises(results.ResultsError, match=re.escape(f"({path}: unknown key 'zzq')")):
-            results.read(tmp_path / "results.json")
+            results.read_results(tmp_path / "results.json")
         del inner["zzq"]
 
 
 def test_an_almost_known_key_of_results_is_told(tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text(results.to_json([WHOLE]).replace('"notes"', '"nots"'))
     with pytest.raises(results.ResultsError, match=r"\$\.tests\[0\]: unknown key 'nots'; did you mean 'notes'\?"):
-        results.read(tmp_path / "results.json")
+        results.read_results(tmp_path / "results.json")

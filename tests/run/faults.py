@@ -14,7 +14,7 @@ from tests.faults import Book
 from tests.run.helpers import BEGUN, DRIVES, FAIL, PASS, READY, WAIT
 
 SHARES = """
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 name = sys.argv[2].partition("=")[2]
 memory = SharedMemory.create(name, 1000)
 print("memory", name, flush=True)

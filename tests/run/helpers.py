@@ -12,9 +12,9 @@ from pathlib import Path
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
 from dodo_dsl.run.backends import Backends, Job, Processes
+from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
-from dodo_dsl.run.standing import Standing
 
 READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
 PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.load.service_use import Used
-from dodo_dsl.run.load.snapshot import Snapshot, Times
+from dodo_dsl.run.machine_load.service_use import Used
+from dodo_dsl.run.machine_load.snapshot import Snapshot, Times
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, VerdictEvent
 
 T = TypeVar("T")

@@ -17,12 +17,12 @@ from dodo_dsl.run.engine import (
     READY_PATIENCE_S,
     Engine,
 )
-from dodo_dsl.run.load import shortage
-from dodo_dsl.run.load.service_use import Used
-from dodo_dsl.run.load.shortage import Shortage
-from dodo_dsl.run.load.snapshot import Snapshot
-from dodo_dsl.run.load.use_judgement import UNSEEN
-from dodo_dsl.run.load.use_series import UseMeter
+from dodo_dsl.run.machine_load import shortage
+from dodo_dsl.run.machine_load.judgement import UNSEEN_USE
+from dodo_dsl.run.machine_load.meter import UseMeter
+from dodo_dsl.run.machine_load.service_use import Used
+from dodo_dsl.run.machine_load.shortage import Shortage
+from dodo_dsl.run.machine_load.snapshot import Snapshot
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
@@ -41,10 +41,9 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
-from dodo_dsl.run.run_state import MEMORY_KILL
-from dodo_dsl.run.services.conditions import LONGEST_S
-from dodo_dsl.run.standing import Standing
-from dodo_dsl.spec.resource_limits import ResourceLimits
+from dodo_dsl.run.run_state import MEMORY_KILL, Standing
+from dodo_dsl.run.start_order import LONGEST_S
+from dodo_dsl.spec.model import ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
 
 ENDED = Exited("track", 0)
@@ -210,7 +209,7 @@ def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
 
     found = outcome(using(broken, resources=ResourceLimits(max_memory_mb=200.0)))
     assert (found.outcome, found.resources) == ("passed", ())
-    assert found.notes == (UNSEEN, "what the application used was not measured to the end: OSError: gone")[::-1]
+    assert found.notes == (UNSEEN_USE, "what the application used was not measured to the end: OSError: gone")[::-1]
     assert outcome(using(lambda _: None)).notes == ()
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import files_of_tests as module
-from dodo_dsl.run.files_of_tests import MOST_HIDDEN, MOST_IN_FOLDER, files_of_tests, in_few
+from dodo_dsl.run import application_files as module
+from dodo_dsl.run.application_files import MOST_HIDDEN, MOST_IN_FOLDER, files_of_tests, in_few
 
 REPORT, PLAN, MAP = '{\n  "dodo": "results",', '{\n  "dodo": "plan",', '{"model": []}'
 SPEC = """\

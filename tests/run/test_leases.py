@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import lease_queue, leases
+from dodo_dsl.run import leases
 from dodo_dsl.run.leases import Lease, LeaseTimeout
 from tests.run.desk import ROOT
 from tests.run.scripted import run
@@ -282,11 +282,11 @@ def test_a_damaged_ticket_holds_up_nobody(folder: Path, text: str) -> None:
 
 def test_all_that_is_waited_for_within_a_turn_keeps_its_place(folder: Path) -> None:
     """A test that has waited for one lease is not the last again for the next."""
-    with lease_queue.arrived():
-        since = lease_queue.now()
-        with lease_queue.ticket(folder, ["cid-121"], since):
+    with leases.arrived():
+        since = leases.arrival_time()
+        with leases.ticket(folder, ["cid-121"], since):
             (asyncio.run(leases.lease_any(["cid-121"], {}, print))).release()
-    assert lease_queue.now() > since
+    assert leases.arrival_time() > since
 
 
 def test_waiting_has_a_limit(folder: Path) -> None:

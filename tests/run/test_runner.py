@@ -11,8 +11,8 @@ import pytest
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan
+from dodo_dsl.run.application_files import files_of_tests
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.files_of_tests import files_of_tests
 from dodo_dsl.run.protocol import BackendError, Exited, VerdictEvent
 from dodo_dsl.run.runner import Policy, Runner, default_backend
 from dodo_dsl.run.schedule import Schedule

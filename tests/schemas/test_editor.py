@@ -9,8 +9,8 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from dodo_dsl import package_data
+from dodo_dsl.lsp import editor_schema
 from dodo_dsl.spec.manifest import load_manifests
-from dodo_dsl.spec.schema import editor_schema
 
 MANIFESTS, _ = load_manifests()
 SPECS = sorted(package_data.registry().glob("*/*.dodo.yml"))

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli import search_session
-from dodo_dsl.margins import with_margin
+from dodo_dsl.outcome import with_margin
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.load import shortage
+from dodo_dsl.run.machine_load import shortage
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
 from tests.check import examples
 from tests.run import scripted

@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from dodo_dsl.search import sampling_order
-from dodo_dsl.search.sampling_order import FIRST, PATIENCE, PROPOSED, SWEPT, Candidate, SamplingOrder, key
+from dodo_dsl.search import search_loop
+from dodo_dsl.search.search_loop import FIRST, PATIENCE, PROPOSED, SWEPT, Candidate, SamplingOrder, key
 from dodo_dsl.search.space import Space, sweep, texts
 from tests.search.test_space import space
 
@@ -77,7 +77,7 @@ def of_each(failing: bool) -> list[list[bool]]:
 def test_the_sweep_gets_more_where_proposals_find_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is proposed: here further points of a sweep."""
     others = sweep(SPACE, 256, 7)
-    monkeypatch.setattr(sampling_order, "propose", lambda *words: list(itertools.islice(others, words[3])))
+    monkeypatch.setattr(search_loop, "propose", lambda *words: list(itertools.islice(others, words[3])))
     patient, impatient = [True] * SWEPT + [False] * PROPOSED, [True] * 7 + [False]
     _, *generations = of_each(failing=False)
     assert generations == [patient] * PATIENCE + [impatient] * 3

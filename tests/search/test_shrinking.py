@@ -11,7 +11,7 @@ import pytest
 from dodo_dsl.search.shrinking import changed, most_drives, name_of, nearest, shrink
 from dodo_dsl.search.space import texts
 from dodo_dsl.search.store import Drive
-from dodo_dsl.spec.instances.vary import Values
+from dodo_dsl.spec.vary import Values
 from tests.search.test_space import space
 
 SPACE = space(

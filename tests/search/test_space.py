@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.search.space import Space, nominal, sweep, texts
-from dodo_dsl.spec.instances import vary
+from dodo_dsl.spec import vary
 from tests.source.nodes import mapping
 
 

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context
-from services.base.flags import parse
-from services.base.manifest import load_manifest
+from services.base.flags import load_manifest, parse
 from tests.services.process import ROOT
 
 MESSAGES = MessageSet.standard()

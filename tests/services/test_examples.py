@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from services.base.manifest import load_manifest
-from services.base.usage import example_line
+from services.base.flags import example_line, load_manifest
 from tests.services.gantry.fake_rig import FakeRig
 from tests.services.process import PATIENCE, ROOT
 

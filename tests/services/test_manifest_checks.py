@@ -7,11 +7,9 @@ from pathlib import Path
 import yaml
 
 from services.base import Check
-from services.collision.measures import DriveMeasures
-from services.collision.requests import Requests
+from services.collision.model import DriveMeasures, Requests
 from services.continuous_signal.measures import SignalLimits, SignalMeasures
-from services.object_detection.counts import Counts, CountsByClass
-from services.object_detection.score import DetectionLimits, Score
+from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score
 
 SERVICES = Path(__file__).parents[2] / "services"
 

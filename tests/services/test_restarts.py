@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.session import Session
 from tests.services.process import PATIENCE, ROOT, receive, running
 
 FRAME, IMAGE = 1003, 1055

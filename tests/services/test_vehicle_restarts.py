@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.session import Session
 from tests.services.process import PATIENCE, receive, running, send
 
 FRAME, STATE, PEDAL = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.proxy.PedalPositionRequest"

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import argument, resolved, written
-from dodo_dsl.spec.deployment.rig import Rig
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.registry import Location
+from dodo_dsl.spec.rig import Rig
 from tests.source.nodes import mapping, value
 
 RATE = Parameter("freq", "number", "Rate.", unit="Hz", default=10, minimum=1)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dodo_dsl.spec.goals import Goal, is_goal
+from dodo_dsl.spec.model import Goal, is_goal
 
 
 @pytest.mark.parametrize(

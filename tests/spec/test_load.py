@@ -4,8 +4,8 @@ from pathlib import Path
 
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.instances.matrix import Choice
 from dodo_dsl.spec.load import load_spec, varied
+from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location
 from tests.check import examples

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.spec.manifest_consistency import problems
+from dodo_dsl.spec.manifest import inconsistencies
 from tests.source.nodes import mapping
 
 PARAMETERS = {
@@ -30,7 +30,7 @@ GOOD = [
 
 
 def messages(text: str) -> list[str]:
-    return [problem.message for problem in problems(mapping(text))]
+    return [problem.message for problem in inconsistencies(mapping(text))]
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS)

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.spec.load import load_spec
-from dodo_dsl.spec.model import Spec
+from dodo_dsl.spec.model import ResourceLimits, Spec
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.resource_limits import ResourceLimits
 from tests.check import examples
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl.compiler import Sources, load
 from dodo_dsl.source import resolve
-from dodo_dsl.spec.names import KEYWORDS, is_free, near
+from dodo_dsl.spec.registry import KEYWORDS, is_free, near
 from tests.check import examples
 
 NAMING = ("wrong-type", "wrong-value", "missing-key", "name-differs", "name-reserved")

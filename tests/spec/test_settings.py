@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.diagnostics import Span
+from dodo_dsl.spec.load import Settings, applied
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.settings import Settings, applied
 
 SPEC = Spec(
     Location(Path("/r/a/a.dodo.yml"), Path("/r")),

@@ -22,22 +22,24 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))  # the services of this checkout
 
-from dodo_dsl.opendlv.bus.envelope import Envelope  # noqa: E402
-from dodo_dsl.opendlv.memory import pixels  # noqa: E402
-from dodo_dsl.opendlv.messages.message_set import MessageSet  # noqa: E402
-from dodo_dsl.opendlv.video.encoder import FORMAT, VideoEncoder  # noqa: E402
+from dodo_dsl.opendlv import pixels  # noqa: E402
+from dodo_dsl.opendlv.envelope import Envelope  # noqa: E402
+from dodo_dsl.opendlv.message_set import MessageSet  # noqa: E402
+from dodo_dsl.opendlv.video import FORMAT, VideoEncoder  # noqa: E402
 from services.dynamic_model.model import Vehicle  # noqa: E402
-from services.integrator.model import BodyPose, Integrator, Twist  # noqa: E402
-from services.integrator.rotation import quaternion  # noqa: E402
+from services.integrator.model import (  # noqa: E402
+    BodyPose,
+    Integrator,
+    Twist,
+    quaternion,
+)
 from services.rec_recorder.model import RecordingFile  # noqa: E402
-from services.scene.camera import Pinhole  # noqa: E402
-from services.scene.draw.render import Renderer  # noqa: E402
-from services.scene.draw.scene import SceneOptions, load_scene  # noqa: E402
+from services.scene.camera import Pinhole, mount  # noqa: E402
 from services.scene.lens import Distortion  # noqa: E402
-from services.scene.vehicle import mount  # noqa: E402
-from services.virtual_camera.image.optics import Optics  # noqa: E402
-from services.virtual_camera.image.sensor import Sensor  # noqa: E402
+from services.scene.render import Renderer  # noqa: E402
+from services.scene.scene import SceneOptions, load_scene  # noqa: E402
 from services.virtual_camera.model import VirtualCamera  # noqa: E402
+from services.virtual_camera.optics import Optics, Sensor  # noqa: E402
 
 BEGIN = 1_700_000_000_000_000  # us since the epoch
 SIZE, FOVY, ABOVE = (640, 480), math.radians(48.8), 0.095

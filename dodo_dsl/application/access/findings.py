@@ -15,7 +15,7 @@ from dodo_dsl.application.access.model import Access, AccessFinding, Look, Steps
 from dodo_dsl.application.access.value_findings import OWN_VOLUMES
 from dodo_dsl.application.model import FILES
 from dodo_dsl.application.mounts import within_another
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _SERVICES = "services"
 _CALLED = {"": "'{name}'", "build": "the build of '{name}'", "volumes.*": "a mount of '{name}'"}

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from dodo_dsl.application.access.model import AccessFinding, Look, Steps, at, items
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 Findings = Iterator[AccessFinding]
 CPU_SHARES = 1024

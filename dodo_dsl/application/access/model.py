@@ -24,7 +24,7 @@ from dodo_dsl import source
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.diagnostics import Diagnostic, Fix, Severity, Span, did_you_mean, only_fix
 from dodo_dsl.source import Node, Scalar
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 Steps = tuple[str | int, ...]
 Kind = Literal["refused", "unknown", "hardware", "privilege", "left out", "port", "limit", "unlimited"]

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from dodo_dsl.application import host_access
-from dodo_dsl.application.access import limit_findings, rig_ports, secret_variables
+from dodo_dsl.application.access import host_paths, limit_findings, secret_variables
 from dodo_dsl.application.access.host_paths import ASK, INSIDE, HostPaths
 from dodo_dsl.application.access.model import AccessFinding, Check, Look, Steps, at, items
 from dodo_dsl.diagnostics import did_you_mean
@@ -132,7 +132,7 @@ def logging(service: Values, look: Look) -> Findings:
 def devices(service: Values, look: Look) -> Findings:
     for item, word in items(service, "devices"):
         shown, steps = (word.get("source"), (*item, "source")) if isinstance(word, dict) else (word, item)
-        source = rig_ports.source(word)
+        source = host_paths.source(word)
         if link := look.paths.link(source):
             message = f"device '{shown}' is a symbolic link to '{link}', outside the repository"
             yield AccessFinding(steps, message, "name the device itself")
@@ -140,7 +140,7 @@ def devices(service: Values, look: Look) -> Findings:
             yield AccessFinding(steps, f"device '{shown}' {_CDI}", "name a file below /dev")
         elif any(map(host_access.is_of_machine, (shown, *look.paths.names(source)))):
             yield AccessFinding(steps, f"device '{shown}' gives access to the host's disks or memory", "remove it")
-        elif rig_ports.holds_port(source, look.ports):
+        elif host_paths.holds_port(source, look.ports):
             yield _port(steps, f"device '{shown}' of '{look.name}'")
         else:
             yield AccessFinding(steps, f"device '{shown}' of '{look.name}' {_WITHOUT}", kind="hardware")
@@ -148,7 +148,7 @@ def devices(service: Values, look: Look) -> Findings:
 
 def device_rules(service: Values, look: Look) -> Findings:
     for steps, word in items(service, "device_cgroup_rules"):
-        if rig_ports.is_rule_for_port(word, look.ports):
+        if host_paths.is_rule_for_port(word, look.ports):
             yield _port(steps, f"rule '{word}' of '{look.name}'")
         elif "$" in str(word) or _RULE_OF_CHARACTERS.fullmatch(str(word)):
             yield AccessFinding(steps, f"device '{word}' of '{look.name}' {_WITHOUT}", kind="hardware")
@@ -172,7 +172,7 @@ def processors(service: Values, look: Look) -> Findings:
 
 
 def _port(steps: Steps, what: str) -> AccessFinding:
-    return AccessFinding(steps, f"{what} {rig_ports.WHY}", rig_ports.HINT, "port")
+    return AccessFinding(steps, f"{what} {host_paths.WHY}", host_paths.HINT, "port")
 
 
 def mounts(service: Values, look: Look) -> Findings:
@@ -205,7 +205,7 @@ def _bind(found: host_access.Mount, look: Look) -> Findings:
     elif any(host_access.is_of_machine(seen.source) for seen in every):
         message = f"{_called(source, paths)} gives access to the host's disks or memory"
         yield AccessFinding((), message, "remove it")
-    elif any(rig_ports.is_port(seen.source, look.ports) for seen in every):
+    elif any(host_paths.is_port(seen.source, look.ports) for seen in every):
         yield _port((), f"'{source}' of '{look.name}'")
     elif source.startswith(("/", "~")) and all(map(host_access.is_hardware, every)) and not paths.link(source):
         yield AccessFinding((), f"'{source}' of '{look.name}' {_WITHOUT}", kind="hardware")

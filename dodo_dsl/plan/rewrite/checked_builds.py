@@ -16,7 +16,7 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, enviro
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Entry
 from dodo_dsl.source import Mapping as Node
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _LEFT_OUT = (*removed(BUILD), "privileged", "ssh")
 

@@ -13,14 +13,14 @@ from dodo_dsl.application.access.model import Look
 from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.compose_files import text_of
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, Word, environment, plain, text
-from dodo_dsl.application.test_variables import with_variables
+from dodo_dsl.application.variables import with_variables
 from dodo_dsl.plan.model import STARTED, Application, ApplicationService
-from dodo_dsl.plan.rewrite import cid_and_image, confinement, service_namespaces, volumes
+from dodo_dsl.plan.rewrite import confinement, service_copy, service_namespaces, volumes
 from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy, Setting
 from dodo_dsl.source import Node, Scalar
 
 _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
-    cid_and_image.assign_image,
+    service_copy.assign_image,
     confinement.remove_machine_settings,
     confinement.remove_hardware,
     confinement.confine,
@@ -90,7 +90,7 @@ def _copied(service: ComposeService, node: Node, project: Project, changes: list
     """The service rewritten, without keys that have no value, most of which compose refuses."""
     kept = {key: value for key, value in _with_values(plain(node)).items() if key not in KEYS}
     copy = ServiceCopy(service.name, kept, project, changes)
-    cid_and_image.assign_cid(copy, service.cid_variables)
+    service_copy.assign_cid(copy, service.cid_variables)
     for step in _STEPS:
         step(copy)
     _note_others(copy, _with_values(plain(service.node)), _with_values(plain(node)))

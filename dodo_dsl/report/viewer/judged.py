@@ -16,8 +16,8 @@ import numpy as np
 from dodo_dsl.log_times import JUDGED_SUFFIX
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.report import check_words
-from dodo_dsl.report.pictures.trajectory import Way
+from dodo_dsl.report import comparison
+from dodo_dsl.report.trajectory import Way
 from dodo_dsl.report.viewer.encoded import packed, shown
 from dodo_dsl.report.viewer.recorded import MICROSECONDS, Values
 
@@ -136,9 +136,9 @@ def _about(service: str, line: Mapping[str, Any]) -> dict[str, Any]:
     unit, exclusive = shown(line.get("unit") or "", 40), bool(line.get("exclusive"))
     limits = [
         "" if band is None else f"band ±{band:.4g}",
-        "" if low is None else check_words.bound("min", low, unit, exclusive),
-        "" if high is None else check_words.bound("max", high, unit, exclusive),
-        "" if distance is None else f"distance {check_words.bound('max', distance)}",
+        "" if low is None else comparison.bound("min", low, unit, exclusive),
+        "" if high is None else comparison.bound("max", high, unit, exclusive),
+        "" if distance is None else f"distance {comparison.bound('max', distance)}",
     ]
     return {
         "evaluator": shown(service, 80),

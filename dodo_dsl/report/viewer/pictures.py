@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from dodo_dsl import atomic
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError
-from dodo_dsl.opendlv.video.picture_size import too_large
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.picture_size import too_large
+from dodo_dsl.opendlv.recording import Recording, RecordingError
 from dodo_dsl.report.viewer.names import VIDEOS
 from dodo_dsl.report.viewer.recorded import MICROSECONDS, PICTURES, RecordedTest
 

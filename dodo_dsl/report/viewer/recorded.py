@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.messages import columns
-from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet
-from dodo_dsl.opendlv.messages.varints import Numbers
-from dodo_dsl.opendlv.recordings.frame_table import Fact
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv import message_columns
+from dodo_dsl.opendlv.frame_table import Fact
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import OWN_IDS, MessageSet
+from dodo_dsl.opendlv.recording import Recording
 
 Values = NDArray[np.float64]
 
@@ -140,12 +140,14 @@ def _channels(recording: Recording, messages: MessageSet, rows: Numbers, clock: 
 def _channel(
     recording: Recording, messages: MessageSet, name: str, sender: int, rows: Numbers, clock: _Clock, every: int
 ) -> Channel:
-    times, parts = list[Values](), list[list[columns.Column]]()
+    times, parts = list[Values](), list[list[message_columns.Column]]()
     goods = []
     for batch in recording.batches(rows):
         sent, received, sampled = batch.times
         table = batch.table
-        found, good = columns.decode(messages.layout(name), batch.data, table[Fact.PAYLOAD], table[Fact.PAYLOAD_END])
+        found, good = message_columns.decode(
+            messages.layout(name), batch.data, table[Fact.PAYLOAD], table[Fact.PAYLOAD_END]
+        )
         moments = np.where(sampled > 0, sampled, np.where(received > 0, received, sent))
         clock.note(sent, received, moments)
         times.append(clock.seconds(moments))

@@ -12,25 +12,22 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
-from dodo_dsl.opendlv.bus.address import Address
+from dodo_dsl.opendlv.address import Address
 from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
+from dodo_dsl.run import service_protocol
+from dodo_dsl.run.announce import hearers, that_hear
 from dodo_dsl.run.docker import shared_files
-from dodo_dsl.run.docker.bus import announce_begin
-from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL
+from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.container_use import ContainerUse
-from dodo_dsl.run.docker.events import EventWatch
-from dodo_dsl.run.docker.processes import ELSEWHERE, ContainerProcesses
+from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerProcesses, ContainerUse
+from dodo_dsl.run.docker.events import EventWatch, announce_begin
 from dodo_dsl.run.docker.pulls import Pulls, Say
-from dodo_dsl.run.docker.teardown import take_down, writers
-from dodo_dsl.run.load.service_use import Used
-from dodo_dsl.run.load.snapshot import Snapshot
+from dodo_dsl.run.machine_load.service_use import Used
+from dodo_dsl.run.machine_load.snapshot import Snapshot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
-from dodo_dsl.run.services import service_protocol
-from dodo_dsl.run.services.announce import hearers, that_hear
-from dodo_dsl.run.services.conditions import LONGEST_S, Conditions, in_turn, one_off, optional
-from dodo_dsl.run.services.service_output import ServiceOutput
+from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, one_off, optional
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""

@@ -1,15 +1,69 @@
 """Stops and removes compose projects on an engine, by their label, and those that killed runs left."""
 
 import contextlib
+import errno
 import functools
+import io
+import shutil
+import tarfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from dodo_dsl import atomic
+from dodo_dsl.emit.containers import REPORT
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.docker.client import engine_error
+
+MAX_BYTES = 4 << 30
+
+
+def copy_out(container: Any, folder: str, target: Path, max_bytes: int = MAX_BYTES) -> None:
+    """Copies the regular files of a container's folder by their last name; links are skipped.
+
+    Each file is complete or absent. Raises OSError when the disk is full, or the stream is damaged or longer than
+    ``max_bytes``.
+    """
+    chunks, _ = container.get_archive(folder)
+    try:
+        with tarfile.open(fileobj=_Stream(chunks, max_bytes), mode="r|") as tar:
+            for member in tar:
+                name = Path(member.name).name
+                if member.isfile() and name not in ("", ".", "..") and (content := tar.extractfile(member)):
+                    with atomic.replacing(target / name) as part, part.open("xb") as file:
+                        shutil.copyfileobj(content, file)
+        for _ in chunks:  # of padding: a stream that is read to its end gives its connection back
+            pass
+    except tarfile.TarError as error:
+        raise OSError(errno.EIO, f"the archive from the engine is damaged ({error})") from error
+
+
+class _Stream(io.RawIOBase):
+    """Chunks of bytes as a file that can be read once; raises OSError beyond ``max_bytes`` bytes."""
+
+    def __init__(self, chunks: Iterable[bytes], max_bytes: int) -> None:
+        self._chunks = iter(chunks)
+        self._max_bytes = max_bytes
+        self._taken = 0
+        self._rest = memoryview(b"")
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        if not self._rest:
+            self._rest = memoryview(next((chunk for chunk in self._chunks if chunk), b""))
+            self._taken += len(self._rest)
+        if self._taken > self._max_bytes:
+            raise OSError(errno.EFBIG, f"more than {self._max_bytes:,} bytes")
+        count = min(len(buffer), len(self._rest))
+        buffer[:count], self._rest = self._rest[:count], self._rest[count:]
+        return count
+
 
 PROJECT_LABEL = "com.docker.compose.project"
 SERVICE_LABEL = "com.docker.compose.service"
@@ -128,3 +182,41 @@ def reap_projects(client: Any) -> Reaped:
             reaped.removed.append(f"{test}: {count} containers, networks and volumes")
         lease.release()
     return reaped
+
+
+def writers(plan: Plan) -> set[str]:
+    """The services that write files of the report."""
+    return {service.name for service in plan.services if any(flag.kind == "report" for flag in service.flags)}
+
+
+def take_down(
+    client: Any,
+    project: str,
+    containers: Mapping[str, Any],
+    report: tuple[Collection[str], Path],
+    note: Callable[[str], None],
+) -> bool:
+    """Whether everything was removed; ``report`` are the services that write it, and its folder.
+
+    The next run removes what cannot be removed now, as when the engine has stopped.
+    """
+    try:
+        stop_project(client, project)
+        for name in report[0]:
+            if name in containers:
+                _copy_report(containers[name], name, report[1], note)
+        remove_project(client, project)
+    except Exception as error:  # noqa: BLE001  (whatever it was, the record of the project has to stay)
+        reason = engine_error(error)
+        note(f"the engine cannot remove the test's containers ({reason}): the next run or 'dodo doctor --clean' does")
+        return False
+    return True
+
+
+def _copy_report(container: Any, name: str, folder: Path, note: Callable[[str], None]) -> None:
+    from docker.errors import DockerException
+
+    try:
+        copy_out(container, f"{REPORT}/.", folder)
+    except (DockerException, OSError) as error:
+        note(f"the report misses files of {name}: {engine_error(error)}")

@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,23 +16,81 @@ from dodo_dsl import advice, atomic
 from dodo_dsl.application import compose_paths
 from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.access.findings import CompiledTest, compiled_findings
+from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.model import AccessFinding, shown
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.application.model import FILES, SANDBOX
-from dodo_dsl.application.service_environment import image_variable
-from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
-from dodo_dsl.plan.clock_service import RUNNER_VARIABLE
-from dodo_dsl.plan.model import LAYERS, Plan
-from dodo_dsl.plan.trace import traced
-from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_paths, secrets_of
-from dodo_dsl.run.docker import own_images
-from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
-from dodo_dsl.run.docker.builds import is_built, private_images
-from dodo_dsl.run.docker.masks import absent, masks
-from dodo_dsl.run.docker.pulls import PullError, Pulls, Say
-from dodo_dsl.run.files_of_tests import files_of_tests
+from dodo_dsl.application.model import FILES, SANDBOX, image_variable
+from dodo_dsl.opendlv.authentication import KEY_VARIABLE
+from dodo_dsl.plan.added_services import RUNNER_VARIABLE
+from dodo_dsl.plan.model import LAYERS, Place, Plan
+from dodo_dsl.run.application_files import (
+    application_paths,
+    env_file_findings,
+    files_of_tests,
+    hidden_paths,
+    secrets_of,
+)
+from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
+from dodo_dsl.run.docker.pulls import PullError, Pulls, Say, hints
 from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.run.rigs.ports import known_ports
+from dodo_dsl.run.rigs.permission import known_ports
+
+
+def masks(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> list[dict[str, Any]]:
+    """The mounts that hide them, as ``docker compose config`` shows the service and the file's ``volumes``."""
+    targets = list(dict.fromkeys(map(Path, _targets(service, volumes, hidden))))
+    outer = [target for target in targets if not any(parent in targets for parent in target.parents)]
+    return [{"type": "tmpfs", "target": str(target), "read_only": True} for target in outer]
+
+
+def absent(service: Mapping[str, Any], paths: HostPaths, always: bool = False) -> list[dict[str, Any]]:
+    """Empty folders in the place of what is mounted and not there: the engine would make it, as root.
+
+    What dodo.yml lets an application write to is the host's own, and made as always; without ``always``, the engine
+    refuses what it is told not to make.
+    """
+    binds = [volume for volume in service.get("volumes") or () if volume.get("type") == "bind"]
+    gone = [v for v in binds if not os.path.lexists(v["source"]) and not paths.is_writable(v["source"])]
+    made = [v for v in gone if always or v.get("bind", {}).get("create_host_path")]
+    return [{"type": "tmpfs", "target": volume["target"], "read_only": True} for volume in made]
+
+
+def _targets(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> Iterator[str]:
+    for volume in service.get("volumes") or ():
+        source = _source(volume, volumes)
+        if source is None:
+            continue
+        for path in hidden:
+            if source == path or source.is_relative_to(path):
+                yield volume["target"]
+            elif path.is_relative_to(source):
+                yield str(Path(volume["target"], path.relative_to(source)))
+
+
+def _source(volume: Mapping[str, Any], volumes: Mapping[str, Any]) -> Path | None:
+    """The folder of the host that a mount shows, if it does."""
+    source = volume.get("source")
+    if volume.get("type") == "volume":
+        options = (volumes.get(str(source)) or {}).get("driver_opts") or {}
+        source = options.get("device") if "bind" in str(options.get("o", "")) else None
+    elif volume.get("type") != "bind":
+        return None
+    return Path(os.path.realpath(source)) if source else None
+
+
+def trace(plan: Plan, text: str) -> Place | None:
+    """The place in the spec of the service that a message about compiled files names; None when it names none."""
+    for service in sorted(plan.services, key=lambda s: -len(s.name)):
+        if re.search(rf"(?<![\w-]){re.escape(service.name)}(?![\w-])", text):
+            return plan.source_map.get(f"{service.layer}.{service.name}")
+    return None
+
+
+def traced(plan: Plan, text: str) -> str:
+    """The message followed by that place."""
+    place = trace(plan, text)
+    return f"{text} ({place.file}:{place.line}:{place.column})" if place else text
+
 
 _BUILD_PROJECT = "dodo-build"
 _OVERLAP = "overlaps"
@@ -121,7 +179,7 @@ class Compose:
             if name in application and name not in built and image_variable(name) not in self._images
         }
         try:
-            notes = await pulls.provide(own, foreign, self._say, own_images.hints(self.plan))
+            notes = await pulls.provide(own, foreign, self._say, hints(self.plan))
         except PullError as error:
             raise BackendError(f"{error}{self._other_way(error.image)}") from error
         for note in notes:

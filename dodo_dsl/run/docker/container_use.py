@@ -2,15 +2,77 @@
 
 import contextlib
 import threading
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.run.docker.processes import is_of
-from dodo_dsl.run.load import control_group
-from dodo_dsl.run.load.control_group import ControlGroup
-from dodo_dsl.run.load.process_memory import PROC
-from dodo_dsl.run.load.service_use import Used, UseReader
+from dodo_dsl.application.model import FILES, SANDBOX
+from dodo_dsl.run.listeners import listening, members
+from dodo_dsl.run.machine_load import service_use, snapshot
+from dodo_dsl.run.machine_load.processes import PROC, ThreadTimes
+from dodo_dsl.run.machine_load.service_use import ControlGroup, Used, UseReader
+from dodo_dsl.run.machine_load.snapshot import Snapshot
+
+ELSEWHERE = "the Docker engine runs its containers on another machine or in a virtual one"
+
+
+class ContainerProcesses:
+    """``containers`` are those of the engine's client, by service. May be used by one thread at a time."""
+
+    def __init__(self, containers: Mapping[str, Any], proc: Path = PROC) -> None:
+        self._containers = {name: c for name, c in containers.items() if name not in (SANDBOX, FILES)}
+        self._proc = proc
+        self._times = ThreadTimes(proc)
+        self._services: dict[int, str] | None = None
+
+    def load(self) -> Snapshot | None:
+        """What the services have used so far; None where the engine runs one of them on another machine."""
+        if self._services is None:
+            self._services = self._pids(self._containers) or {}
+        return snapshot.take(self._times, self._services, self._proc) if self._services else None
+
+    def listeners(self, names: Collection[str], cid: int) -> set[str] | None:
+        """The services among ``names`` that listen on an OpenDLV bus already; None where that cannot be seen.
+
+        Where the kernel does not show this user their sockets, those do whose network has a member of the bus: each
+        container has a network of its own, but on the host.
+        """
+        services = self._pids({name: c for name, c in self._containers.items() if name in names})
+        if not services:
+            return None
+        found = listening(services, self._proc)
+        if found is None:
+            found = {name for pid, name in services.items() if members(cid, self._proc / str(pid)) != 0}
+        return found
+
+    def first(self, names: Collection[str]) -> Collection[int] | None:
+        """The first processes of containers that run; None where one of them is not found here."""
+        return self._pids({name: c for name, c in self._containers.items() if name in names})
+
+    def _pids(self, containers: Mapping[str, Any]) -> dict[int, str] | None:
+        """The first process of each container that runs; None where one of them is not found here."""
+        from docker.errors import DockerException
+
+        found = {}
+        for name, container in containers.items():
+            try:
+                container.reload()
+            except (DockerException, OSError):
+                return None
+            pid = int(container.attrs["State"].get("Pid") or 0)
+            if pid and not is_of(pid, container.id, self._proc):
+                return None
+            found[pid] = name
+        found.pop(0, None)
+        return found
+
+
+def is_of(pid: int, container: str, proc: Path = PROC) -> bool:
+    """Whether a process here is that of the container, and not one of another machine with the same number."""
+    try:
+        return container in (proc / str(pid) / "cgroup").read_text()
+    except OSError:
+        return False
 
 
 class ContainerUse:
@@ -58,7 +120,7 @@ class ContainerUse:
                 continue
             if not is_of(pid, container.id, self._proc):
                 self._elsewhere.append(name)
-            elif (group := control_group.of_process(pid, self._proc)) and group.used():
+            elif (group := service_use.of_process(pid, self._proc)) and group.used():
                 self._groups[name] = group
             else:
                 self._roots[pid] = name
@@ -68,5 +130,5 @@ class ContainerUse:
 
         with contextlib.suppress(DockerException, OSError):
             container = self._containers[name]
-            return control_group.of_engine(container.client.api.stats(container.id, stream=False, one_shot=True))
+            return service_use.of_engine(container.client.api.stats(container.id, stream=False, one_shot=True))
         return None

@@ -13,13 +13,26 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job, Say
 from dodo_dsl.run.docker import cleanup
 from dodo_dsl.run.docker.backend import DockerBackend, other_subnets
-from dodo_dsl.run.docker.camera_source import refuse_rpicam
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.process import host_isolation
 from dodo_dsl.run.process.slot import new_key
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.attendance import attended, is_real, refuse_hardware
+from dodo_dsl.run.rigs.session import attended, is_real, refuse_hardware
+from dodo_dsl.spec.rig import CAMERA_SOURCE, RPICAM
+
+_FLAG = CAMERA_SOURCE.rpartition(".")[2]
+
+
+def refuse_rpicam(plan: Plan) -> None:
+    """Raises BackendError where a service takes pictures by ``rpicam-vid``, a program of the rig's computer."""
+    for service in plan.services:
+        if any((flag.name, flag.value) == (_FLAG, RPICAM) for flag in service.flags):
+            raise BackendError(
+                f"service '{service.name}' needs the program rpicam-vid of the rig's computer, which containers do not "
+                "have: use --backend mixed or process"
+            )
+
 
 _Kind = TypeVar("_Kind", bound=DockerBackend)
 

@@ -7,8 +7,11 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.client import engine_error
+from dodo_dsl.run.process.commands import own_module
 from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.spec.deployment import build_command
 
 Say = Callable[[str], None]
 _UNKNOWN = "unknown"
@@ -186,3 +189,22 @@ class _Progress:
         if tenth > self._reported:
             self._reported = tenth
             self._say(f"pulling {self._image}: {done / 1e6:.0f} of {total / 1e6:.0f} MB")
+
+
+def hints(plan: Plan) -> dict[str, str]:
+    """How to get each image that has the prefix and the tag of DoDo's, by its reference."""
+    prefix, _, last = plan.sandbox_image.rpartition("/")
+    tag = last.rpartition(":")[2]
+    all_of_them = f"'{build_command(prefix, tag)}' makes it"
+    found = {plan.sandbox_image: all_of_them}
+    for service in plan.services:
+        place, _, image = service.image.rpartition("/")
+        name, _, version = image.rpartition(":")
+        if (place, version) != (prefix, tag):
+            continue
+        if own_module(service.process):
+            found[service.image] = all_of_them
+        else:
+            command = build_command(prefix, tag, name)
+            found[service.image] = f"build it from your own Dockerfile on {prefix}/base:{tag}: {command}"
+    return found

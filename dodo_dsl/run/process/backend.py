@@ -12,25 +12,22 @@ from typing import Any
 import msgspec
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.opendlv.bus.address import Address
+from dodo_dsl.opendlv.address import Address
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run.application_files import application_paths, hidden_paths
-from dodo_dsl.run.files_of_tests import Found, files_of_tests, in_few
-from dodo_dsl.run.load.service_use import Used
-from dodo_dsl.run.load.snapshot import Snapshot
+from dodo_dsl.run import service_protocol
+from dodo_dsl.run.announce import begin_frame, hearers
+from dodo_dsl.run.application_files import Found, application_paths, files_of_tests, hidden_paths, in_few
+from dodo_dsl.run.machine_load.service_use import Used
+from dodo_dsl.run.machine_load.snapshot import Snapshot
 from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
-from dodo_dsl.run.process.confined import bubblewrap
-from dodo_dsl.run.process.confined.confinement import confinement
-from dodo_dsl.run.process.entered import Entered
+from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
 from dodo_dsl.run.process.environment import own_environment
-from dodo_dsl.run.process.forks.fork_server_client import ForkServer
+from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
-from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Ready, Unstartable
-from dodo_dsl.run.services import service_protocol
-from dodo_dsl.run.services.announce import begin_frame, hearers
-from dodo_dsl.run.services.conditions import Conditions, in_turn, one_off
-from dodo_dsl.run.services.service_output import ServiceOutput
+from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.start_order import Conditions, in_turn, one_off
 
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
@@ -123,7 +120,7 @@ class ProcessBackend:
         if failed:
             said = " ".join(self.tail(exited)[-1:])
             starts = self._starts[exited]
-            if self.is_on_host and bubblewrap.MOUNT_GONE.match(said) and len(starts) < bubblewrap.MOST_TRIES:
+            if self.is_on_host and MOUNT_GONE.match(said) and len(starts) < MOST_TRIES:
                 self._start(starts[-1])
                 return
             is_of_sandbox = not said or said.startswith(_OF_SANDBOX)

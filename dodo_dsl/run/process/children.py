@@ -3,19 +3,86 @@
 import contextlib
 import functools
 import os
+import runpy
 import signal
 import subprocess
+import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
 
-from dodo_dsl.run.load.processes import owners, parents
-from dodo_dsl.run.process import namespaces
-from dodo_dsl.run.process.confined import memory_watch
-from dodo_dsl.run.process.confined.confined_process import ConfinedProcess
-from dodo_dsl.run.process.confined.confinement import Confinement
-from dodo_dsl.run.process.confined.places import Places
-from dodo_dsl.run.process.forks.forked_process import ForkedModule
+from dodo_dsl.run.machine_load.processes import owners, parents
+from dodo_dsl.run.process import confined_process, namespaces
+from dodo_dsl.run.process.confined_process import ConfinedProcess
+from dodo_dsl.run.process.confinement import Confinement
+from dodo_dsl.run.process.places import Places
+
+_DESCRIPTORS = 65_536
+
+
+class ForkedModule:
+    """A child of this process, which has one thread; ``pid`` is that of its own session."""
+
+    def __init__(self, words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> None:
+        """``words`` are ``python -m MODULE`` and its arguments; raises OSError when the folder cannot be entered."""
+        Path(folder).stat()
+        sys.stderr.flush()
+        self.pid = os.fork()
+        if self.pid == 0:
+            _become(words, environment, folder, output)
+
+    def wait(self) -> int:
+        """Its exit code, below 0 for the signal that ended it, as in subprocess."""
+        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+
+
+def _become(words: Sequence[str], environment: Mapping[str, str], folder: str, output: int) -> NoReturn:
+    code = 1
+    try:
+        _set_up(environment, folder, output)
+        sys.argv[:] = words[2:]
+        runpy.run_module(words[2], run_name="__main__", alter_sys=True)
+        code = 0
+    except SystemExit as end:
+        code = _exit_code(end)
+    except BaseException:  # noqa: BLE001  (it is printed as Python does)
+        traceback.print_exc()
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(code & 0xFF)
+
+
+def _set_up(environment: Mapping[str, str], folder: str, output: int) -> None:
+    """Session, signals, descriptors, variables and folder as those of a started program."""
+    os.setsid()
+    signal.set_wakeup_fd(-1)
+    for caught in (signal.SIGCHLD, signal.SIGTERM):
+        signal.signal(caught, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    no_input = os.open(os.devnull, os.O_RDONLY)
+    for number, target in enumerate((no_input, output, output)):
+        os.dup2(target, number)
+    os.closerange(3, _DESCRIPTORS)
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(folder)
+    sys.stdin = open(0, closefd=False)  # noqa: SIM115
+    sys.stdout = open(1, "w", buffering=1, closefd=False)  # noqa: SIM115
+    sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115
+
+
+def _exit_code(end: SystemExit) -> int:
+    if end.code is None:
+        return 0
+    if isinstance(end.code, int):
+        return end.code
+    print(end.code, file=sys.stderr)
+    return 1
+
 
 GRACE_S = 3.0
 _POLL_S = 0.05
@@ -115,7 +182,7 @@ class Children:
         """Ends those that use more memory than they may."""
         confined = {c.pid: (name, c.memory) for name, c in self._running.items() if isinstance(c, ConfinedProcess)}
         limits = {pid: most for pid, (_, most) in confined.items()}
-        for pid, size in memory_watch.above(limits, dict(parents())).items():
+        for pid, size in confined_process.above(limits, dict(parents())).items():
             name, _ = confined[pid]
             if name not in self._used:
                 self._used[name] = size

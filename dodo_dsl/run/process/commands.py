@@ -10,18 +10,16 @@ from dodo_dsl.application.access import secret_variables
 from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate, own_dotenv
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
-from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
+from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.model import ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths
-from dodo_dsl.run.process.entered import named_paths
 from dodo_dsl.run.process.environment import (
     application_environment,
     base_environment,
     expanded,
 )
-from dodo_dsl.run.process.python_path import package_path
-from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
-from dodo_dsl.run.rigs.ports import masked
+from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot, named_paths, package_path
+from dodo_dsl.run.rigs.permission import masked
 
 OWN_VARIABLES = ("PYTHONPATH", SLOT_VARIABLE)
 """Variables with other values in the sandbox than in the runner: they are always set."""

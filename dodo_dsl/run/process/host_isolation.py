@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.bus.address import group
+from dodo_dsl.opendlv.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
-from dodo_dsl.run.process.confined.bubblewrap import MOST_TRIES, MOUNT_GONE, PROGRAM
-from dodo_dsl.run.process.confined.confined_probe import BUBBLEWRAP, NAMESPACES
-from dodo_dsl.run.process.forks.fork_server_client import ForkServer
+from dodo_dsl.run.process.confined_process import BUBBLEWRAP, NAMESPACES
+from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, PROGRAM
+from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
 from dodo_dsl.run.process.slot import Slot

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from dodo_dsl.run import leases
-from dodo_dsl.run.process.confined import process_group
+from dodo_dsl.run.process import process_group
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
 
 SLOT_NAME = re.compile(r"dodo-[0-9a-f]{8}-")
@@ -67,7 +67,7 @@ def _is_alive(process: Path) -> bool:
 
 def remove_memories(prefix: str) -> int:
     """Removes shared memories by the prefix of their names, with their semaphores; returns their number."""
-    from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+    from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
     removed = 0
     for token in [p for p in Path("/tmp").glob(f"{prefix}*") if p.is_file() and not p.is_symlink()]:

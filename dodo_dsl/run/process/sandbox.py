@@ -37,18 +37,17 @@ from typing import Any
 
 import msgspec
 
-from dodo_dsl.run.load import snapshot
-from dodo_dsl.run.load.service_use import UseReader
-from dodo_dsl.run.load.thread_times import ThreadTimes
-from dodo_dsl.run.process import namespaces
+from dodo_dsl.run.listeners import listening
+from dodo_dsl.run.machine_load import snapshot
+from dodo_dsl.run.machine_load.processes import ThreadTimes
+from dodo_dsl.run.machine_load.service_use import UseReader
+from dodo_dsl.run.process import confined_process, namespaces, places
 from dodo_dsl.run.process.children import Children
-from dodo_dsl.run.process.confined import confined_probe, users
-from dodo_dsl.run.process.confined.confinement import Confinement
-from dodo_dsl.run.process.confined.memory_watch import PERIOD_S
-from dodo_dsl.run.process.confined.places import Places
-from dodo_dsl.run.process.confined.seccomp_filter import NoSeccomp
-from dodo_dsl.run.process.entered import Entered
-from dodo_dsl.run.services.listeners import listening
+from dodo_dsl.run.process.confined_process import PERIOD_S
+from dodo_dsl.run.process.confinement import Confinement
+from dodo_dsl.run.process.places import Places
+from dodo_dsl.run.process.seccomp_filter import NoSeccomp
+from dodo_dsl.run.process.slot import Entered
 
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
@@ -154,12 +153,12 @@ class Sandbox:
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
         if confined.isolation == "network" and self.places is None:
-            self.places = Places(users.own(confined.cid))
+            self.places = Places(places.own(confined.cid))
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_probe(self, _descriptors: list[int]) -> None:
-        why = confined_probe.problem()
-        self.send(probe=why, missing=confined_probe.missing() if why else "")
+        why = confined_process.problem()
+        self.send(probe=why, missing=confined_process.missing() if why else "")
 
     def _do_send(self, _descriptors: list[int], to: list[tuple[str, int]], data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
@@ -244,7 +243,7 @@ def main(argv: list[str]) -> int:
         else:
             namespaces.adopt_orphans()
     except OSError as error:
-        missing = confined_probe.NAMESPACES if namespaces.refusal() else ""
+        missing = confined_process.NAMESPACES if namespaces.refusal() else ""
         channel.send(json.dumps({"down": str(error.strerror or error), "missing": missing}).encode())
         return 1
     sandbox = Sandbox(channel, isolation, forks)

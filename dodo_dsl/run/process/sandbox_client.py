@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import atomic
-from dodo_dsl.run.process.entered import Entered
 from dodo_dsl.run.process.environment import own_environment
-from dodo_dsl.run.process.forks.fork_server_client import ForkedSandbox, ForkServer, end
-from dodo_dsl.run.process.python_path import package_path
+from dodo_dsl.run.process.fork_server_client import ForkedSandbox, ForkServer, end
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
-from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
+from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
 from dodo_dsl.run.protocol import BackendError
 
 CLOSE_S = 10.0

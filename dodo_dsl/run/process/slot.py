@@ -1,9 +1,17 @@
 """What keeps tests of the process backend apart."""
 
+import json
+import os
 import secrets
+import sys
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Self
 
-from dodo_dsl.opendlv.bus.proof import KEY_BYTES
+from dodo_dsl import package_data
+from dodo_dsl.opendlv.authentication import KEY_BYTES
+from dodo_dsl.run.process import namespaces
 
 SLOT_VARIABLE = "DODO_SLOT"
 """Environment variable of a test's processes on the host: the name of its slot, by which leftovers are found."""
@@ -26,3 +34,50 @@ class Slot:
     memory_prefix: str = ""
     descriptors: tuple[int, ...] = ()
     key: bytes = field(default_factory=new_key, repr=False)
+
+
+_FLAG = "--enter="
+
+
+@dataclass(frozen=True)
+class Entered:
+    """A process of the container on this machine, 0 for own namespaces, and folders of ``/tmp`` that the test needs."""
+
+    process: int
+    shown: tuple[Path, ...] = ()
+
+    @classmethod
+    def with_own(cls, process: int, *needed: Path) -> Self:
+        """With what in ``/tmp`` and ``/dev/shm`` holds ``needed`` paths, Python, DoDo, or paths in variables."""
+        own = (Path(sys.prefix), Path(sys.base_prefix), *(Path(place) for place in sys.path if place))
+        given = named_paths(os.environ.values())
+        every = (*needed, *own, *given)
+        names = {name for path in every for name in (os.path.abspath(path), os.path.realpath(path))}  # noqa: PTH100
+        inside = ((folder, name.relative_to(folder).parts) for folder in namespaces.SHARED for name in map(Path, names)
+                  if name.is_relative_to(folder))  # fmt: skip
+        return cls(process, tuple(sorted({folder / parts[0] for folder, parts in inside if parts})))
+
+    def word(self) -> str:
+        """The word of a sandbox's command line."""
+        return _FLAG + json.dumps([self.process, *map(str, self.shown)])
+
+    @classmethod
+    def among(cls, words: Sequence[str]) -> Self | None:
+        """The one among the words of a sandbox's command line."""
+        for word in words:
+            if word.startswith(_FLAG):
+                process, *shown = json.loads(word.removeprefix(_FLAG))
+                return cls(process, tuple(map(Path, shown)))
+        return None
+
+
+def named_paths(words: Iterable[str]) -> list[Path]:
+    """The whole paths among words, each of which may have several, as ``PATH`` does."""
+    return [Path(name) for word in words for name in word.split(os.pathsep) if name.startswith("/")]
+
+
+def package_path(own: Iterable[Path] = ()) -> str:
+    """``PYTHONPATH`` of services and sandbox: the folders of ``services`` and of ``dodo_dsl``, and ``own`` ones."""
+    ours = (package_data.root(), Path(__file__).resolve().parents[3])
+    places = [*map(str, (*ours, *own)), os.environ.get("PYTHONPATH", "")]
+    return os.pathsep.join(dict.fromkeys(p for p in places if p))

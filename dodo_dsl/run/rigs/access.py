@@ -5,14 +5,26 @@ import contextlib
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
+from dodo_dsl.diagnostics import shown_path
+from dodo_dsl.plan.added_services import CAMERA, DRAWN, hardware
+from dodo_dsl.plan.model import Flag, PlannedService
 from dodo_dsl.run import leases
 from dodo_dsl.run.process.environment import base_environment
-from dodo_dsl.run.process.python_path import package_path
+from dodo_dsl.run.process.slot import package_path
+from dodo_dsl.run.rigs.leases import devices_in, leased, release, taken
+from dodo_dsl.run.rigs.permission import Motion, motion_of
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
-from dodo_dsl.run.rigs.rig_leases import devices_in, leased, release, taken
+from dodo_dsl.source import Scalar
+from dodo_dsl.spec.arguments import Argument, resolved
+from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
+from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.rig import CIRCLE, MEMORY, Rig
+from dodo_dsl.spec.values import ValueProblem, convert, default_value
 
 MANUAL = ("python", "-m", "services.gantry.manual")
 PATIENCE_S = 180.0
@@ -151,3 +163,113 @@ def occupied(
         yield ask
     finally:
         release(held)
+
+
+PROGRAMS = {
+    CAMERA: ("python", "-m", "services.camera.snapshot"),
+    DRAWN: ("python", "-m", "services.virtual_camera.snapshot"),
+}
+
+_OF_WHO_ASKS = ("truth-sender", "truth-classes")
+"""What a test says of its true boxes is not what a snapshot is asked for."""
+
+
+@dataclass(frozen=True)
+class SnapshotCommand:
+    """A program that takes a snapshot, its words without the output, and whether it renders a scene with its truth."""
+
+    program: tuple[str, ...]
+    words: tuple[str, ...]
+    is_rendered: bool
+
+
+def snapshot(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec | None) -> SnapshotCommand:
+    """A snapshot as the service ``camera`` of a test sees it, or without a test as the rig is; raises RigProblem."""
+    use = next((use for use in spec.uses if use.uses.text == CAMERA), None) if spec else None
+    if spec and use is None:
+        raise RigProblem(f"test '{spec.title}' has no service '{CAMERA}'", usage=True)
+    if use is None and rig.is_emulated:
+        raise RigProblem("the emulated rig's camera sees the map of a test: name one with --test", usage=True)
+    if use is None and rig.entry("camera.source") is None:
+        raise RigProblem(f"rig '{rig.name}' has no camera in dodo.yml", usage=True)
+    flags = _flags(rig, manifests[CAMERA], spec, use)
+    real = PlannedService("environment", CAMERA, CAMERA, "", PROGRAMS[CAMERA], flags)
+    service = hardware(real, manifests, "")
+    words = tuple(f"--{flag.name}={flag.value}" for flag in service.flags if flag.name not in _OF_WHO_ASKS)
+    return SnapshotCommand(PROGRAMS[service.uses], words, service.uses == DRAWN)
+
+
+def _flags(rig: Rig, manifest: Manifest, spec: Spec | None, use: Use | None) -> tuple[Flag, ...]:
+    if spec and use:
+        given = list(resolved(spec, use, manifest, rig).arguments.values())
+    else:
+        given = [_of_rig(rig, parameter) for parameter in manifest.parameters.values()]
+    for argument in given:
+        if argument.problem:
+            span = argument.problem.span
+            raise RigProblem(f"{span.file}:{span.line}:{span.column}: {argument.problem.message}", usage=True)
+    values = ((argument.parameter.name, argument.value) for argument in given if argument.value)
+    return tuple(Flag(name, str(value.path or value.text)) for name, value in values)
+
+
+def _of_rig(rig: Rig, parameter: Parameter) -> Argument:
+    entry = rig.entry(parameter.rig) if parameter.rig else None
+    if entry is None:
+        return Argument(parameter, None, default_value(parameter))
+    try:
+        return Argument(parameter, entry, convert(parameter, entry.value, Path.cwd()))
+    except ValueProblem as problem:
+        return Argument(parameter, entry, None, problem.diagnostic)
+
+
+def judged_classes(rig: Rig, manifests: Mapping[str, Manifest], spec: Spec) -> list[str]:
+    """The classes that a test evaluates; empty when it names none."""
+    texts = (
+        resolved(spec, use, manifests[use.uses.text], rig).texts.get("classes", "")
+        for use in spec.uses
+        if use.layer == "evaluation" and use.uses.text in manifests
+    )
+    return sorted({name for text in texts for name in text.split(",") if name})
+
+
+TEXTS = (("serial", "serial", ""), (CIRCLE, "kind", ""), (MEMORY, "limits", ""))
+RANGES = (("limits.x", "range-x", "m"), ("limits.y", "range-y", "m"), ("limits.yaw", "range-yaw", "deg"))
+CONSTANTS = tuple(
+    (f"axes.{axis}.{what}", f"{what}-{axis}", unit)
+    for axis, density in (("x", "steps/m"), ("y", "steps/m"), ("yaw", "steps/deg"))
+    for what, unit in (("steps", density), ("offset", "steps"))
+)
+"""The rig's settings that are flags of the gantry: key, flag, unit."""
+
+
+def flags(rig: Rig) -> list[str]:
+    """The rig's port, kind, limits and constants as the gantry's flags; raises RigProblem for an invalid one."""
+    numbers = _numbers(rig)
+    found = []
+    for key, flag, unit in (*TEXTS, *RANGES, *CONSTANTS):
+        entry = rig.entry(key)
+        if entry is None or not isinstance(entry.value, Scalar):
+            continue
+        found.append(f"--{flag}={numbers[key] if unit else entry.value.text}")
+    return found
+
+
+def motion(rig: Rig) -> Motion:
+    """The rig's motion by these flags."""
+    return motion_of(dict(word.removeprefix("--").split("=", 1) for word in flags(rig)), manual=True)
+
+
+def _numbers(rig: Rig) -> dict[str, str]:
+    """All limits and constants of the rig in the gantry's units, by their keys."""
+    found = {}
+    for parameter in load_manifests()[0]["gantry"].parameters.values():
+        entry = rig.entry(parameter.rig)
+        if entry is None or not parameter.rig.startswith(("limits.", "axes.")):
+            continue
+        try:
+            found[parameter.rig] = convert(replace(parameter, name=parameter.rig), entry.value, Path.cwd()).text
+        except ValueProblem as problem:
+            span = problem.diagnostic.span
+            text = f"{shown_path(span.file)}:{span.line}:{span.column}: {problem.diagnostic.message}"
+            raise RigProblem(text, usage=True) from None
+    return found

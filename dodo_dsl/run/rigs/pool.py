@@ -5,14 +5,13 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
-from dodo_dsl.run import lease_queue, leases
+from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job, Say
 from dodo_dsl.run.process.host_isolation import is_claimed
 from dodo_dsl.run.protocol import Backend, BackendError
+from dodo_dsl.run.rigs.leases import device_leases, devices_in, quarantined
 from dodo_dsl.run.rigs.permission import refuse_test
 from dodo_dsl.run.rigs.problems import RigProblem
-from dodo_dsl.run.rigs.quarantine import quarantined
-from dodo_dsl.run.rigs.rig_leases import device_leases, devices_in
 
 Open = Callable[[Job], AbstractAsyncContextManager[Backend]]
 
@@ -24,7 +23,7 @@ async def opened(job: Job, say: Say, backend_of: Open) -> AsyncIterator[tuple[Jo
     All that the test waits for, it waits for since now, so that nobody who comes later overtakes it.
     """
     async with contextlib.AsyncExitStack() as stack:
-        with lease_queue.arrived(), contextlib.ExitStack() as tickets:
+        with leases.arrived(), contextlib.ExitStack() as tickets:
             chosen = await _chosen(job, say, tickets) if job.others else job
             backend = await stack.enter_async_context(backend_of(chosen))
         yield chosen, backend
@@ -35,17 +34,17 @@ async def _chosen(job: Job, say: Say, tickets: contextlib.ExitStack) -> Job:
     usable = _usable([job, *job.others])
     by_rig = {one.plan.rig: _lease_names(one) for one in usable}
     names = [name for found in by_rig.values() for name in found]
-    place, since = leases.folder(), lease_queue.now()
+    place, since = leases.folder(), leases.arrival_time()
 
     def free() -> Job | None:
         return next((one for one in usable if _is_free(by_rig[one.plan.rig], place, since)), None)
 
-    with lease_queue.ticket(place, names, since):
+    with leases.ticket(place, names, since):
         try:
             chosen = await leases.in_turn(free, names, say, False, leases.DEFAULT_PATIENCE_S, since)
         except leases.LeaseTimeout as error:
             raise BackendError(f"none of the rigs {', '.join(by_rig)} came free: {error}") from error
-        tickets.enter_context(lease_queue.ticket(place, by_rig[chosen.plan.rig], since, turn=True))
+        tickets.enter_context(leases.ticket(place, by_rig[chosen.plan.rig], since, turn=True))
     say(f"on rig '{chosen.plan.rig}'")
     return chosen
 
@@ -59,7 +58,7 @@ def _lease_names(job: Job) -> list[str]:
 
 
 def _is_free(names: Sequence[str], place: Path, since: int) -> bool:
-    waited_for = lease_queue.ahead(place, names, since)
+    waited_for = leases.ahead_in_line(place, names, since)
     return not waited_for and all(leases.is_free(name) for name in names) and not is_claimed(names[0])
 
 

@@ -10,7 +10,7 @@ import yaml
 from dodo_dsl.application.access.compose_keys import BELOW
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.read import read_application
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.application.access.compose_forms import schema
 
 NESTED = {path: tuple(rows) for path, rows in BELOW.items()}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.access.rig_ports import holds_port, is_port, is_rule_for_port, source
+from dodo_dsl.application.access.host_paths import holds_port, is_port, is_rule_for_port, source
 
 PORTS = ("/dev/ttyACM7", "socket://127.0.0.1:4242")
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules.camera_sources import check
+from dodo_dsl.check.service_rules import check_camera_sources
 from tests.check.contexts import context, found
 
 
@@ -29,13 +29,15 @@ def example(rig: str, source: str, width: int = 640) -> str:
     ],
 )
 def test_sources(rig: str, source: str, width: int, count: int, tmp_path: Path) -> None:
-    assert [rule for rule, _ in found(check, example(rig, source, width), tmp_path)] == ["camera-source"] * count
+    assert [rule for rule, _ in found(check_camera_sources, example(rig, source, width), tmp_path)] == [
+        "camera-source"
+    ] * count
 
 
 def test_ways_out(tmp_path: Path) -> None:
-    (problem,) = check(context(example("kiwi", "rpicm"), tmp_path))
+    (problem,) = check_camera_sources(context(example("kiwi", "rpicm"), tmp_path))
     assert (problem.message, problem.hint) == ("'rpicm' is not a source of pictures", "did you mean 'rpicam'?")
-    (problem,) = check(context(example("kiwi", "rpicam", 600), tmp_path))
+    (problem,) = check_camera_sources(context(example("kiwi", "rpicam", 600), tmp_path))
     assert problem.hint == "write a width of 576"
 
 
@@ -51,14 +53,14 @@ def test_ways_out(tmp_path: Path) -> None:
 )
 def test_exposures(source: str, written: str, said: list[str], tmp_path: Path) -> None:
     test = example("kiwi", source).replace("{uses: camera}", f"{{uses: camera, with: {{{written}}}}}")
-    assert [message for _, message in found(check, test, tmp_path)] == said
+    assert [message for _, message in found(check_camera_sources, test, tmp_path)] == said
 
 
 @pytest.mark.parametrize(("level", "camera"), [("sil", "virtual-camera"), ("hil\nrig: kiwi", "camera")])
 def test_odd_sizes(level: str, camera: str, tmp_path: Path) -> None:
     test = f"level: {level}\nenvironment:\n  camera: {{uses: {camera}, with: {{width: 641, height: 479}}}}\n"
     test += "# dodo.yml\nrigs: {kiwi: {kind: static, cid: 121, camera: {source: /dev/video0}}}\n"
-    assert found(check, test, tmp_path) == [
+    assert found(check_camera_sources, test, tmp_path) == [
         ("out-of-range", "parameter 'width' is 641, expected an even number"),
         ("out-of-range", "parameter 'height' is 479, expected an even number"),
     ]
@@ -66,4 +68,4 @@ def test_odd_sizes(level: str, camera: str, tmp_path: Path) -> None:
 
 def test_an_odd_height_of_a_raspberry_pi_s_camera(tmp_path: Path) -> None:
     test = example("kiwi", "rpicam").replace("height: 480", "height: 479")
-    assert [rule for rule, _ in found(check, test, tmp_path)] == ["out-of-range"]
+    assert [rule for rule, _ in found(check_camera_sources, test, tmp_path)] == ["out-of-range"]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules.levels import check
+from dodo_dsl.check.spec_rules import check_levels
 from tests.check.contexts import found
 
 
@@ -20,4 +20,4 @@ from tests.check.contexts import found
 )
 def test_levels(level: str, kind: str, clock: str, rules: list[str], tmp_path: Path) -> None:
     example = f"level: {level}\nkind: {kind}\nclock: {clock}\n"
-    assert [rule for rule, _ in found(check, example, tmp_path)] == rules
+    assert [rule for rule, _ in found(check_levels, example, tmp_path)] == rules

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules import memories
+from dodo_dsl.check import wiring_rules
 from tests.check.contexts import context
 
 
@@ -13,7 +13,7 @@ def example(*services: str) -> str:
 
 
 def hints(folder: Path, *services: str) -> list[str]:
-    return [diagnostic.hint for diagnostic in memories.check(context(example(*services), folder))]
+    return [diagnostic.hint for diagnostic in wiring_rules.check_memories(context(example(*services), folder))]
 
 
 @pytest.mark.parametrize(

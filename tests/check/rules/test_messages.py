@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules.messages import check
+from dodo_dsl.check.service_rules import check_messages
 from tests.check.contexts import context, found
 
 SIGNAL = """\
@@ -18,7 +18,7 @@ services: {{driver: {{image: driver, command: --cid=1, x-dodo: {{{key}: [{name}]
 
 
 def test_an_unknown_message_of_a_parameter(tmp_path: Path) -> None:
-    (problem,) = check(context(SIGNAL.format(name="opendlv.proxy.GroundSteeringReqest"), tmp_path))
+    (problem,) = check_messages(context(SIGNAL.format(name="opendlv.proxy.GroundSteeringReqest"), tmp_path))
     assert (problem.rule, problem.message) == (
         "unknown-message",
         "unknown message 'opendlv.proxy.GroundSteeringReqest'",
@@ -29,9 +29,9 @@ def test_an_unknown_message_of_a_parameter(tmp_path: Path) -> None:
 @pytest.mark.parametrize("key", ["in", "out", "answers"])
 def test_an_unknown_message_of_the_application(key: str, tmp_path: Path) -> None:
     expected = [("unknown-message", "unknown message 'my.Own'")]
-    assert found(check, DECLARED.format(key=key, name="my.Own/3"), tmp_path) == expected
+    assert found(check_messages, DECLARED.format(key=key, name="my.Own/3"), tmp_path) == expected
 
 
 def test_messages_of_the_deployment_are_known(tmp_path: Path) -> None:
     own = "# dodo.yml\nmessages: [my.odvd]\n# my.odvd\nmessage my.Own [id = 3000] { float x [id = 1]; }\n"
-    assert found(check, own + DECLARED.format(key="in", name="my.Own/3"), tmp_path) == []
+    assert found(check_messages, own + DECLARED.format(key="in", name="my.Own/3"), tmp_path) == []

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules.parameters import check
+from dodo_dsl.check.service_rules import check_parameters
 from tests.check.contexts import context, found
 
 CAMERA = "environment: {{camera: {{uses: virtual-camera, with: {{{values}}}}}}}\n"
@@ -25,11 +25,11 @@ CAMERA = "environment: {{camera: {{uses: virtual-camera, with: {{{values}}}}}}}\
 )
 def test_written_values(values: str, rules: list[str], tmp_path: Path) -> None:
     """The evaluator shares the map, so a wrong one is wrong for both."""
-    assert [rule for rule, _ in found(check, CAMERA.format(values=values), tmp_path)] == rules
+    assert [rule for rule, _ in found(check_parameters, CAMERA.format(values=values), tmp_path)] == rules
 
 
 def test_a_required_value(tmp_path: Path) -> None:
-    problems = list(check(context(CAMERA.format(values=""), tmp_path)))
+    problems = list(check_parameters(context(CAMERA.format(values=""), tmp_path)))
     assert [problem.rule for problem in problems] == ["missing-parameter", "missing-parameter"]
     assert problems[0].message.startswith("service 'virtual-camera' needs parameter 'map-path': ")
     assert problems[0].hint == "write 'map-path: ...' under 'with'"
@@ -41,7 +41,7 @@ environment:
   camera: {uses: virtual-camera, with: {map-path: ../maps/plain}}
   other: {uses: virtual-camera, with: {map-path: ../maps, name.argb: b.argb, name.i420: b.i420, frame-id: 1}}
 """
-    (problem,) = check(context(example, tmp_path))
+    (problem,) = check_parameters(context(example, tmp_path))
     assert problem.hint == "camera and other give different values, so write the one to use"
 
 
@@ -53,7 +53,7 @@ environment: {camera: {uses: camera}}
 # dodo.yml
 rigs: {kiwi: {kind: static, cid: 121CAMERA}}
 """
-    missing = {message.split("'")[3] for _, message in found(check, example.replace("CAMERA", ""), tmp_path)}
+    missing = {message.split("'")[3] for _, message in found(check_parameters, example.replace("CAMERA", ""), tmp_path)}
     assert missing == {"source", "map-path"}
     given = example.replace("CAMERA", ", camera: {source: /dev/video0, width: 640, height: 480}")
-    assert {message.split("'")[3] for _, message in found(check, given, tmp_path)} == {"map-path"}
+    assert {message.split("'")[3] for _, message in found(check_parameters, given, tmp_path)} == {"map-path"}

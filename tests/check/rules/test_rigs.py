@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules.rigs import check
+from dodo_dsl.check.spec_rules import check_rigs
 from tests.check.contexts import context, found
 
 RIGS = "# dodo.yml\nrigs: {kiwi: {kind: dynamic, cid: 121}}\n"
@@ -24,9 +24,9 @@ RIGS = "# dodo.yml\nrigs: {kiwi: {kind: dynamic, cid: 121}}\n"
     ],
 )
 def test_rigs(example: str, rules: list[str], tmp_path: Path) -> None:
-    assert [rule for rule, _ in found(check, example + RIGS, tmp_path)] == rules
+    assert [rule for rule, _ in found(check_rigs, example + RIGS, tmp_path)] == rules
 
 
 def test_a_misspelt_rig(tmp_path: Path) -> None:
-    (problem,) = check(context(f"level: hil\nrig: kiwy\n{RIGS}", tmp_path))
+    (problem,) = check_rigs(context(f"level: hil\nrig: kiwy\n{RIGS}", tmp_path))
     assert (problem.message, problem.hint) == ("unknown rig 'kiwy'", "did you mean 'kiwi'?")

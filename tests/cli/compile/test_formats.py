@@ -10,7 +10,7 @@ import pytest
 from junitparser import JUnitXml
 
 from dodo_dsl.check import catalogue
-from dodo_dsl.cli.compile.formats import FORMATS
+from dodo_dsl.cli.compile import FORMATS
 from dodo_dsl.cli.main import main
 from tests.check import examples
 from tests.cli.terminal import Terminal

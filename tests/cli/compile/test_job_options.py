@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl.cli.compile.job_options import services, tags
+from dodo_dsl.cli.pipeline_options import services, tags
 from tests.check import examples
 from tests.emit.readers import run
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.cli.compile.pipeline_rules import KINDS, Unreadable, holds, is_made, may_be_there
+from dodo_dsl.cli.pipeline_rules import KINDS, Unreadable, holds, is_made, may_be_there
 
 VARIABLES = {"A": "a", "EMPTY": "", "CI_COMMIT_BRANCH": "main", "PATTERN": "/^A$/i"}
 

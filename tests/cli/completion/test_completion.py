@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.completion import candidates
-from dodo_dsl.cli.completion.command import SHELLS
+from dodo_dsl.cli import completion
+from dodo_dsl.cli.completion import SHELLS
 from dodo_dsl.cli.main import main
 
 ROOT = Path(__file__).parents[3]
@@ -48,20 +48,20 @@ def test_a_line_goes_on(line: str, words: list[str]) -> None:
 
 
 def test_names_of_services_rigs_and_instances() -> None:
-    assert {"integrator", "virtual-camera"} <= set(candidates.services())
-    assert candidates.rigs() == ["emulated", "emulated-circle", "kiwi"]
-    assert {"sil-perception[light=1]", "sil-perception[light=1,"} <= set(candidates.tests("sil-perception[li"))
+    assert {"integrator", "virtual-camera"} <= set(completion.services())
+    assert completion.rigs() == ["emulated", "emulated-circle", "kiwi"]
+    assert {"sil-perception[light=1]", "sil-perception[light=1,"} <= set(completion.tests("sil-perception[li"))
     both = ["sil-perception[light=1,clutter=0]", "sil-perception[light=1,clutter=60]"]
-    assert candidates.tests("sil-perception[light=1,clu") == both
-    assert candidates.tests("no-such-test[") == []
-    assert "wrong-unit" in candidates.tests_and_rules("wrong")
+    assert completion.tests("sil-perception[light=1,clu") == both
+    assert completion.tests("no-such-test[") == []
+    assert "wrong-unit" in completion.tests_and_rules("wrong")
 
 
 def test_specs_are_completed_as_files() -> None:
     Path("mine").mkdir()
     for name in ("a.dodo.yml", "a.txt"):
         Path("mine", name).touch()
-    assert candidates.tests("mine/") == ["mine/a.dodo.yml"]
+    assert completion.tests("mine/") == ["mine/a.dodo.yml"]
 
 
 @pytest.mark.parametrize("shell", SHELLS)

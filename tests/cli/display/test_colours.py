@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.display import colours
+from dodo_dsl.cli import display, run_report
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.run import summary
-from dodo_dsl.cli.run.progress import PlainProgress, choose
-from dodo_dsl.cli.run.uninterrupted import UninterruptedStream
+from dodo_dsl.cli.progress import PlainProgress, choose
+from dodo_dsl.cli.uninterrupted import UninterruptedStream
 from dodo_dsl.diagnostics import Diagnostic, Span, format_text
 from dodo_dsl.terminal import harmless_stream
 from tests.cli.terminal import Terminal, shown
@@ -43,21 +42,21 @@ def test_the_variables_that_decide(
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     made = stream()
-    colours.write(made, [("ok", "passed")])
+    display.write(made, [("ok", "passed")])
     assert made.getvalue() == (f"{GREEN}ok\x1b[0m" if wanted else "ok")
 
 
 def test_a_harmless_stream_lets_colours_through_and_nothing_of_others() -> None:
     terminal = Terminal()
     stream = UninterruptedStream(harmless_stream(terminal))
-    colours.write(stream, [("\x1b[2Jgone", "failed"), ("\n", ""), ("::error::x", "hint")])  # type: ignore[arg-type]
+    display.write(stream, [("\x1b[2Jgone", "failed"), ("\n", ""), ("::error::x", "hint")])  # type: ignore[arg-type]
     assert terminal.getvalue() == f"{RED}�[2Jgone\x1b[0m\n\x1b[36m: :error::x\x1b[0m"
 
 
 def test_a_summary_says_the_same_with_colours() -> None:
     terminal, file = Terminal(), StringIO()
     for stream in (terminal, file):
-        summary.write(stream, [OUTCOME], {"test": "test"}, [])
+        run_report.write_summary(stream, [OUTCOME], {"test": "test"}, [])
     assert RED in terminal.getvalue()
     assert shown(terminal.getvalue()) == file.getvalue()
     assert GREEN not in terminal.getvalue(), "there is no test that passed"
@@ -67,7 +66,7 @@ def test_diagnostics_say_the_same_with_colours(tmp_path: Path) -> None:
     (tmp_path / "a.yml").write_text("name: x\n")
     found = [Diagnostic(Span(str(tmp_path / "a.yml"), 1, 7), "a-rule", "wrong", "write y")]
     terminal = Terminal()
-    colours.write_diagnostics(terminal, found)
+    display.write_diagnostics(terminal, found)
     assert "\x1b[1;31merror[a-rule]\x1b[0m: wrong\n" in terminal.getvalue()
     assert shown(terminal.getvalue()) == format_text(found)
 

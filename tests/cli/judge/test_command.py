@@ -5,16 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.judge.known_run import KnownRun
-from dodo_dsl.cli.judge.output import as_text
+from dodo_dsl.cli.judge import KnownRun, as_text
 from dodo_dsl.cli.main import main
-from dodo_dsl.margins import with_margin
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.plan.model import Application, Plan
+from dodo_dsl.run.judge import Judgement
 from dodo_dsl.run.outcomes import Finding
 from dodo_dsl.run.protocol import VerdictEvent
-from dodo_dsl.run.recorded.judge import Judgement
-from dodo_dsl.run.recorded.test_recording import TestRecording
+from dodo_dsl.run.test_recording import TestRecording
 from tests.check import examples
 from tests.run.recorded.made import begin, message, step, write
 

@@ -14,9 +14,10 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.cli.errors import NO_APPLICATION
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.new.starts import kinds
+from dodo_dsl.cli.new_test import kinds
 from dodo_dsl.compiler import load
-from dodo_dsl.opendlv.odvd import STANDARD, parser
+from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.odvd import STANDARD
 from dodo_dsl.spec.model import LEVELS
 from tests.cli.terminal import Terminal
 from tests.test_documentation import PROGRAM
@@ -336,8 +337,8 @@ def test_an_application_in_c_plus_plus_has_what_builds_it(empty: Path) -> None:
     included = [entry["local"] for entry in yaml.safe_load((empty / ".gitlab-ci.yml").read_text())["include"]]
     assert [Path(path).name for path in included] == ["deployment.gitlab-ci.yml", "application.gitlab-ci.yml"]
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
-    standard = {definition.name: definition for definition in parser.load(STANDARD)}
-    own = {definition.name: definition for definition in parser.load(empty / "messages.odvd")}
+    standard = {definition.name: definition for definition in odvd.load(STANDARD)}
+    own = {definition.name: definition for definition in odvd.load(empty / "messages.odvd")}
     assert sorted(own) == sorted(service["x-dodo"]["out"])
     assert all(definition.same_layout(standard[name]) for name, definition in own.items())
 

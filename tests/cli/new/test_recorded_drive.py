@@ -7,10 +7,10 @@ import pytest
 import yaml
 
 from dodo_dsl import package_data
-from dodo_dsl.cli.new.recorded_drive import SIGNALS
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.cli.recorded_drive import SIGNALS
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
 from tests.cli.new.test_command import contents, dodo
 
 SHIPPED = package_data.registry() / "recordings/kiwi-track.rec"

@@ -9,7 +9,7 @@ import pytest
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.report import results
-from dodo_dsl.spec.goals import Goal
+from dodo_dsl.spec.model import Goal
 from tests.cli.rank.test_score import run
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dodo_dsl.cli.rank.score import rank, run_score
+from dodo_dsl.cli.rank import rank, run_score
 from dodo_dsl.outcome import Outcome, Result
-from dodo_dsl.spec.goals import Goal
+from dodo_dsl.spec.model import Goal
 
 BASE = Outcome("t", "t", "t.dodo.yml", "sil", "closed-loop", "passed", "so", 130, 0, "lockstep", "process")
 GOALS = (Goal("time", 20.0, 10.0, 3.0), Goal("margin", 0.0, 0.25))

@@ -8,14 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.rec import command
-from dodo_dsl.rec.truth import Mark, text
+from dodo_dsl.cli import rec
+from dodo_dsl.rec.truth import Mark, truth_text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, video
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
-SHOWN = re.findall(
-    r"^ +dodo rec (.*?)(?:  |$)", PAGE + command.EXAMPLES + command._CUT + command._EXPORT + command._INFO, re.MULTILINE
-)
+SHOWN = re.findall(r"^ +dodo rec (.*?)(?:  |$)", PAGE + rec.EXAMPLES + rec._CUT + rec._EXPORT + rec._INFO, re.MULTILINE)
 
 
 @pytest.mark.parametrize("words", sorted(set(SHOWN)))
@@ -35,7 +33,7 @@ def test_the_lines_shown_run(
     box = [message("opendlv.logic.perception.DetectionBoundingBox", BEGIN + 100_000, stamp) for stamp in (0, 3)]
     for name in ("drive.rec", "old.rec", "desk.rec"):
         record([*video(4), *others, *box], name)
-    (tmp_path / "desk.json").write_text(text([Mark("yellow", 1, 2, 3, 4)], "desk.png", WIDTH, HEIGHT))
+    (tmp_path / "desk.json").write_text(truth_text([Mark("yellow", 1, 2, 3, 4)], "desk.png", WIDTH, HEIGHT))
     code, stdout, stderr = dodo_rec(*shlex.split(words))
     assert (code, stderr) == (0, "") and stdout
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.envelope import Envelope
 from tests.rec.conftest import BEGIN, dodo_rec
 
 CONE = "message team.Cone [id = 8000] { uint32 colour [id = 1]; }\n"

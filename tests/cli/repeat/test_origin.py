@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli.main import parser
-from dodo_dsl.cli.repeat.command_line import command_line
-from dodo_dsl.cli.repeat.origin import Origin, recording
-from dodo_dsl.cli.repeat.repositories import asking
+from dodo_dsl.cli.provenance import Origin, asking, command_line, recording
 
 
 def git(folder: Path, *words: str) -> str:

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import yaml
 
+from dodo_dsl.cli import rig_camera
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.rig import camera_measurement
-from dodo_dsl.run.rigs import camera
+from dodo_dsl.run.rigs import access
 from dodo_dsl.run.rigs.access import Command
-from dodo_dsl.spec.deployment.deployment import load_deployment
+from dodo_dsl.spec.deployment import load_deployment
 from dodo_dsl.spec.manifest import load_manifests
 from tests.calibration.board_pictures import pictures
 
@@ -50,7 +50,7 @@ def test_a_camera_is_measured_by_pictures_and_written(tmp_path: Path, monkeypatc
     deployment, problems = load_deployment(tmp_path / "dodo.yml")
     assert not problems and deployment.rigs["desk"].text("camera.intrinsics.fovy").startswith("48.9")
     parameters = load_manifests(())[0]["projected-truth"].parameters
-    given = {name: camera._of_rig(deployment.rigs["desk"], about).value for name, about in parameters.items()}
+    given = {name: access._of_rig(deployment.rigs["desk"], about).value for name, about in parameters.items()}
     assert given["fovy"] and float(given["fovy"].text) == pytest.approx(48.887, abs=0.1)
     k1, p1 = given["distortion.k1"], given["distortion.p1"]
     assert k1 and p1 and (float(k1.text), float(p1.text)) == pytest.approx((-0.12, 0.001), abs=0.01)
@@ -72,8 +72,8 @@ def test_a_camera_is_measured_in_a_dialogue(tmp_path: Path, monkeypatch: pytest.
         yield query
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(camera_measurement, "occupied", occupied)
-    monkeypatch.setattr(camera_measurement, "PICTURES", 9)
+    monkeypatch.setattr(rig_camera, "occupied", occupied)
+    monkeypatch.setattr(rig_camera, "PICTURES", 9)
     monkeypatch.setattr(sys, "stdin", StringIO("\n" * 10))
     (tmp_path / "dodo.yml").write_text(RIGS)
     said = dodo("measure", "desk", "--camera", "--dry-run", code=0)

@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.rig.truth_command import EXAMPLES
-from services.object_detection.truth import load
+from dodo_dsl.cli.rig_truth import EXAMPLES
+from services.object_detection.boxes import load
 from tests.drive.applications import ROOT
 
 CONES = "cone_yellow=yellow,cone_blue=blue"

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.rig import command, gantry_flags
-from dodo_dsl.spec.deployment.deployment import load_deployment
+from dodo_dsl.cli.rig import ACTIONS, _sentence, add
+from dodo_dsl.run.rigs import access
+from dodo_dsl.spec.deployment import load_deployment
 
 
 @pytest.fixture(autouse=True)
@@ -50,7 +51,7 @@ def test_constants_of_the_rig_are_flags_of_the_gantry(folder: Path) -> None:
     (folder / "dodo.yml").write_text(f"dodo: 1\nrigs: {{desk: {{kind: dynamic, cid: 120, axes: {{{axes}}}}}}}\n")
     deployment, problems = load_deployment(folder / "dodo.yml")
     assert not problems
-    flags = gantry_flags.flags(deployment.rigs["desk"])
+    flags = access.flags(deployment.rigs["desk"])
     assert flags == ["--steps-x=3300", "--offset-x=2990.5", "--steps-yaw=0.549778714378214"]
 
 
@@ -73,17 +74,17 @@ def test_a_limit_that_the_gantry_refuses_is_named_as_it_is_written(folder: Path,
 
 def test_a_result_in_words() -> None:
     result = {"rig": "desk", "quarantine": "", "says": "ready", "x": 0.1, "y": -0.25, "yaw": 90.0}
-    assert command._sentence(result) == "desk: ready, x = 0.100 m, y = -0.250 m, yaw = 90.0 degrees"
-    assert command._sentence({**result, "x": None}) == "desk: ready"
-    assert command._sentence({"rig": "desk", "quarantine": ""}) == "desk: not in quarantine"
+    assert _sentence(result) == "desk: ready, x = 0.100 m, y = -0.250 m, yaw = 90.0 degrees"
+    assert _sentence({**result, "x": None}) == "desk: ready"
+    assert _sentence({"rig": "desk", "quarantine": ""}) == "desk: not in quarantine"
     broken = {"rig": "desk", "quarantine": "belt", "error": "no answer"}
-    assert command._sentence(broken) == "desk: no answer; in quarantine: belt; 'dodo rig clear desk' ends it"
+    assert _sentence(broken) == "desk: no answer; in quarantine: belt; 'dodo rig clear desk' ends it"
 
 
-@pytest.mark.parametrize("action", [*command.ACTIONS, "truth", "measure"])
+@pytest.mark.parametrize("action", [*ACTIONS, "truth", "measure"])
 def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
     parser = argparse.ArgumentParser(prog="dodo rig")
-    command.add(parser)
+    add(parser)
     with pytest.raises(SystemExit, match="0"):
         parser.parse_args([action, "--help"])
     assert "--wait S" in capsys.readouterr().out

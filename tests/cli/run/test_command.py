@@ -17,8 +17,8 @@ import jsonschema
 import pytest
 
 from dodo_dsl import __version__, package_data
+from dodo_dsl.cli import run as cli_run
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.run import command
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import to_json
@@ -87,7 +87,7 @@ def dodo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Command]:
     def backends(*_: object) -> ScriptedBackends:
         return ScriptedBackends(lambda tested, _: made.backend(tested, made.stages))
 
-    monkeypatch.setattr(command, "Processes", backends)
+    monkeypatch.setattr(cli_run, "Processes", backends)
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     yield made
     for number, handler in before.items():

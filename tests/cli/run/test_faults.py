@@ -20,8 +20,8 @@ FLOODS = "while True: print('x' * 1000, flush=True)\n"
 HOST = ("--isolation", "host")
 STUBBORN = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
 TALKS = """
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
 with Session(int(sys.argv[1].partition("=")[2])) as bus:
     while True:
         bus.send_envelope(Envelope(1086, b"", 1, 1, 1, 0))

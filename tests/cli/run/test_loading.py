@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.run.loading import begin, loading
-from dodo_dsl.run.process.forks import fork_server_client
-from dodo_dsl.run.process.forks.fork_server_client import ForkServer
+from dodo_dsl.cli.run_jobs import begin, loading
+from dodo_dsl.run.process import fork_server_client
+from dodo_dsl.run.process.fork_server_client import ForkServer
 from tests.run.desk import ROOT
 
 

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from dodo_dsl.cli.run.live import LiveProgress, Pace
-from dodo_dsl.cli.run.progress import PlainProgress, about, choose, count
-from dodo_dsl.run.standing import Standing
+from dodo_dsl.cli.live_table import LiveProgress, Pace
+from dodo_dsl.cli.progress import PlainProgress, about, choose, count
+from dodo_dsl.run.run_state import Standing
 from tests.cli.terminal import SAID, Terminal, shown, wide
 from tests.report.test_report_folder import OUTCOME
 

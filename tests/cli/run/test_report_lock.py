@@ -3,7 +3,7 @@
 import io
 from pathlib import Path
 
-from dodo_dsl.cli.run.report_lock import reserved
+from dodo_dsl.cli.run import reserved
 
 
 def said(folder: Path) -> str:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.run import saved_files
-from dodo_dsl.cli.run.saved_files import saved, seen
+from dodo_dsl.cli import watch
+from dodo_dsl.cli.watch import saved, seen
 
 
 @pytest.fixture
@@ -41,5 +41,5 @@ def test_links_lead_into_no_other_folder_and_a_missing_folder_is_empty(folder: P
 
 
 def test_no_more_files_than_can_be_looked_at(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(saved_files, "MOST_FILES", 1)
+    monkeypatch.setattr(watch, "MOST_FILES", 1)
     assert names(folder, seen([folder], ())) == ["a.py"]

@@ -4,8 +4,8 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-from dodo_dsl.cli.display.verbosity import Verbosity
-from dodo_dsl.cli.run import summary
+from dodo_dsl.cli import run_report
+from dodo_dsl.cli.display import Verbosity
 from dodo_dsl.outcome import NotRun, ServiceUse
 from tests.report.test_report_folder import OUTCOME
 
@@ -14,7 +14,7 @@ PASSED = replace(OUTCOME, name="ok", slug="ok", outcome="passed", reason="reache
 
 def text(outcomes: list[object], tests: dict[str, str], skipped: tuple[NotRun, ...] = ()) -> str:
     stream = StringIO()
-    summary.write(stream, outcomes, tests, skipped)  # type: ignore[arg-type]
+    run_report.write_summary(stream, outcomes, tests, skipped)  # type: ignore[arg-type]
     return stream.getvalue()
 
 
@@ -42,7 +42,7 @@ def test_repetitions_have_a_rate_and_skipped_tests_are_named() -> None:
 
 def test_quiet_names_only_what_did_not_pass() -> None:
     stream = StringIO()
-    summary.write(stream, [PASSED, OUTCOME], {"ok": "ok", "test": "test"}, [], Verbosity.QUIET)
+    run_report.write_summary(stream, [PASSED, OUTCOME], {"ok": "ok", "test": "test"}, [], Verbosity.QUIET)
     assert stream.getvalue() == "FAILED  test  hit wall\n1 passed, 1 failed, 0 in error\n"
 
 
@@ -52,7 +52,7 @@ def test_verbose_shows_checks_use_and_what_services_complained_of(tmp_path: Path
     passed = replace(PASSED, checks=({"name": "gap", "value": 0.5, "limit": {"min": 0.1}, "unit": "m", "ok": True},))
     passed = replace(passed, resources=(ServiceUse("steering", 1.5, 0.25, 150_000_000, 5e6, None),))
     stream = StringIO()
-    summary.write(stream, [passed], {"ok": "ok"}, [], Verbosity.VERBOSE, {"ok": tmp_path})
+    run_report.write_summary(stream, [passed], {"ok": "ok"}, [], Verbosity.VERBOSE, {"ok": tmp_path})
     used = "1.50 s of processor time (25 % of a processor), up to 150 MB of memory, growing by 300 MB/min"
     assert stream.getvalue().splitlines()[2:9] == [
         "        ok   gap: 0.5 m (at least 0.1 m)",

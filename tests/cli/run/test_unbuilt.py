@@ -7,7 +7,7 @@ import pytest
 
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import parser
-from dodo_dsl.cli.run.jobs import prepare
+from dodo_dsl.cli.run_jobs import prepare
 from tests.check import examples
 
 DRIVER = """\

@@ -7,12 +7,7 @@ import signal
 
 import pytest
 
-from dodo_dsl.cli.run.uninterrupted import (
-    UninterruptedStream,
-    more_descriptors,
-    stop_like_interrupt,
-    undisturbed,
-)
+from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
 
 
 def test_a_reader_that_leaves_ends_nothing() -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.cli import run, watch
 from dodo_dsl.cli.main import main, parser
-from dodo_dsl.cli.run import command, watch
-from dodo_dsl.cli.run.watch import Watch
+from dodo_dsl.cli.watch import Watch
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import results
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
@@ -65,7 +65,7 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     shutil.copytree(ROOT / "examples/kiwi", tmp_path / "kiwi", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\n")
     made = Desk(tmp_path)
-    monkeypatch.setattr(command, "Processes", lambda *_: ScriptedBackends(made.backend))
+    monkeypatch.setattr(run, "Processes", lambda *_: ScriptedBackends(made.backend))
     given = options("--watch", "--clock", "lockstep", "--isolation", "host", "--report", "report")
     with work_folder() as folder:
         made.watch = Watch(given, folder, made.stdout)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dodo_dsl.cli.stats.reuse import averaged, fit, in_order
+from dodo_dsl.cli.stats import averaged, fit, in_order
 
 _LOOP = ("virtual-camera", "dynamic-model", "integrator", "collision")
 _OPEN = ("virtual-camera", "beacon", "continuous-signal")

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dodo_dsl.cli.stats.student_t import quantile
+from dodo_dsl.cli.stats import quantile
 
 
 @given(st.floats(0.5, 0.9999), st.integers(1, 200))

@@ -16,9 +16,9 @@ from threading import Thread
 
 import sysv_ipc
 
-from dodo_dsl.opendlv.bus.address import group
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.address import group
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
 
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 CID = int(FLAGS["cid"])

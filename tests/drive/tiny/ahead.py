@@ -2,8 +2,8 @@
 
 import argparse
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--cid", type=int)

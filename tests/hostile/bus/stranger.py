@@ -17,10 +17,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.bus.address import group
-from dodo_dsl.opendlv.bus.envelope import Envelope, decode_frame, encode_frame
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.address import group
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 STEER, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"

@@ -1,9 +1,9 @@
 import subprocess
 import sys
 
-from dodo_dsl.opendlv.bus.address import group
+from dodo_dsl.opendlv.address import group
 
-LOADED = "import sys; import dodo_dsl.opendlv.bus.address; print(*(m for m in sys.modules if m.startswith('dodo_dsl')))"
+LOADED = "import sys; import dodo_dsl.opendlv.address; print(*(m for m in sys.modules if m.startswith('dodo_dsl')))"
 
 
 def test_the_group_and_port_of_libcluon() -> None:
@@ -13,5 +13,5 @@ def test_the_group_and_port_of_libcluon() -> None:
 def test_sandboxes_load_it_without_anything_else() -> None:
     loaded = subprocess.run([sys.executable, "-S", "-c", LOADED], capture_output=True, text=True, check=True).stdout
     assert set(loaded.split()) == {
-        "dodo_dsl", "dodo_dsl.opendlv", "dodo_dsl.opendlv.bus", "dodo_dsl.opendlv.bus.address",
+        "dodo_dsl", "dodo_dsl.opendlv", "dodo_dsl.opendlv.bus", "dodo_dsl.opendlv.address",
     }  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, body_length, decode_frame, encode_frame
+from dodo_dsl.opendlv.envelope import Envelope, FrameError, body_length, decode_frame, encode_frame
 from tests.opendlv import vectors
 
 times = st.integers(-(2**31) * 1_000_000, 2**31 * 1_000_000 - 1)

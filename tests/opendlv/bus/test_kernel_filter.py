@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus import kernel_filter
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv import session
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 
 IDS = st.integers(1, 2**31 - 1)
 
@@ -34,19 +34,19 @@ def passed(pair: tuple[socket.socket, socket.socket], data: bytes) -> bool:
 
 @given(st.sets(IDS, max_size=9), st.lists(IDS, max_size=9))
 def test_only_these_ids_pass(pair: tuple[socket.socket, socket.socket], wanted: set[int], others: list[int]) -> None:
-    assert kernel_filter.attach(pair[0], wanted)
+    assert session.attach_filter(pair[0], wanted)
     for id_ in [*wanted, *others]:
         assert passed(pair, encode_frame(Envelope(id_, b"payload", 1, 2, 3, 4))) == (id_ in wanted), id_
 
 
 @pytest.mark.parametrize("data", [b"0123456789012345", b"\x0d\xa4\x03\0\0\x12\x01x\x08\x02"])
 def test_what_does_not_begin_with_an_id_passes(pair: tuple[socket.socket, socket.socket], data: bytes) -> None:
-    assert kernel_filter.attach(pair[0], [7])
+    assert session.attach_filter(pair[0], [7])
     assert passed(pair, data)
 
 
 def test_more_ids_than_a_filter_holds_are_left_to_the_process(pair: tuple[socket.socket, socket.socket]) -> None:
-    assert not kernel_filter.attach(pair[0], range(1, 3000))
+    assert not session.attach_filter(pair[0], range(1, 3000))
 
 
 @given(st.sets(IDS, max_size=5), st.sets(IDS, max_size=5), st.booleans())
@@ -55,6 +55,6 @@ def test_some_pass_only_from_others(
 ) -> None:
     host, port = pair[1].getsockname()
     than = [("127.0.0.2", port), (host, port + 1 if port < 65_535 else 1)] + ([(host, port)] if is_one else [])
-    assert kernel_filter.attach(pair[0], ids, of_others, than)
+    assert session.attach_filter(pair[0], ids, of_others, than)
     for id_ in ids | of_others:
         assert passed(pair, encode_frame(Envelope(id_, b"", 1, 2, 3, 4))) == (id_ in ids or not is_one), id_

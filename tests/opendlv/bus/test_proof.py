@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.proof import is_proven, with_proof
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.authentication import is_proven, with_proof
+from dodo_dsl.opendlv.message_set import MessageSet
 
 KEYS = st.binary(min_size=1, max_size=64)
 IDS = st.integers(1, 2**31 - 1)

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus import session as sessions
-from dodo_dsl.opendlv.bus.address import group
-from dodo_dsl.opendlv.bus.envelope import Envelope, decode_frame, encode_frame
-from dodo_dsl.opendlv.bus.session import MAX_DATAGRAM_BYTES, Session, SessionError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv import session as sessions
+from dodo_dsl.opendlv.address import group
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import MAX_DATAGRAM_BYTES, Session, SessionError
 from tests.opendlv.conftest import Peer
 
 STANDARD = MessageSet.standard()
@@ -130,7 +130,7 @@ IDS = [0, 5, 63, 64, 1090, 8191, 8192, 1_048_575, 1_048_576, 2**31 - 1, -1, -64,
 @pytest.mark.thorough
 def test_only_some_messages_are_heard(cid: int, is_kernel_able: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not is_kernel_able:
-        monkeypatch.setattr(sessions.kernel_filter, "attach", lambda *_: False)
+        monkeypatch.setattr(sessions, "attach_filter", lambda *_: False)
     for chosen in ([], [1090], IDS[::2], IDS[1::2], range(300)):
         with Session(cid) as session, Session(cid) as other:
             session.hear_only(chosen)
@@ -178,7 +178,7 @@ def test_a_machine_without_a_route_for_multicast() -> None:
     alone = ["unshare", "--net", "--map-root-user"]
     if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False, capture_output=True).returncode:
         pytest.skip("no network namespace can be made here")
-    code = "from dodo_dsl.opendlv.bus.session import Session\ntry: Session(130)\nexcept OSError as error: print(error)"
+    code = "from dodo_dsl.opendlv.session import Session\ntry: Session(130)\nexcept OSError as error: print(error)"
     done = subprocess.run([*alone, sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("the bus 225.0.0.130:12175 cannot be joined: ")
     assert done.stdout.endswith(" (is there a route to 224.0.0.0/4?)\n")

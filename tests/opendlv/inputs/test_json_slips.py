@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs.json_slips import JsonError, loads
+from dodo_dsl.opendlv.assets.json_file import JsonError, loads
 
 _NUMBER = "write digits before and behind the point, as in 0.5, and no other zero or plus before them"
 _VALUE = "a value is a text in double quotes, a number, true, false, null, [...] or {...}"

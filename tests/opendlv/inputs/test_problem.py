@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.inputs.problem import InputError, json_position
+from dodo_dsl.opendlv.assets.problem import InputError, json_position
 
 TEXT = """{"a": {"b": 1, "b": [10,
    {"c": "]}"}, 30] },

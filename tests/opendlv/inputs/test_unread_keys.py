@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.inputs import formats
-from dodo_dsl.opendlv.inputs.problem import InputError
+from dodo_dsl.opendlv.assets import formats
+from dodo_dsl.opendlv.assets.problem import InputError
 
 MAP: dict[str, Any] = {
     "model": [{"name": "cone", "file": "cone.obj", "color": [1, 0, 0], "instances": [[0, 1, 0, 0]]}],

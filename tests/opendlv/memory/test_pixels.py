@@ -2,8 +2,8 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.memory import pixels
-from dodo_dsl.opendlv.memory.pixels import PixelError
+from dodo_dsl.opendlv import pixels
+from dodo_dsl.opendlv.pixels import PixelError
 
 WIDTH, HEIGHT = 64, 48
 SMOOTH = cv2.resize(np.random.default_rng(3).integers(100, 156, (3, 4, 3), np.uint8), (WIDTH, HEIGHT))

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import sysv_ipc
 
-from dodo_dsl.opendlv.memory import token_file
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv import sysv_memory
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from tests.opendlv.conftest import Peer
 
 SIZE = 64 * 48 * 4
@@ -142,9 +142,9 @@ def test_colliding_keys_are_avoided(memory_name: str) -> None:
     twin.touch()
     os.link(twin, path)  # the same inode gives the same keys, as two inodes 65536 apart would
     try:
-        assert token_file.collides(path)
+        assert sysv_memory.token_collides(path)
         with SharedMemory.create(memory_name, 10) as memory:
-            assert not token_file.collides(path)
+            assert not sysv_memory.token_collides(path)
             memory.buffer[0] = 1
             with SharedMemory.attach(memory_name) as reader:
                 assert reader.buffer[0] == 1
@@ -177,7 +177,7 @@ def test_what_another_user_left_under_these_keys_is_avoided(memory_name: str) ->
     token = Path("/tmp", memory_name)
     token.touch()
     os.chown(token, NOBODY, NOBODY)
-    left = sysv_ipc.SharedMemory(token_file.key(token.stat(), 1), sysv_ipc.IPC_CREX, size=10, mode=0o666)
+    left = sysv_ipc.SharedMemory(sysv_memory.token_key(token.stat(), 1), sysv_ipc.IPC_CREX, size=10, mode=0o666)
     left.detach()
     try:
         creator = multiprocessing.get_context("fork").Process(target=create_as_nobody, args=(memory_name,))

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.messages import columns
-from dodo_dsl.opendlv.messages.codec import MessageError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.frame_table import PADDING
+from dodo_dsl.opendlv import message_columns
+from dodo_dsl.opendlv.frame_table import PADDING
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 
 ODVD = """
 message test.Inner [id = 8001] { int8 small [id = 1]; string text [id = 2]; }
@@ -51,8 +50,8 @@ def decoded(messages: MessageSet, payloads: list[bytes]) -> tuple[list[dict[str,
     ends = np.cumsum([len(payload) for payload in payloads], dtype=np.int64)
     starts = ends - np.array([len(payload) for payload in payloads], np.int64)
     layout = messages.layout("test.Every")
-    decoded, good = columns.decode(layout, b"".join(payloads) + PADDING, starts, ends)
-    assert [(column.name, column.type) for column in decoded] == list(columns.names(layout))
+    decoded, good = message_columns.decode(layout, b"".join(payloads) + PADDING, starts, ends)
+    assert [(column.name, column.type) for column in decoded] == list(message_columns.names(layout))
     rows = [{column.name: column.values[row] for column in decoded} for row in range(len(payloads))]
     return rows, good.tolist()
 
@@ -96,7 +95,7 @@ def test_a_payload_that_ends_before_the_size_of_its_last_field_is_damaged() -> N
     layout, data = standard.layout(2905), bytes.fromhex("082710a6011a")  # dodo.RecordedStep, its last field is bytes
     with pytest.raises(MessageError):
         standard.decode(2905, data)
-    _, good = columns.decode(layout, data + PADDING, np.array([0]), np.array([len(data)]))
+    _, good = message_columns.decode(layout, data + PADDING, np.array([0]), np.array([len(data)]))
     assert not good[0]
 
 
@@ -116,4 +115,4 @@ def test_usual_payloads_tell_a_message(messages: MessageSet, tmp_path: Path) -> 
     usual = messages.encode(messages.type(8000)())
     data = usual + b"\x18\x05" + PADDING
     starts, ends = np.array([0, len(usual)]), np.array([len(usual), len(usual) + 2])
-    assert columns.usual_rows(messages.layout(8000), data, starts, ends).tolist() == [True, False]
+    assert message_columns.usual_rows(messages.layout(8000), data, starts, ends).tolist() == [True, False]

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.messages.message_set import MessageError, MessageSet, UnknownMessage
-from dodo_dsl.opendlv.odvd.parser import OdvdError
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet, UnknownMessage
+from dodo_dsl.opendlv.odvd import OdvdError
 from tests.opendlv import vectors
 
 STANDARD = MessageSet.standard()

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.messages import protobuf_classes
-from dodo_dsl.opendlv.odvd.parser import OdvdError, parse
+from dodo_dsl.opendlv import protobuf_classes
+from dodo_dsl.opendlv.odvd import OdvdError, parse
 
 
 def layout(text: str, name: str) -> protobuf_classes.Layout:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages import versions
-from dodo_dsl.opendlv.messages.message_set import OWN_IDS, MessageSet
-from dodo_dsl.opendlv.messages.versions import NEW, OLD
-from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9, parser
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv import message_versions, odvd
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import OWN_IDS, MessageSet
+from dodo_dsl.opendlv.message_versions import NEW, OLD
+from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
+from dodo_dsl.opendlv.recording import Recording
 
-SETS = {version: versions.load(version) for version in (OLD, NEW)}
+SETS = {version: message_versions.load(version) for version in (OLD, NEW)}
 PROXY, SENSATION, PERCEPTION = "opendlv.proxy.", "opendlv.logic.sensation.", "opendlv.logic.perception."
 WHOLE = {
     # 1.0 of March 2024
@@ -38,7 +38,7 @@ def floats(*values: float) -> bytes:
 
 @pytest.mark.parametrize("path", WHOLE, ids=lambda path: path.name)
 def test_a_file_holds_every_message_of_its_set(path: Path) -> None:
-    standard = [d.id for d in parser.load(path) if d.name.startswith("opendlv.")]
+    standard = [d.id for d in odvd.load(path) if d.name.startswith("opendlv.")]
     assert sorted(standard) == sorted(WHOLE[path])
 
 
@@ -103,7 +103,9 @@ def test_what_only_0_9_has_is_decoded(id_: int, payload: bytes, fields: dict[str
 def test_every_id_whose_payloads_tell_the_sets_apart_is_looked_at() -> None:
     old, new = SETS[OLD], SETS[NEW]
     apart = old.ids() ^ new.ids() | {id_ for id_ in old.ids() & new.ids() if wire(old, id_) != wire(new, id_)}
-    assert apart - {1055} == set(versions.TELLING) - {1128, 1129}, "these two have no clash, but only 0.9 has them"
+    assert apart - {1055} == set(message_versions.TELLING) - {1128, 1129}, (
+        "these two have no clash, but only 0.9 has them"
+    )
 
 
 def wire(messages: MessageSet, id_: int) -> list[tuple[int, str]]:
@@ -127,14 +129,14 @@ def test_the_set_is_told_by_its_payloads(payloads: dict[int, bytes], version: st
     path = tmp_path / "a.rec"
     path.write_bytes(b"".join(encode_frame(Envelope(id_, payload, 1, 1, 1, 0)) for id_, payload in payloads.items()))
     with Recording(path) as recording:
-        assert versions.version_of(recording) == version
+        assert message_versions.version_of(recording) == version
 
 
 def test_own_messages_replace_those_of_either_set(tmp_path: Path) -> None:
     own = tmp_path / "own.odvd"
     own.write_text("message team.Lap [id = 1140] { uint32 number; } message opendlv.sim.Frame [id = 1001] { float x; }")
     for version in SETS:
-        messages = versions.load(version, own)
+        messages = message_versions.load(version, own)
         assert messages.name(1140) == "team.Lap"
         assert messages.id("opendlv.sim.Frame") == 1001 and 1003 not in messages.ids()
         assert PERCEPTION + "GroundSurface" not in messages.names()
@@ -143,6 +145,6 @@ def test_own_messages_replace_those_of_either_set(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["cones-2020-05-15.rec", "sim-2023-04-27.rec", "track-1-2025-05-08.rec"])
 def test_recordings_of_others_hold_known_messages(name: str, shared_data: Callable[[str], Path]) -> None:
     with Recording(shared_data(name)) as recording:
-        messages = versions.load(versions.version_of(recording))
+        messages = message_versions.load(message_versions.version_of(recording))
         found = Counter(recording.index["data_type"].tolist())
     assert set(found) - messages.ids() <= {1144}, "1144 is the author's own"

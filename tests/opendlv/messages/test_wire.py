@@ -5,8 +5,8 @@ from google.protobuf.internal import encoder
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.messages import wire
-from dodo_dsl.opendlv.messages.wire import DELIMITED, EIGHT_BYTES, FOUR_BYTES, VARINT
+from dodo_dsl.opendlv import wire
+from dodo_dsl.opendlv.wire import DELIMITED, EIGHT_BYTES, FOUR_BYTES, VARINT
 
 NUMBERS = st.integers(0, 2**64 - 1)
 

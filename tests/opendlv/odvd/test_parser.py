@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.odvd import parser
-from dodo_dsl.opendlv.odvd.parser import OdvdError
+from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.odvd import OdvdError
 
 
 def test_names_ids_types_and_defaults() -> None:
-    first, second = parser.parse(
+    first, second = odvd.parse(
         """
         package a.b; // libcluon writes the package before the name
         message c.First [id = 7,] {
@@ -35,7 +35,7 @@ def test_names_ids_types_and_defaults() -> None:
 
 
 def test_fields_without_id_are_counted_apart_from_the_others() -> None:
-    (message,) = parser.parse("message M [id = 1] { float a [id = 5]; float b; float c []; }")
+    (message,) = odvd.parse("message M [id = 1] { float a [id = 5]; float b; float c []; }")
     assert [field.number for field in message.fields] == [5, 1, 2]
 
 
@@ -62,24 +62,24 @@ def test_fields_without_id_are_counted_apart_from_the_others() -> None:
 )
 def test_errors_name_the_place(text: str, error: str) -> None:
     with pytest.raises(OdvdError) as raised:
-        parser.parse(text, "f.odvd")
+        odvd.parse(text, "f.odvd")
     assert error in str(raised.value)
 
 
 def test_files_that_cannot_be_used(tmp_path: Path) -> None:
     missing, binary, large = tmp_path / "missing.odvd", tmp_path / "binary.odvd", tmp_path / "large.odvd"
     binary.write_bytes(b"\xff\xfe")
-    large.write_text(" " * (parser.MAX_FILE_BYTES + 1))
+    large.write_text(" " * (odvd.MAX_FILE_BYTES + 1))
     for path, text in [(missing, "No such file"), (binary, "UTF-8"), (large, "larger than 1000000 bytes")]:
         with pytest.raises(OdvdError, match=text) as raised:
-            parser.load(path)
+            odvd.load(path)
         assert str(raised.value).startswith(f"{path}: ")
 
 
 @given(st.text() | st.text("message M[id=1]{}float x;,\"'0/*\n"))
 def test_any_text_gives_messages_or_an_error_with_a_place(text: str) -> None:
     try:
-        messages = parser.parse(text, "f.odvd")
+        messages = odvd.parse(text, "f.odvd")
     except OdvdError as error:
         assert str(error).startswith("f.odvd:")
     else:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.odvd.tokens import OdvdError, tokens
+from dodo_dsl.opendlv.odvd import OdvdError, tokens
 
 
 def words(text: str) -> list[tuple[str, str, str]]:

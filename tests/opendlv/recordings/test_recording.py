@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.recordings.damage import MAX_PLACES, Damage, DamagePlace
-from dodo_dsl.opendlv.recordings.recording import Recording, RecordingError, read_envelopes
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.recording import MAX_PLACES, Damage, DamagePlace, Recording, RecordingError, read_envelopes
 
 times = st.integers(-(2**31) * 1_000_000, 2**31 * 1_000_000 - 1)
 envelopes = st.builds(
@@ -189,7 +188,7 @@ def test_files_that_are_no_recordings(tmp_path: Path) -> None:
 LARGE = """
 import sys
 from pathlib import Path
-from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.recording import Recording, read_envelopes
 path = Path(sys.argv[1])
 assert sum(1 for _ in read_envelopes(path)) == 96
 with Recording(path) as recording:
@@ -233,8 +232,8 @@ def test_recordings_of_others(name: str, shared_data: Callable[[str], Path]) -> 
 WRITER = """
 import sys, itertools
 from pathlib import Path
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
 assert "numpy" not in sys.modules
 with RecordingWriter(Path(sys.argv[1])) as writer:
     for number in itertools.count():

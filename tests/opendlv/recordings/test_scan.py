@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.recordings import scan
-from dodo_dsl.opendlv.recordings.scan import Scanner
+from dodo_dsl.opendlv import recording
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.recording import Scanner
 
 ENVELOPES = st.builds(
     Envelope,
@@ -27,7 +27,7 @@ GARBAGE = st.binary(max_size=9).filter(lambda data: b"\x0d" not in data and b"\x
 def few_bytes_at_a_time() -> object:
     """Chunks of the reader that end anywhere in a frame."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scan, "CHUNK_BYTES", 16)
+        patch.setattr(recording, "CHUNK_BYTES", 16)
         yield
 
 
@@ -53,7 +53,7 @@ def test_a_frame_that_is_cut_short_is_damage(rest: int) -> None:
 
 
 def test_rows_are_selected_in_any_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scan, "CHUNK_BYTES", 1 << 16)
+    monkeypatch.setattr(recording, "CHUNK_BYTES", 1 << 16)
     envelopes = [Envelope(7, bytes([number]), 1, 2, number, 4) for number in range(3)]
     (batch,) = Scanner(io.BytesIO(b"".join(map(encode_frame, envelopes)))).batches()
     assert [e.sample_time for e in batch.select(np.array([2, 0])).envelopes()] == [2, 0]

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.inputs import recording_contents
-from dodo_dsl.opendlv.recordings import timing
-from dodo_dsl.opendlv.recordings.recording import Recording
+from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.assets import recording_contents
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.recording import Recording
 
 T0, S, STEERING, TOOL = 1_600_000_000_000_000, 1_000_000, 1090, 11
 DRIVE = [Envelope(STEERING, bytes([n]), t, t, t, n % 2) for n, t in enumerate(range(T0, T0 + 20 * S, S))]
@@ -40,7 +40,7 @@ def test_what_cannot_be_right_is_told_with_its_place(tmp_path: Path, envelopes: 
     path.write_bytes(b"".join(map(encode_frame, envelopes)))
     with Recording(path) as recording:
         types = recording.index["data_type"]
-        found = timing.fault(recording, np.flatnonzero(types < 2900))
+        found = recording_times.fault(recording, np.flatnonzero(types < 2900))
     assert found.startswith(said)
     assert bool(found) == bool(said)
     problems = list(recording_contents.problems(path, STEERING, 0, "steering", is_needed=True))
@@ -52,7 +52,7 @@ def test_times_of_tools_lie_within_those_of_the_others(tmp_path: Path) -> None:
     tools = [Envelope(TOOL, b"", time, time, time, 0) for time in (T0 - 90 * S, T0 + 90 * S)]
     path.write_bytes(b"".join(map(encode_frame, [*tools, *DRIVE])))
     with Recording(path) as recording:
-        times = timing.within(recording, np.arange(len(recording)))
+        times = recording_times.within(recording, np.arange(len(recording)))
     assert (times.min(), times.max()) == (T0, T0 + 19 * S)
 
 
@@ -60,4 +60,4 @@ def test_times_of_tools_lie_within_those_of_the_others(tmp_path: Path) -> None:
     ("seconds", "text"), [(0.25, "0.25 s"), (119, "119 s"), (7200, "120 minutes"), (2e5, "2 days"), (1.7e9, "54 years")]
 )
 def test_durations_are_told_in_a_unit_that_suits(seconds: float, text: str) -> None:
-    assert timing.span(seconds) == text
+    assert recording_times.span(seconds) == text

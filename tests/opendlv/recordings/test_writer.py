@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError, encode_frame
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from dodo_dsl.opendlv.envelope import Envelope, FrameError, encode_frame
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
 
 ENVELOPE = Envelope(1086, b"\x0d\x00\x00\x00\x00", 1, 2, 3, 4)
 

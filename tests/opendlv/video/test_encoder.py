@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.memory import pixels
-from dodo_dsl.opendlv.video.decoder import VideoDecoder, VideoError, has_key_frame
-from dodo_dsl.opendlv.video.encoder import VideoEncoder
+from dodo_dsl.opendlv import pixels
+from dodo_dsl.opendlv.video import VideoDecoder, VideoEncoder, VideoError, has_key_frame
 
 WIDTH, HEIGHT = 84, 46  # no multiple of 16, so that rows are padded
 

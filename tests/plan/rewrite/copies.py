@@ -7,7 +7,7 @@ from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.model import Look
 from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy, Setting
 from dodo_dsl.plan.rewrite.volumes import FileCopies
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 FOLDER = Path("/builds/team")
 CONFINED: dict[str, Any] = {

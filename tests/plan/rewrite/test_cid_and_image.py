@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.plan.rewrite.cid_and_image import assign_cid, assign_image
+from dodo_dsl.plan.rewrite.service_copy import assign_cid, assign_image
 from tests.plan.rewrite.copies import copy
 
 

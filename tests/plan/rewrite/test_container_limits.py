@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.plan.rewrite.confinement import LOGS, confine
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.plan.rewrite.copies import CONFINED, copy
 
 

@@ -17,14 +17,14 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
-import dodo_dsl.rec.export
+import dodo_dsl.rec
 from dodo_dsl import advice
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages import versions
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.rec.export import foxglove
-from dodo_dsl.rec.export.mcap_file import topic
+from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.rec import mcap
+from dodo_dsl.rec.mcap import topic
 from tests.opendlv.test_against_libcluon import some_value
 from tests.rec.conftest import BEGIN, MESSAGES, dodo_rec, message, video
 
@@ -217,8 +217,8 @@ ANGLE = st.floats(-3.125, 3.125, width=32)
 @given(ANGLE, ANGLE, ANGLE)
 def test_angles_of_set_0_9_turn_as_three_rotations(roll: float, pitch: float, yaw: float) -> None:
     """Against scipy's rotations."""
-    layout = versions.load(versions.OLD).layout("opendlv.sim.Frame")
-    convert = foxglove.converter(layout)
+    layout = message_versions.load(message_versions.OLD).layout("opendlv.sim.Frame")
+    convert = mcap.converter(layout)
     assert convert is not None
     found = convert(layout.type(roll=roll, pitch=pitch, yaw=yaw), 0, BEGIN)
     assert found is not None
@@ -298,8 +298,8 @@ def test_too_many_topics(tmp_path: Path, record: Callable[..., Path]) -> None:
 def test_the_module_that_is_missing_is_named(
     tmp_path: Path, record: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delitem(sys.modules, "dodo_dsl.rec.export.mcap_file")
-    monkeypatch.delattr(dodo_dsl.rec.export, "mcap_file")
+    monkeypatch.delitem(sys.modules, "dodo_dsl.rec.mcap")
+    monkeypatch.delattr(dodo_dsl.rec, "mcap")
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     answer = dodo_rec("export", record(video(1)), "--mcap", "-o", tmp_path / "out.mcap")
     assert (answer.code, answer.stdout) == (2, "")

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.rec.export.video_times import MOST_GAP
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.rec.video import MOST_GAP
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 STEPS = (0, 100_000, 133_333, 240_001, 1_000_000, 1_000_001, 2_345_678)

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.rec.export.video_times import DEFAULT_LASTING, MOST_GAP, VideoTimes, timed
+from dodo_dsl.rec.video import DEFAULT_LASTING, MOST_GAP, VideoTimes, timed
 
 
 def test_times_rise_and_come_back_to_those_of_the_frames() -> None:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.report.changes import words
-from dodo_dsl.report.changes.check_change import check_change, with_margins
+from dodo_dsl.report import comparison
+from dodo_dsl.report.comparison import check_change, with_margins
 
 
 def check(value: float | None, ok: bool | None = None, unit: str = "m", **limit: float) -> dict[str, Any]:
@@ -84,4 +84,4 @@ def test_margins_are_those_of_the_results_where_they_have_any() -> None:
     ],
 )
 def test_a_change_in_words(before: dict[str, Any], after: dict[str, Any], told: str) -> None:
-    assert words.change(check_change(before, after, 0)) == told
+    assert comparison.change_words(check_change(before, after, 0)) == told

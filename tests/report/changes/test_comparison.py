@@ -8,9 +8,9 @@ import pytest
 
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report.changes import markdown, text
-from dodo_dsl.report.changes.comparison import Comparison, compare
-from dodo_dsl.report.given_report import GivenReport
+from dodo_dsl.report import comparison
+from dodo_dsl.report.comparison import Comparison, compare
+from dodo_dsl.report.results import GivenReport
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named
 from tests.report.viewer.hostile import HOSTILE
@@ -56,7 +56,7 @@ def test_checks_of_one_name_are_compared_in_their_order() -> None:
 
 
 def test_the_terminal_shows_what_changed() -> None:
-    assert list(text.lines(compared(BEFORE, AFTER))) == [
+    assert list(comparison.lines(compared(BEFORE, AFTER))) == [
         "compared with main/results.json: 1 newly failing, 1 still failing, 1 new, 1 gone, 1 fixed, 1 still passing",
         "  NEWLY FAILING  a  passed -> failed  hit wall",
         "  STILL FAILING  c  failed -> error  crashed",
@@ -72,7 +72,7 @@ def test_the_terminal_shows_what_changed() -> None:
 
 def test_markdown_shows_what_changed() -> None:
     counts = "1 newly failing, 1 still failing, 1 new, 1 gone, 1 fixed, 1 still passing"
-    assert markdown.to_markdown(compared(BEFORE, AFTER)).splitlines()[1:] == [
+    assert comparison.to_markdown(compared(BEFORE, AFTER)).splitlines()[1:] == [
         f"**DoDo:** {counts}, compared with `main/results.json`",
         "",
         "**Newly failing (1)**",
@@ -104,11 +104,11 @@ def test_markdown_is_short(number: int) -> None:
     before += [failed(f"{kind}-{n}", *one) for kind in ("still", "fixed") for n in range(number)]
     after = [failed(f"{kind}-{n}", *two) for kind in ("newly", "still") for n in range(number)]
     after += [named(f"{kind}-{n}", checks=two) for kind in ("new", "fixed") for n in range(number)]
-    lines = markdown.to_markdown(compared(before, after)).splitlines()
-    assert len(lines) <= markdown.MOST_LINES
+    lines = comparison.to_markdown(compared(before, after)).splitlines()
+    assert len(lines) <= comparison.MOST_LINES
     shown = [int(line.split("(")[1].removesuffix(")**")) for line in lines if line.startswith("**") and "(" in line]
     assert shown == [number] * 5 + [3 * number] * 3
-    assert number < 7 or len(lines) > markdown.MOST_LINES - 8
+    assert number < 7 or len(lines) > comparison.MOST_LINES - 8
 
 
 @pytest.mark.parametrize("hostile", [*HOSTILE, "` @all /close `", "a\n/close\n", "| --- |", "![](http://example.org)"])
@@ -117,7 +117,7 @@ def test_markdown_has_no_markup_of_others(hostile: str) -> None:
     outcome = named("a", outcome="failed", reason=hostile, checks=({**check(2, max=1), "name": hostile},))
     outcome = replace(outcome, name=hostile)
     old = named("a", checks=({**check(1, max=1), "name": hostile},))
-    lines = markdown.to_markdown(compare([outcome], GivenReport(Path(hostile), [old]))).splitlines()
+    lines = comparison.to_markdown(compare([outcome], GivenReport(Path(hostile), [old]))).splitlines()
     assert [re.sub("`[^`]*`", "CODE", line) for line in lines] == [
         "<!-- written by dodo report -->",
         "**DoDo:** 1 newly failing, compared with CODE",
@@ -133,12 +133,12 @@ def test_markdown_has_no_markup_of_others(hostile: str) -> None:
 
 def test_a_file_of_others_is_not_replaced(tmp_path: Path) -> None:
     found, file = compared(BEFORE, AFTER), tmp_path / "changes.md"
-    markdown.write(tmp_path, found)
-    assert file.read_text() == markdown.to_markdown(found)
-    markdown.write(tmp_path, None)
+    comparison.write(tmp_path, found)
+    assert file.read_text() == comparison.to_markdown(found)
+    comparison.write(tmp_path, None)
     assert not file.exists()
     file.write_text("# My changes\n")
-    markdown.write(tmp_path, None)
+    comparison.write(tmp_path, None)
     with pytest.raises(atomic.NotReplaceable, match="not written by DoDo"):
-        markdown.write(tmp_path, found)
+        comparison.write(tmp_path, found)
     assert file.read_text() == "# My changes\n"

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.report import results
-from dodo_dsl.report.joined import child_jobs
-from dodo_dsl.report.joined.child_jobs import NoChildJobs
+from dodo_dsl.report import child_jobs, results
+from dodo_dsl.report.child_jobs import NoChildJobs
 from tests.report.joined.gitlab_api import Api, serving
 from tests.report.joined.reports import named, tree, write
 

@@ -11,15 +11,15 @@ import pytest
 
 from dodo_dsl import atomic
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report import given_report, results
-from dodo_dsl.report.joined import copies
-from dodo_dsl.report.joined.join import join
+from dodo_dsl.report import join as report_join
+from dodo_dsl.report import results
+from dodo_dsl.report.join import join
 from dodo_dsl.report.report_folder import write_summaries
 from tests.report.joined.reports import PASSED, drive, named, tree, write
 
 
 def joined(out: Path, *folders: Path) -> list[str]:
-    outcomes, sentences = join([given_report.read(folder) for folder in folders], out)
+    outcomes, sentences = join([results.read_given(folder) for folder in folders], out)
     write_summaries(out, outcomes)
     return sentences
 
@@ -208,8 +208,8 @@ def test_pages_are_those_of_this_dodo(tmp_path: Path) -> None:
 def test_what_is_too_large_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = write(tmp_path / "in", [PASSED])
     with (folder / "test" / "test.rec").open("wb") as file:
-        file.truncate(copies.MOST_BYTES + 1)
-    monkeypatch.setattr(copies, "MOST_FILES", 3)
+        file.truncate(report_join.MOST_BYTES + 1)
+    monkeypatch.setattr(report_join, "MOST_FILES", 3)
     many, large = joined(tmp_path / "out", folder)
     assert many == f"{folder}/test has 4 files, of which 1 are left out"
     assert (

@@ -4,12 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.report.changes.comparison import compare
-from dodo_dsl.report.given_report import read
-from dodo_dsl.report.joined import other_ways
-from dodo_dsl.report.joined.drive_page import read_document
-from dodo_dsl.report.joined.join import join
+from dodo_dsl.report.comparison import compare
+from dodo_dsl.report.join import join, read_document, write
 from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.results import read_given
 from dodo_dsl.report.viewer.encoded import script
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium
@@ -20,7 +18,7 @@ from tests.report.viewer.chromium import Chromium
 def test_each_drive_is_replayed_from_the_joined_report(chromium: Chromium, tmp_path: Path) -> None:
     folder, out = tmp_path / "report", tmp_path / "out"
     drives.write(folder, [failures.missed_cones()])
-    outcomes, _ = join([read(folder), read(folder)], out)
+    outcomes, _ = join([read_given(folder), read_given(folder)], out)
     write_summaries(out, outcomes)
     folder.rename(tmp_path / "gone")
     with chromium.page((out / "index.html").as_uri()) as page:
@@ -48,7 +46,7 @@ def test_a_page_without_records_shows_the_drive_and_why_there_are_no_limits(chro
     document = {key: value for key, value in read_document(data).items() if key not in ("messages", "why")}
     old = {"version": 2, "judged": [{"kind": "margin", "min": 0}], "frames": [{"time": 1, "found": [], "true": None}]}
     data.write_text(script({**document, **old}))
-    outcomes, said = join([read(folder)], out)
+    outcomes, said = join([read_given(folder)], out)
     write_summaries(out, outcomes)
     assert said == []
     with chromium.page((out / "test-0" / "drive.html").as_uri()) as page:
@@ -64,10 +62,10 @@ def test_the_ways_of_two_reports_are_drawn_over_one_another(chromium: Chromium, 
     (tmp_path / "old").mkdir()
     drives.write(tmp_path / "old" / "report", [failures.timed_out()])
     outcomes = drives.write(tmp_path / "report", [failures.wall_hit()])
-    other = read(tmp_path / "old" / "report")
+    other = read_given(tmp_path / "old" / "report")
     comparison = compare(outcomes, other)
     address = (tmp_path / "report" / "test-0" / "drive.html").as_uri()
-    other_ways.write(tmp_path / "report", comparison, other)
+    write(tmp_path / "report", comparison, other)
     with chromium.page(address) as page:
         assert page.value("dodo.way.before.length") == 4001
         page.value("dodo.cursor.move(2)")
@@ -75,7 +73,7 @@ def test_the_ways_of_two_reports_are_drawn_over_one_another(chromium: Chromium, 
         assert caption.endswith("dashed: before (failed), 0.80 m apart")
         assert page.faults == []
         both = page.pixels()
-    other_ways.write(tmp_path / "report", None, None)
+    write(tmp_path / "report", None, None)
     with chromium.page(address) as page:
         page.value("dodo.cursor.move(2)")
         assert page.value("dodo.way.before.length") == 0

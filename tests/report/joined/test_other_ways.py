@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.report.changes.comparison import compare
-from dodo_dsl.report.given_report import read
-from dodo_dsl.report.joined import other_ways
+from dodo_dsl.report import join
+from dodo_dsl.report.comparison import compare
+from dodo_dsl.report.results import read_given
 from dodo_dsl.report.viewer.encoded import packed, script
 from tests.report.joined.reports import drive, named, write
 
@@ -16,7 +16,7 @@ PASSED = named("a")
 
 
 def way(**changes: Any) -> dict[str, Any]:
-    fields = [{"name": name, "values": packed([0.0, 1.0])} for name in (*other_ways.FIELDS, "more")]
+    fields = [{"name": name, "values": packed([0.0, 1.0])} for name in (*join.FIELDS, "more")]
     channel = {"message": "opendlv.sim.Frame", "sender": 2, "every": 1, "times": packed([0.0, 0.1]), "fields": fields}
     document = json.loads(drive(PASSED).partition("= ")[2].rstrip(";\n"))
     frame = {"message": "opendlv.sim.Frame", "sender": 2}
@@ -28,8 +28,8 @@ def compared(folder: Path, data: str) -> Path:
     write(folder / "new", [named("a", outcome="failed"), named("b")])
     write(folder / "old", [PASSED])
     (folder / "old" / "a" / "drive.js").write_text(data)
-    given = read(folder / "old")
-    other_ways.write(folder / "new", compare(read(folder / "new").outcomes, given), given)
+    given = read_given(folder / "old")
+    join.write(folder / "new", compare(read_given(folder / "new").outcomes, given), given)
     return folder / "new" / "a"
 
 
@@ -39,10 +39,10 @@ def test_the_way_is_beside_the_page_until_nothing_is_compared(tmp_path: Path) ->
     assert text.startswith("var dodoBefore = {")
     document = json.loads(text.partition("= ")[2].rstrip(";\n"))
     assert (document["outcome"], document["times"]) == ("passed", packed([0.0, 0.1]))
-    assert [field["name"] for field in document["fields"]] == list(other_ways.FIELDS)
+    assert [field["name"] for field in document["fields"]] == list(join.FIELDS)
     assert 'src="before.js"' in (place / "drive.html").read_text()
     assert not (place.parent / "b" / "before.js").exists()
-    other_ways.write(place.parent, None, None)
+    join.write(place.parent, None, None)
     assert not (place / "before.js").exists()
     assert "before.js" not in (place / "drive.html").read_text()
 

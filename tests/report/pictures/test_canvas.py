@@ -8,9 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report.pictures.canvas import Axes, Canvas, thinned
-from dodo_dsl.report.pictures.trajectory import DrivenPath, Ground
-from dodo_dsl.report.pictures.trajectory_plot import draw
+from dodo_dsl.report.trajectory import DrivenPath, Ground
+from dodo_dsl.report.trajectory_plot import Axes, Canvas, draw, thinned
 
 OUTCOME = Outcome("test", "test", "t.dodo.yml", "sil", "closed-loop", "passed", "all", 130, 0, "lockstep", "process")
 

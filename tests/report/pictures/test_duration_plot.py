@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.report.pictures.duration_plot import Times, draw
+from dodo_dsl.report.duration_plot import Times, draw
 
 SVG = "{http://www.w3.org/2000/svg}"
 SECONDS = st.floats(0, 1e6)

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dodo_dsl.report import overview
 from dodo_dsl.report.report_folder import write_report, write_summaries
-from dodo_dsl.report.suite import check_history
 from tests.report.joined.reports import named
 
 CHECK: dict[str, Any] = {"name": "wall-margin", "value": 0.2, "limit": {"min": 0.1}, "unit": "m", "ok": True}
@@ -20,7 +20,7 @@ def runs(*values: float) -> list[dict[str, Any]]:
 
 
 def test_a_curve_has_a_point_a_run_and_a_line_a_limit() -> None:
-    svg = ElementTree.fromstring(check_history.curve({"a": runs(0.1, 0.3, 0.2)}, "a", CHECK))
+    svg = ElementTree.fromstring(overview.curve({"a": runs(0.1, 0.3, 0.2)}, "a", CHECK))
     assert svg.findtext("title") == "last 3 values: 0.1 to 0.3"
     points = svg.find("polyline").get("points")  # type: ignore[union-attr]
     assert points == "3,17 32,3 61,10"
@@ -28,11 +28,11 @@ def test_a_curve_has_a_point_a_run_and_a_line_a_limit() -> None:
 
 
 def test_a_limit_far_away_flattens_no_curve() -> None:
-    assert "<line" not in check_history.curve({"a": runs(0.1, 0.3)}, "a", {**CHECK, "limit": {"max": 40.0}})
+    assert "<line" not in overview.curve({"a": runs(0.1, 0.3)}, "a", {**CHECK, "limit": {"max": 40.0}})
 
 
 def test_values_that_stay_the_same_make_a_line() -> None:
-    assert "3,10 61,10" in check_history.curve({"a": runs(0.2, 0.2)}, "a", {**CHECK, "limit": {}})
+    assert "3,10 61,10" in overview.curve({"a": runs(0.2, 0.2)}, "a", {**CHECK, "limit": {}})
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_values_that_stay_the_same_make_a_line() -> None:
      {"a": runs(float("inf"), 1.0)}, {"a": [{"checks": None}] * 2}],
 )  # fmt: skip
 def test_what_is_no_history_has_no_curve(past: Any) -> None:
-    assert check_history.curve(past, "a", CHECK) == ""
+    assert overview.curve(past, "a", CHECK) == ""
 
 
 def test_the_page_shows_curves_until_another_run_has_none(tmp_path: Path) -> None:
@@ -53,15 +53,15 @@ def test_the_page_shows_curves_until_another_run_has_none(tmp_path: Path) -> Non
         write_summaries(tmp_path, outcomes)
     write_report(tmp_path, outcomes, {})
     assert "Latest runs" not in (tmp_path / "index.html").read_text()
-    assert not (tmp_path / check_history.FILE_NAME).exists()
+    assert not (tmp_path / overview.FILE_NAME).exists()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"a": ' * 3000])
 def test_a_damaged_file_is_no_history(tmp_path: Path, text: str) -> None:
-    (tmp_path / check_history.FILE_NAME).write_text(text)
-    assert check_history.read(tmp_path) == {}
+    (tmp_path / overview.FILE_NAME).write_text(text)
+    assert overview.read(tmp_path) == {}
 
 
 def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
-    check_history.write(tmp_path, {"a": runs(0.1)})
-    assert check_history.read(tmp_path) == json.loads(json.dumps({"a": runs(0.1)}))
+    overview.write(tmp_path, {"a": runs(0.1)})
+    assert overview.read(tmp_path) == json.loads(json.dumps({"a": runs(0.1)}))

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.report.changes.comparison import compare
-from dodo_dsl.report.given_report import GivenReport
+from dodo_dsl.report import overview
+from dodo_dsl.report.comparison import compare
+from dodo_dsl.report.overview import ReportFiles, ReportPicture, breakable, render
 from dodo_dsl.report.report_folder import write_summaries
-from dodo_dsl.report.suite import check_history
-from dodo_dsl.report.suite.html import ReportFiles, ReportPicture, breakable, render
+from dodo_dsl.report.results import GivenReport
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named, write
 from tests.report.viewer import drives, failures
@@ -108,7 +108,7 @@ def test_no_column_is_clipped(chromium: Chromium, tmp_path: Path) -> None:
         for test in new
     ]
     runs = [{"when": n, "outcome": "passed", "checks": {c["name"]: n for c in new[0].checks}} for n in range(3)]
-    check_history.write(tmp_path, {new[0].slug: runs})
+    overview.write(tmp_path, {new[0].slug: runs})
     comparison = compare([*new, *grid], GivenReport(Path("main/results.json"), [*old, *grid]))
     for changes in (None, comparison):
         write_summaries(tmp_path, [*new, *grid], changes)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from dodo_dsl.outcome import MachineLoad, Wait
-from dodo_dsl.report.suite.machine_line import machine_line
+from dodo_dsl.report.overview import machine_line
 
 
 def test_the_line() -> None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.report.suite.matrix_grid import decisive_value, grids
+from dodo_dsl.report.overview import decisive_value, grids
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named
 

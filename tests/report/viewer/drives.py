@@ -9,16 +9,15 @@ from typing import Any
 
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.log_times import JUDGED_SUFFIX
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.report.report_folder import Drawable, write_report
 from services.base import Context, Service
-from services.base.flags import parse
-from services.base.manifest import load_manifest
+from services.base.flags import load_manifest, parse
 from services.base.service import Build
 
 ROOT = Path(__file__).parents[3]

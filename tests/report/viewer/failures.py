@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dodo_dsl.opendlv.video.encoder import VideoEncoder
+from dodo_dsl.opendlv.video import VideoEncoder
 from tests.report.viewer.drives import MadeDrive, Pose, Sample, check, poses, requests, verdict
 
 Box = tuple[str, float, float]

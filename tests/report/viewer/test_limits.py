@@ -8,7 +8,7 @@ import pytest
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Place
 from dodo_dsl.plan.plan_json import from_json
-from dodo_dsl.report.viewer.limits import SpecLines, checks
+from dodo_dsl.report.viewer.page import SpecLines, checks
 from tests.report.viewer.drives import GOLDEN, ROOT, check
 
 RESPONSE = "response: {max: 100 ms, over: 10 %, sample-times: copied}"

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 import shapely
 
-from services.collision.geometry import VehicleBox, VehiclePose, outline
-from services.collision.obstacles import load
+from services.collision.track import VehicleBox, VehiclePose, load, outline
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
 from tests.report.viewer.hostile import HOSTILE

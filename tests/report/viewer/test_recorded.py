@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.report.viewer import recorded
 from tests.report.viewer.drives import EPOCH, MESSAGES, WALL, MadeDrive, record
 

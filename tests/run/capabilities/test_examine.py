@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.capabilities import programs
-from dodo_dsl.run.capabilities.examine import examine, rigs, state_folder
-from dodo_dsl.run.rigs.quarantine import quarantine
+from dodo_dsl.run import capabilities
+from dodo_dsl.run.capabilities import examine, rigs, state_folder
+from dodo_dsl.run.rigs.leases import quarantine
 from services.gantry import emulator
 from tests.run.docker.engine_stub import engine_stub
 
@@ -28,21 +28,21 @@ def test_an_engine_on_a_port_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(name, raising=False)
     with engine_stub() as host:
         monkeypatch.setenv("DOCKER_HOST", host)
-        engine, files = programs.docker_engine()
+        engine, files = capabilities.docker_engine()
     assert (engine.state, engine.text) == ("ok", f"version 99.0, API 1.41 at {host}")
     assert (files.state, files.text[:42]) == ("warning", "the Docker engine cannot make an empty ima")
 
 
 def test_whether_the_emulated_rig_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Looked for where the gantry looks."""
-    assert (programs.FIRMWARE, programs.EMULATOR_PLACES) == (emulator.FOLDER, emulator.PLACES)
-    monkeypatch.setenv(programs.FIRMWARE, str(tmp_path))
-    (found,) = programs.emulated_rig()
+    assert (capabilities.FIRMWARE, capabilities.EMULATOR_PLACES) == (emulator.FOLDER, emulator.PLACES)
+    monkeypatch.setenv(capabilities.FIRMWARE, str(tmp_path))
+    (found,) = capabilities.emulated_rig()
     assert (found.state, found.text) == ("warning", f"is not built: it is not in {tmp_path}; hil tests need it")
     assert found.advice == f"DODO_FIRMWARE is {tmp_path}: build it there, or unset DODO_FIRMWARE"
     for name in ("rig-emulator", "gantry.elf"):
         (tmp_path / name).write_bytes(b"")
-    (found,) = programs.emulated_rig()
+    (found,) = capabilities.emulated_rig()
     assert (found.state, found.text) == ("ok", f"is built, in {tmp_path}")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.docker.archive import copy_out
+from dodo_dsl.run.docker.cleanup import copy_out
 
 
 def archive(*members: tuple[str, bytes | str]) -> bytes:

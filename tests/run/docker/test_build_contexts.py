@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.plan.model import ApplicationService
-from dodo_dsl.run.docker.build_contexts import HiddenContext, own_contexts
+from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.pulls import Pulls
 from tests.run.scripted import plan

@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
-from dodo_dsl.opendlv.bus.address import group
-from dodo_dsl.opendlv.bus.envelope import decode_frame
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.run.docker.bus import announce_begin
+from dodo_dsl.opendlv.address import group
+from dodo_dsl.opendlv.envelope import decode_frame
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.run.docker.events import announce_begin
 from dodo_dsl.run.protocol import BackendError
 
 

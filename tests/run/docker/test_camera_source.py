@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from dodo_dsl.plan.model import Flag
-from dodo_dsl.run.docker.camera_source import refuse_rpicam
+from dodo_dsl.run.docker.containers import refuse_rpicam
 from dodo_dsl.run.protocol import BackendError
 from tests.run.scripted import plan
 

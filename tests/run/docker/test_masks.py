@@ -8,7 +8,7 @@ import pytest
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.plan.model import Application
 from dodo_dsl.run.application_files import hidden_paths
-from dodo_dsl.run.docker.masks import absent, masks
+from dodo_dsl.run.docker.compose import absent, masks
 
 HIDDEN = [Path("/team/tests"), Path("/team/.git")]
 BOUND = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "/team"}}, "own": {}}

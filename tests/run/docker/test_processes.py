@@ -11,12 +11,11 @@ import pytest
 from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
-from dodo_dsl.run.docker import processes
+from dodo_dsl.run.docker import container_use
 from dodo_dsl.run.docker.backend import DockerBackend
-from dodo_dsl.run.docker.container_use import ContainerUse
-from dodo_dsl.run.docker.processes import ContainerProcesses
+from dodo_dsl.run.docker.container_use import ContainerProcesses, ContainerUse
 from dodo_dsl.run.docker.pulls import Pulls
-from dodo_dsl.run.load.snapshot import Times
+from dodo_dsl.run.machine_load.snapshot import Times
 from dodo_dsl.run.protocol import BackendError
 from tests.run.helpers import Bench
 from tests.run.load.test_thread_times import Proc
@@ -50,10 +49,10 @@ def test_which_containers_listen_on_a_bus(proc: Proc, monkeypatch: pytest.Monkey
     (proc.root / "10" / "net").mkdir()
     (proc.root / "10" / "net" / "igmp").write_text("Idx\tDevice\n2\teth0\n\t\t\t\t830000E1     1 0:00000000\t\t0\n")
     containers = ContainerProcesses({"app": Container("c0ffee", 10), "camera": Container("beef", 12)}, proc.root)
-    monkeypatch.setattr(processes, "listening", lambda services, _: set(services.values()))
+    monkeypatch.setattr(container_use, "listening", lambda services, _: set(services.values()))
     assert containers.listeners(["app"], 130) == {"app"}
     assert containers.listeners(["camera"], 130) is None
-    monkeypatch.setattr(processes, "listening", lambda *_: None)
+    monkeypatch.setattr(container_use, "listening", lambda *_: None)
     assert (containers.listeners(["app"], 131), containers.listeners(["app"], 130)) == ({"app"}, set())
 
 

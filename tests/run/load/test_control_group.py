@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.load import control_group
-from dodo_dsl.run.load.service_use import Used
+from dodo_dsl.run.machine_load import service_use
+from dodo_dsl.run.machine_load.service_use import Used
 
 OF_1 = "cache 999\nrss 5\nshmem 6\ntotal_cache 888\ntotal_rss 5000000\ntotal_rss_huge 0\ntotal_shmem 1000000\n"
 OF_2 = "anon 5000000\nfile 777\nkernel_stack 1\nshmem 1000000\nfile_mapped 3\n"
@@ -30,7 +30,7 @@ class Machine:
 
     def used(self, *groups: str) -> Used | None:
         (self.proc / "7" / "cgroup").write_text("".join(f"{line}\n" for line in groups))
-        group = control_group.of_process(7, self.proc)
+        group = service_use.of_process(7, self.proc)
         return group.used() if group else None
 
 
@@ -66,7 +66,7 @@ def test_without_the_controller_of_memory_nothing_is_told(machine: Machine) -> N
     machine.write("docker/abc/cpu.stat", CPU_2)
     assert machine.used("0::/docker/abc") is None
     assert machine.used("0::/elsewhere") is None
-    assert control_group.of_process(8, machine.proc) is None
+    assert service_use.of_process(8, machine.proc) is None
 
 
 def test_a_group_that_is_gone(machine: Machine) -> None:
@@ -74,7 +74,7 @@ def test_a_group_that_is_gone(machine: Machine) -> None:
     machine.write("abc/memory.stat", OF_2)
     machine.write("abc/cpu.stat", CPU_2)
     (machine.proc / "7" / "cgroup").write_text("0::/abc\n")
-    group = control_group.of_process(7, machine.proc)
+    group = service_use.of_process(7, machine.proc)
     assert group is not None and group.used() == EXPECTED
     (machine.groups / "abc" / "memory.stat").unlink()
     assert group.used() is None
@@ -83,8 +83,8 @@ def test_a_group_that_is_gone(machine: Machine) -> None:
 @pytest.mark.parametrize("stat", [OF_1, OF_2])
 def test_what_an_engine_says(stat: str) -> None:
     stats = {
-        "memory_stats": {"usage": 9, "stats": control_group.numbers(stat)},
+        "memory_stats": {"usage": 9, "stats": service_use.numbers(stat)},
         "cpu_stats": {"cpu_usage": {"total_usage": 2_500_000_000}},
     }
-    assert control_group.of_engine(stats) == EXPECTED
-    assert control_group.of_engine({**stats, "memory_stats": {}}) is None, "it has ended, or no controller of memory"
+    assert service_use.of_engine(stats) == EXPECTED
+    assert service_use.of_engine({**stats, "memory_stats": {}}) is None, "it has ended, or no controller of memory"

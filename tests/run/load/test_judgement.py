@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from dodo_dsl.outcome import MachineLoad, Wait
-from dodo_dsl.run.load.judgement import consider
+from dodo_dsl.run.machine_load.judgement import consider
 from dodo_dsl.run.outcomes import Finding
 
 CALM = MachineLoad(

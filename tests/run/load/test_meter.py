@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from dodo_dsl.outcome import MachineLoad, Wait
-from dodo_dsl.run.load.meter import LAST_PATIENCE_S, PERIOD_S, LoadMeter, add_up
-from dodo_dsl.run.load.snapshot import Snapshot, Times, with_ended
+from dodo_dsl.run.machine_load.meter import LAST_PATIENCE_S, PERIOD_S, LoadMeter, add_up
+from dodo_dsl.run.machine_load.snapshot import Snapshot, Times, with_ended
 from tests.run.scripted import load, run
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.load import service_use
-from dodo_dsl.run.load.service_use import Used, UseReader
+from dodo_dsl.run.machine_load import service_use
+from dodo_dsl.run.machine_load.service_use import Used, UseReader
 
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 MB = 1 << 20

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.load import shortage
-from dodo_dsl.run.load.shortage import Shared, Shortage
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.run.machine_load import shortage
+from dodo_dsl.run.machine_load.shortage import Shared, Shortage
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 FREE = {
     "loadavg": "0.1 0.2 0.3 2/300 4711",

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import msgspec
 
-from dodo_dsl.run.load import snapshot
-from dodo_dsl.run.load.snapshot import Snapshot, Times, busy_s
-from dodo_dsl.run.load.thread_times import ThreadTimes
+from dodo_dsl.run.machine_load import snapshot
+from dodo_dsl.run.machine_load.processes import ThreadTimes
+from dodo_dsl.run.machine_load.snapshot import Snapshot, Times, busy_s
 
 STAT = """cpu  9 9 9 9 9 9 9 9 9 9
 cpu0 100 20 300 9999 9999 4 5 60 8888 7777

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.load.thread_times import ThreadTimes
+from dodo_dsl.run.machine_load.processes import ThreadTimes
 
 
 class Proc:

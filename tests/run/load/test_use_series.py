@@ -5,8 +5,8 @@ import random
 import pytest
 
 from dodo_dsl.outcome import ServiceUse
-from dodo_dsl.run.load.service_use import Used
-from dodo_dsl.run.load.use_series import FIRST_PERIOD_S, MOST_PERIOD_S, UseMeter, growth, period_s, test_time
+from dodo_dsl.run.machine_load.meter import FIRST_PERIOD_S, MOST_PERIOD_S, UseMeter, growth, period_s, test_time
+from dodo_dsl.run.machine_load.service_use import Used
 
 test_time.__test__ = False  # type: ignore[attr-defined]
 MB = 1e6

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from docker.errors import DockerException, ImageNotFound
 
+from dodo_dsl.cli import run
 from dodo_dsl.plan.model import Application, ApplicationService, PlannedService
-from dodo_dsl.run.mixed import choice
 from dodo_dsl.run.protocol import BackendError
 from tests.run.scripted import plan
 
@@ -48,11 +48,11 @@ def test_without_images_of_dodo(
         return engine
 
     monkeypatch.setattr("dodo_dsl.run.docker.client.connect", connect)
-    monkeypatch.setattr("dodo_dsl.run.mixed.backends.may_enter", lambda: root)
-    assert choice.choose([plan(application=IMAGE, services=OWN)]) == backend
+    monkeypatch.setattr("dodo_dsl.run.mixed.may_enter", lambda: root)
+    assert run.choose([plan(application=IMAGE, services=OWN)]) == backend
 
 
 def test_on_rigs_unless_the_application_can_be_started() -> None:
-    assert choice.choose([plan(application=IMAGE, rig="desk")]) == "mixed"
+    assert run.choose([plan(application=IMAGE, rig="desk")]) == "mixed"
     started = Application(".", (ApplicationService("app", ("python", "a.py")),))
-    assert choice.choose([replace(plan(application=started), rig="desk")]) == "process"
+    assert run.choose([replace(plan(application=started), rig="desk")]) == "process"

@@ -2,7 +2,7 @@
 
 import yaml
 
-from dodo_dsl.run.mixed.compose import replacing
+from dodo_dsl.run.mixed import replacing
 
 
 class _Loader(yaml.SafeLoader):

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run import engine, files_of_tests
-from dodo_dsl.run.services import conditions
+from dodo_dsl.run import application_files, engine, start_order
 from tests.run.desk import processes_with
 from tests.run.helpers import AFTER_START, BEGUN, PASS, READY, STARTED, WAIT, Bench
 
@@ -95,7 +94,7 @@ IN_TURN = {
 
 
 def test_services_start_when_those_for_which_they_wait_have_ended(host: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(conditions, "LONGEST_S", 2.0)
+    monkeypatch.setattr(start_order, "LONGEST_S", 2.0)
     plans = []
     for slug, (last, _, _) in IN_TURN.items():
         mark = host.folder / f"{slug}-mark"
@@ -164,7 +163,7 @@ def test_variables_file_of_an_unknown_user_is_an_error_of_its_test_alone(host: B
 
 JOINS = """
 time.sleep(0.5)
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.session import Session
 session = Session(int(sys.argv[1].removeprefix("--cid=")))
 """
 
@@ -213,7 +212,7 @@ def test_tests_at_once_are_apart_and_leave_nothing(bench: Bench) -> None:
 def _fork_servers() -> list[str]:
     """Those that this process has started."""
     children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-    return [pid for pid in processes_with("dodo_dsl.run.process.forks.fork_server") if pid in children]
+    return [pid for pid in processes_with("dodo_dsl.run.process.fork_server") if pid in children]
 
 
 def test_application_without_flags_runs_alone_on_the_host(host: Bench) -> None:
@@ -251,7 +250,7 @@ def test_what_is_hidden_in_the_applications_folder_is_absent_and_named_when_it_f
 ) -> None:
     """But what dodo.yml names. Folders beyond the limit are told, too."""
     (tmp_path / "aaa").mkdir()  # the seventh, after the application's own and five others
-    monkeypatch.setattr(files_of_tests, "MOST_FOLDERS", 6)
+    monkeypatch.setattr(application_files, "MOST_FOLDERS", 6)
     bench = Bench(tmp_path, "network")
     names = ("truths/a.csv", "truths/own.txt", "data/a.rec", "data/own.yml", "data/own.rec", "kept/a.rec")
     for name in names:

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run.process.backend import ProcessBackend
-from dodo_dsl.run.process.entered import Entered
 from dodo_dsl.run.process.sandbox_client import SandboxClient
-from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.process.slot import Entered, Slot
 from tests.run.scripted import plan
 
 

@@ -8,7 +8,7 @@ import pytest
 
 LOAD = """
 import os, sys
-from dodo_dsl.run.process.forks import fork_server
+from dodo_dsl.run.process import fork_server
 before = dict(os.environ)
 fork_server.load()
 fork_server.load_services(["services.virtual_camera", "services.not_there"])

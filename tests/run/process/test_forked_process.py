@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.forks.forked_process import ForkedModule
+from dodo_dsl.run.process.children import ForkedModule
 
 TELLS = """
 import os, signal, sys
@@ -20,7 +20,7 @@ print("an error", file=sys.stderr)
 
 PARENT = """
 import signal, sys
-from dodo_dsl.run.process.forks.forked_process import ForkedModule
+from dodo_dsl.run.process.children import ForkedModule
 signal.signal(signal.SIGTERM, lambda *_: None)
 sys.path.insert(0, sys.argv[1])
 with open(sys.argv[1] + "/log", "wb") as log:

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import leases
-from dodo_dsl.run.capabilities import kernel
+from dodo_dsl.run import capabilities, leases
 from dodo_dsl.run.process import leftovers
-from dodo_dsl.run.process.forks.fork_server_client import ForkServer
+from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal, runs_alone
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError
@@ -26,7 +25,7 @@ from tests.run.scripted import plan
 
 SHARES = """
 import time
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 memory = SharedMemory.create("{name}", 100)
 print("shared", flush=True)
 time.sleep(600)
@@ -183,7 +182,7 @@ def test_only_what_is_missing_is_blamed(
     refusal = isolation_refusal()
     assert refusal is not None
     assert (str(refusal)[-len(told) :], refusal.remedy) == (told, remedy)
-    (finding,) = kernel.namespaces()
+    (finding,) = capabilities.namespaces()
     assert bool(BLAMES.search(finding.advice)) == bool(remedy)
 
 

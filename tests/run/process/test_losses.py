@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import package_data
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from tests.run.helpers import READY, Bench
 
 CROWD, LAST, RECORDING_END = 400, 4711, 2906
 SLOW_RECORDER = f"""
 import pathlib, sys, time
-from dodo_dsl.opendlv.bus import session
+from dodo_dsl.opendlv import session
 session.RECEIVE_BUFFER = 8192
 from services.base import run
 from services.rec_recorder import model, service
@@ -23,8 +23,8 @@ sys.exit(run(pathlib.Path({str(package_data.root())!r}, "services", "rec_recorde
 """
 CROWDING_JUDGE = f"""
 import pathlib, sys, time
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
 with Session(int(sys.argv[1].partition("=")[2])) as bus:
     {READY.strip()}
     while bus.receive(1.0) is None:

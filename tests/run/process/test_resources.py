@@ -7,8 +7,8 @@ import pytest
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.resource_limits import ResourceLimits
+from dodo_dsl.spec.model import ResourceLimits
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
 
 pytestmark = pytest.mark.slow

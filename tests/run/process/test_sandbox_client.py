@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import backends
-from dodo_dsl.run.process import sandbox_client
-from dodo_dsl.run.process.forks import fork_server_client
+from dodo_dsl.run.process import fork_server_client, sandbox_client
 from tests.run.helpers import Bench
 
 

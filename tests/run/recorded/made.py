@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
 
 MESSAGES = MessageSet.standard()
 EPOCH = 1_700_000_000_000_000

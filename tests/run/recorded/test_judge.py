@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Application, Plan, PlannedService
-from dodo_dsl.run.recorded.judge import Judgement, judge
-from dodo_dsl.run.recorded.test_recording import TestRecording, inspect
+from dodo_dsl.run.judge import Judgement, judge
+from dodo_dsl.run.test_recording import TestRecording, inspect
 from tests.run.helpers import FAIL, PASS, READY
 from tests.run.recorded.made import begin, step, write
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService, Flag, Plan, PlannedService
-from dodo_dsl.run.recorded.longest_pause import long_pause
+from dodo_dsl.run.test_recording import long_pause
 from tests.run.recorded.made import EPOCH, begin, message, write
 from tests.run.scripted import plan
 

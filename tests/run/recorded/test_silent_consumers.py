@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.recorded.silent_consumers import silent_consumer
+from dodo_dsl.run.test_recording import silent_consumer
 from tests.run.recorded.made import begin, message, write
 from tests.run.scripted import plan
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.recordings.recording import RecordingError
-from dodo_dsl.run.recorded.test_recording import NoTestRecording, inspect
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import RecordingError
+from dodo_dsl.run.test_recording import NoTestRecording, inspect
 from tests.run.recorded.made import EPOCH, begin, message, step, write
 
 PEDAL = "opendlv.proxy.PedalPositionRequest"

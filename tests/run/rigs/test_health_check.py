@@ -11,10 +11,10 @@ import pytest
 
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.run.rigs import health_check
-from dodo_dsl.run.rigs.health_check import CHECKS, TRIES, examine
+from dodo_dsl.run.rigs import session
+from dodo_dsl.run.rigs.leases import quarantine, quarantined
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
-from dodo_dsl.run.rigs.quarantine import quarantine, quarantined
+from dodo_dsl.run.rigs.session import CHECKS, TRIES, examine
 from tests.run.scripted import plan
 
 GANTRY = (Flag("serial", "/dev/ttyACM0", ""), Flag("range-x", "0.5", ""), Flag("freq", "50", ""))
@@ -57,7 +57,7 @@ def on_rig() -> Plan:
 
 def problem(programs: Programs, monkeypatch: pytest.MonkeyPatch, tested: Plan | None = None) -> str:
     """Why a test cannot run; empty when it can."""
-    monkeypatch.setattr(health_check, "query", programs.query)
+    monkeypatch.setattr(session, "query", programs.query)
     try:
         asyncio.run(examine(tested or on_rig(), lambda _: None, (7, 8)))
     except BackendError as error:

@@ -16,9 +16,8 @@ from dodo_dsl.run.attempts import Attempts
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.process import host_isolation
 from dodo_dsl.run.protocol import Backend, BackendError, Ready
+from dodo_dsl.run.rigs.leases import leased, quarantine
 from dodo_dsl.run.rigs.pool import opened
-from dodo_dsl.run.rigs.quarantine import quarantine
-from dodo_dsl.run.rigs.rig_leases import leased
 from tests.run.scripted import ScriptedBackend, drives, plan, run
 
 DEVICES = {"kiwi-1": "/dev/null", "kiwi-2": "/dev/zero"}

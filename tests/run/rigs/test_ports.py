@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
-from dodo_dsl.run.rigs import ports
+from dodo_dsl.run.rigs import permission
 from dodo_dsl.run.rigs.problems import RigProblem
-from dodo_dsl.spec.deployment import machine as operator
+from dodo_dsl.spec import machine as operator
 from tests.run.scripted import plan
 
 
@@ -38,9 +38,9 @@ def test_every_port_but_ones_own_is_masked(terminals: list[Path]) -> None:
     rig, other = map(str, terminals)
     tested = on_rig(rig, known=(rig, other, "socket://127.0.0.1:4242", "/dev/ttyACM99"))
     (pose,) = tested.services
-    assert ports.masked(tested, None) == [os.path.realpath(rig), os.path.realpath(other)]
-    assert ports.masked(tested, pose) == [os.path.realpath(other)]
-    assert ports.masked(tested, replace(pose, port="")) == ports.masked(tested, None)
+    assert permission.masked(tested, None) == [os.path.realpath(rig), os.path.realpath(other)]
+    assert permission.masked(tested, pose) == [os.path.realpath(other)]
+    assert permission.masked(tested, replace(pose, port="")) == permission.masked(tested, None)
 
 
 def test_the_usb_device_of_a_port_is_masked_too(
@@ -55,9 +55,9 @@ def test_the_usb_device_of_a_port_is_masked_too(
     usb = tmp_path / "001" / "012"
     usb.parent.mkdir()
     usb.touch()
-    monkeypatch.setattr(ports, "_SYS", tmp_path)
-    monkeypatch.setattr(ports, "_USB", tmp_path)
-    assert ports.device_files([str(terminals[0])]) == [os.path.realpath(terminals[0]), str(usb)]
+    monkeypatch.setattr(permission, "_SYS", tmp_path)
+    monkeypatch.setattr(permission, "_USB", tmp_path)
+    assert permission.device_files([str(terminals[0])]) == [os.path.realpath(terminals[0]), str(usb)]
 
 
 def test_no_other_service_opens_the_port_under_any_name(terminals: list[Path]) -> None:
@@ -66,12 +66,12 @@ def test_no_other_service_opens_the_port_under_any_name(terminals: list[Path]) -
     def camera(source: str) -> PlannedService:
         return PlannedService("environment", "eye", "camera", "x", (), (Flag("source", source),))
 
-    ports.refuse_shared_port(on_rig(str(rig), camera(str(other)), camera("rpicam")))
+    permission.refuse_shared_port(on_rig(str(rig), camera(str(other)), camera("rpicam")))
     text = f"'eye' would open '{rig.resolve()}', the port of the rig, which only 'pose' may open"
     with pytest.raises(RigProblem, match=text):
-        ports.refuse_shared_port(on_rig(str(rig), camera(str(rig.resolve()))))
+        permission.refuse_shared_port(on_rig(str(rig), camera(str(rig.resolve()))))
     with pytest.raises(RigProblem, match="which only 'pose' may open"):
-        ports.refuse_shared_port(on_rig("socket://127.0.0.1:4242", camera("socket://localhost:4242")))
+        permission.refuse_shared_port(on_rig("socket://127.0.0.1:4242", camera("socket://localhost:4242")))
 
 
 def test_where_the_operators_file_is_broken_nothing_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,4 +81,4 @@ def test_where_the_operators_file_is_broken_nothing_starts(tmp_path: Path, monke
     file.chmod(0o644)
     monkeypatch.setattr(operator, "FILE", file)
     with pytest.raises(operator.MachineError):
-        ports.masked(plan(), None)
+        permission.masked(plan(), None)

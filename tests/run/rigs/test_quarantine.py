@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.run.rigs.leases import all_quarantined, clear, quarantine, quarantined
 from dodo_dsl.run.rigs.problems import RigProblem
-from dodo_dsl.run.rigs.quarantine import all_quarantined, clear, quarantine, quarantined
 
 
 @pytest.fixture(autouse=True)

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from services.gantry.port import SerialPort
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.session import Session
+from services.gantry.link import SerialPort
 from tests.drive.applications import results
 from tests.run.rigs.place import APPLICATION, Place, place
 from tests.services.process import receive, running, send
@@ -93,7 +93,7 @@ def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place, killed
 
 def test_what_a_killed_runner_leaves_misses_it_and_stops_the_rig(place: Place, cid: int, tmp_path: Path) -> None:
     """As containers do, which nothing ends when `dodo run` is killed."""
-    live = "import asyncio\nfrom dodo_dsl.run.services.announce import heartbeat\n"
+    live = "import asyncio\nfrom dodo_dsl.run.announce import heartbeat\n"
     live += f"async def main():\n async with heartbeat({cid}):\n  await asyncio.sleep(60)\nasyncio.run(main())\n"
     runner = subprocess.Popen([sys.executable, "-c", live])
     place.rig.at = [0.0, 0.0, 0.0]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import leases
-from dodo_dsl.run.rigs.rig_leases import device_leases, devices_in, leased
+from dodo_dsl.run.rigs.leases import device_leases, devices_in, leased
 from tests.run.scripted import run
 
 

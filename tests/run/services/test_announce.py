@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from dodo_dsl.opendlv.bus.address import group
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.address import group
+from dodo_dsl.opendlv.session import Session
 from dodo_dsl.plan.model import Lockstep
-from dodo_dsl.run.services.announce import hearers, heartbeat, that_hear
+from dodo_dsl.run.announce import hearers, heartbeat, that_hear
 from tests.run.scripted import plan
 
 CAMERA, TRACK, CLOCK = ("10.1.0.2", 40000), ("10.1.0.3", 40001), ("10.1.0.4", 40002)

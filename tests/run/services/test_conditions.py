@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.plan.model import COMPLETED, HEALTHY, STARTED, ApplicationService
-from dodo_dsl.run.services.conditions import LONGEST_S, Conditions, in_turn, longest_s, may_end, optional
+from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, longest_s, may_end, optional
 from tests.run.scripted import run
 
 DB = ApplicationService("db")

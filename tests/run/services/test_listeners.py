@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.run.services.listeners import listening, members
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.run.listeners import listening, members
 from tests.run.load.test_thread_times import Proc
 
 ROW = "  72: {local} 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 {inode} 2 0 0"

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.run.services import service_output
-from dodo_dsl.run.services.service_output import ServiceOutput
+from dodo_dsl.run import service_output
+from dodo_dsl.run.service_output import ServiceOutput
 
 
 class Read:

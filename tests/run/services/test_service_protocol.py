@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.margins import with_margin
-from dodo_dsl.outcome import Response
-from dodo_dsl.plan.clock_service import CLOCK
+from dodo_dsl.outcome import Response, with_margin
+from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.run.protocol import (
     Foreign,
     InputEnded,
@@ -25,7 +24,7 @@ from dodo_dsl.run.protocol import (
     Time,
     VerdictEvent,
 )
-from dodo_dsl.run.services.service_protocol import read_line
+from dodo_dsl.run.service_protocol import read_line
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
 JUDGED = {**CHECK, "margin": 0.5, "margin_share": 0.2}

@@ -3,7 +3,7 @@ from collections.abc import Callable
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.envelope import Envelope
 from services.base.clock import RealTimeClock
 
 SECOND = 1_000_000

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from services.base import Check
-from services.base.crash import sentence, short_traceback
+from services.base.process import sentence, short_traceback
 
 
 def raised(work: Callable[[], object]) -> Exception:
@@ -33,5 +33,5 @@ def test_the_innermost_place_of_its_own_code(tmp_path: Path) -> None:
 def test_what_the_base_cannot_use_is_shown_there(tmp_path: Path) -> None:
     error = raised(lambda: Check("step", 1.0, "deg").as_json())  # type: ignore[arg-type]
     told = sentence(error, tmp_path / "my_services/judge")
-    assert told.startswith("AttributeError: 'str' object has no attribute 'items' (services/base/verdict.py:")
+    assert told.startswith("AttributeError: 'str' object has no attribute 'items' (services/base/service.py:")
     assert told.endswith(", in as_json)")

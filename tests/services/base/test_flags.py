@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.base.flags import Flags, FlagsError, parse
-from services.base.manifest import load_manifest
+from services.base.flags import Flags, FlagsError, load_manifest, parse
 
 MANIFEST = load_manifest(Path(__file__).with_name("tiny"))
 NEEDED = ("--cid=128", "--role=echo")

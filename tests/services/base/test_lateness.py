@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-from services.base.lateness import Lateness
+from services.base.loop import Lateness
 
 PERIOD = 100_000
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from services.base.log_messages import LONGEST, published
+from dodo_dsl.opendlv.session import Session
+from services.base.process import LONGEST, published
 from tests.services.base.conftest import Start
 from tests.services.process import receive
 

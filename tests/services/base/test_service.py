@@ -3,8 +3,8 @@ from fractions import Fraction
 
 import pytest
 
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base.flags import Flags
 from services.base.service import Context, Service, period_of
 

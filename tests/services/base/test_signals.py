@@ -3,7 +3,7 @@ import signal
 
 import pytest
 
-from services.base.signals import interruptible
+from services.base.process import interruptible
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

@@ -1,8 +1,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from services.base.stamps import HeardStamps, with_strangers
+from dodo_dsl.opendlv.envelope import Envelope
+from services.base.loop import HeardStamps, with_strangers
 
 STEER, PEDAL = 1090, 1086
 INPUTS = {(STEER, 0): "opendlv.proxy.GroundSteeringRequest", (STEER, 9): "opendlv.proxy.GroundSteeringRequest"}

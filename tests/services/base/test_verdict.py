@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from services.base.verdict import Check, Verdict, undeclared_checks
+from services.base.service import Check, Verdict, undeclared_checks
 
 
 def test_the_line() -> None:

@@ -4,12 +4,11 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.inputs.trajectory import TrajectoryError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.assets.trajectory import TrajectoryError
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 from services.base import Context
-from services.base.flags import parse
-from services.base.manifest import load_manifest
+from services.base.flags import load_manifest, parse
 from services.beacon.service import Beacon
 from tests.services.built import refusal
 from tests.services.process import PATIENCE, ROOT, receive, running, send

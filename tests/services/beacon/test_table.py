@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs.trajectory import Trajectory, TrajectoryError
-from dodo_dsl.opendlv.inputs.way_points import read_points, read_table
+from dodo_dsl.opendlv.assets.trajectory import Trajectory, TrajectoryError, read_points, read_table
 from tests.services.process import ROOT
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs.trajectory import Point, Trajectory, TrajectoryError, headings, straight, wrapped
+from dodo_dsl.opendlv.assets.trajectory import Point, Trajectory, TrajectoryError, headings, straight, wrapped
 
 
 def points(*places: tuple[float, ...]) -> list[Point]:

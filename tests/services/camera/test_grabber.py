@@ -3,8 +3,8 @@ import threading
 import numpy as np
 import pytest
 
-from services.camera.grabber import Grabber, longest_silence
 from services.camera.picture import CameraError, SharedPicture, from_bgr
+from services.camera.sources import Grabber, longest_silence
 
 PATIENCE = 20.0
 

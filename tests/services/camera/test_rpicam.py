@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from services.camera.picture import CameraError
-from services.camera.rpicam import RpiCamera, argv
+from services.camera.sources import RpiCamera, argv
 
 
 def test_pictures_come_whole_and_in_order(rpicam: Path) -> None:
@@ -44,7 +44,7 @@ def test_why_it_ended(rpicam: Path, monkeypatch: pytest.MonkeyPatch, mode: str, 
 @pytest.mark.thorough
 def test_one_that_does_not_go_is_killed(rpicam: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FAKE_MODE", "stubborn")
-    monkeypatch.setattr("services.camera.rpicam.PATIENCE", 0.2)
+    monkeypatch.setattr("services.camera.sources.PATIENCE", 0.2)
     camera = RpiCamera(64, 48, freq=100, exposure=0.01)
     camera.read()
     camera.close()

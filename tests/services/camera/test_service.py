@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from services.camera.v4l2 import V4l2Camera
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+from services.camera.sources import V4l2Camera
 from tests.services.built import built, refusal
 from tests.services.process import PATIENCE, launch, receive, running
 

@@ -1,5 +1,5 @@
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.camera.telemetry import CameraTelemetry
+from dodo_dsl.opendlv.message_set import MessageSet
+from services.camera.service import CameraTelemetry
 
 PERIOD = 100_000
 

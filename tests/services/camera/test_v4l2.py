@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from services.camera.picture import CameraError
-from services.camera.v4l2 import V4l2Camera
+from services.camera.sources import V4l2Camera
 
 DEVICE = Path("/dev/null")
 

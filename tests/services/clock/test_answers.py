@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
+from dodo_dsl.opendlv.envelope import Envelope
 from services.clock.answers import MOST_SURPLUS, Answers, MessageFilter, filters
 
 STEER, PEDAL, BOX, READY = 1090, 1086, 1134, 1054

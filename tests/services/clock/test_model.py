@@ -8,13 +8,12 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from services.base.lockstep import channel, clock_client
-from services.base.lockstep.announced_memory import AnnouncedMemory
-from services.base.lockstep.lockstep_clock import EPOCH
+from dodo_dsl.opendlv.session import Session
+from services.base import clock_link
+from services.base.lockstep_clock import EPOCH, AnnouncedMemory
 from services.clock import exchange, model
+from services.clock.exchange import ApplicationSilent, Patience, ServiceSilent, TimeOver
 from services.clock.model import Stepper
-from services.clock.participants import ApplicationSilent, Patience, ServiceSilent, TimeOver
 from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Forger, Mover, ToyEvaluator, Toys, Watcher
 
 Way = list[tuple[int, float]]
@@ -90,9 +89,9 @@ def test_who_watches_sees_each_picture(toys: Toys, monkeypatch: pytest.MonkeyPat
 def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """A third of what clock and services tell each other is lost, some comes twice, some after the next."""
     chance = random.Random(seed)
-    plain, held = channel.ClockChannel.send, []
+    plain, held = clock_link.ClockChannel.send, []
 
-    def send(self: channel.ClockChannel, message: Any, to: Any) -> None:
+    def send(self: clock_link.ClockChannel, message: Any, to: Any) -> None:
         fate = chance.random()
         if fate < 0.3:
             return
@@ -106,10 +105,10 @@ def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch:
             if late._socket.fileno() >= 0:
                 plain(late, what, whom)
 
-    monkeypatch.setattr(channel.ClockChannel, "send", send)
+    monkeypatch.setattr(clock_link.ClockChannel, "send", send)
     monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
     monkeypatch.setattr(exchange, "_SLICE", 0.01)
-    monkeypatch.setattr(clock_client, "SLICE_MS", 10)
+    monkeypatch.setattr(clock_link, "SLICE_MS", 10)
     way, stepper = toys.run(toys.application())
     assert close(way, expected(21))
     assert stepper.application.frames == 21
@@ -125,7 +124,7 @@ def test_who_has_not_the_key_changes_nothing(toys: Toys, key: bytes, capsys: pyt
 
 
 def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.base.lockstep.datagrams.PART_BYTES", 100)
+    monkeypatch.setattr("services.base.clock_link.PART_BYTES", 100)
     way, _ = toys.run(toys.application())
     assert close(way, expected(21))
 
@@ -213,9 +212,9 @@ def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest
 @pytest.mark.slow
 def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each burst the first three get through only, as where the receive buffer is small."""
-    plain, sent = channel.ClockChannel.send, dict[int, tuple[float, int]]()
+    plain, sent = clock_link.ClockChannel.send, dict[int, tuple[float, int]]()
 
-    def send(self: channel.ClockChannel, message: Any, to: Any) -> None:
+    def send(self: clock_link.ClockChannel, message: Any, to: Any) -> None:
         began, count = sent.get(id(self), (0.0, 0))
         now = time.monotonic()
         began, count = (began, count + 1) if now - began < 0.003 else (now, 1)
@@ -223,8 +222,8 @@ def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: p
         if count <= 3:
             plain(self, message, to)
 
-    monkeypatch.setattr("services.base.lockstep.datagrams.PART_BYTES", 150)
-    monkeypatch.setattr(channel.ClockChannel, "send", send)
+    monkeypatch.setattr("services.base.clock_link.PART_BYTES", 150)
+    monkeypatch.setattr(clock_link.ClockChannel, "send", send)
     monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
     monkeypatch.setattr(exchange, "_SLICE", 0.01)
     toys.evaluator = ToyEvaluator(0.5)
@@ -266,7 +265,7 @@ def test_the_stepper_goes_to_the_time_that_a_source_tells() -> None:
 @pytest.mark.thorough
 def test_messages_on_the_channel_wake_nobody_else(cid: int) -> None:
     with Session(cid) as other:
-        ours, theirs = (channel.ClockChannel(cid, other.messages) for _ in range(2))
+        ours, theirs = (clock_link.ClockChannel(cid, other.messages) for _ in range(2))
         address = ("127.0.0.1", theirs._socket.getsockname()[1])
         ours.send(other.messages.type("dodo.Step")(number=3), address)
         assert other.receive(0.2) is None

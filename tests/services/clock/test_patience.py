@@ -7,10 +7,9 @@ from typing import Any, cast
 
 import pytest
 
-from services.clock.application import SteppedApplication
-from services.clock.participants import ApplicationSilent, Patience
+from services.clock.application import ResponseTimes, SteppedApplication
+from services.clock.exchange import ApplicationSilent, Patience
 from services.clock.processor_time import ApplicationProcesses, ProcessorTimes, ThreadSpent
-from services.clock.response import ResponseTimes
 
 PID = 7
 LIMIT_S, ANSWER_S = 0.05, 0.4

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from services.clock.application import ResponseTimes, processor_name
 from services.clock.processor_time import Spent
-from services.clock.response import ResponseTimes, processor_name
 
 times = st.lists(st.floats(0.0, 10.0), min_size=1, max_size=50)
 

@@ -5,15 +5,13 @@ from fractions import Fraction
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base.lockstep.channel import ClockChannel
-from services.base.lockstep.datagrams import encode
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
+from services.base.clock_link import ClockChannel, encode
 from services.clock import model
 from services.clock.answers import Answers
-from services.clock.exchange import Exchange
-from services.clock.participants import Patience, Roles, Timing
+from services.clock.exchange import Exchange, Patience, Roles, Timing
 from services.clock.service import ClockService
 
 STEP = Fraction(100_000)

@@ -10,19 +10,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base import Service, Verdict
-from services.base.lockstep.channel import ClockChannel
-from services.base.lockstep.lockstep_clock import EPOCH, LockstepClock
+from services.base.clock_link import ClockChannel
+from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, filters
-from services.clock.application import SteppedApplication
-from services.clock.exchange import Exchange
+from services.clock.application import ResponseTimes, SteppedApplication
+from services.clock.exchange import Exchange, Patience, Roles
 from services.clock.model import Stepper
-from services.clock.participants import Patience, Roles
-from services.clock.response import ResponseTimes
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"

@@ -8,8 +8,7 @@ import shapely
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from services.collision.gates import Gate, Gates, crossings
-from services.collision.geometry import VehiclePose
+from services.collision.track import Gate, Gates, VehiclePose, crossings
 
 # The path has its corners at whole numbers and the gates theirs aside, so that none lies on the other.
 corners = st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=2, max_size=12)

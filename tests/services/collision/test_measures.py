@@ -3,8 +3,8 @@ import math
 import pytest
 
 from services.base import Check
-from services.collision.geometry import VehiclePose
-from services.collision.measures import DriveMeasures
+from services.collision.model import DriveMeasures
+from services.collision.track import VehiclePose
 
 SECOND = 1_000_000
 

@@ -12,10 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.base import UnjudgeableError, Verdict
-from services.collision.geometry import VehicleBox, VehiclePose
-from services.collision.model import TrackEvaluator
-from services.collision.requests import REQUESTS, Requests
-from services.collision.track import Track, told
+from services.collision.model import REQUESTS, Requests, TrackEvaluator
+from services.collision.track import Track, VehicleBox, VehiclePose, told
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from services.collision.obstacles import ObstaclesError, load, pick
+from services.collision.track import ObstaclesError, load, pick
 
 
 def write(folder: Path, document: Any) -> Path:

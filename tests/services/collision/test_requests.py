@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.collision.requests import REQUESTS, Requests
+from services.collision.model import REQUESTS, Requests
 
 SECOND = 1_000_000
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 from services.base import Check, Context, Flags, UnjudgeableError
-from services.collision.requests import REQUESTS
+from services.collision.model import REQUESTS
 from services.collision.service import Collision
 from tests.services.built import built, hand, refusal
 from tests.services.process import PATIENCE, running, send

@@ -3,10 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.continuous_signal.late import LateFacts
-from services.continuous_signal.measures import SignalLimits, SignalMeasures, WorstSample
-from services.continuous_signal.reason import verdict
-from services.continuous_signal.shape import RepeatedValue
+from services.continuous_signal.measures import LateFacts, RepeatedValue, SignalLimits, SignalMeasures, WorstSample
+from services.continuous_signal.model import verdict
 from services.continuous_signal.target import Target
 
 TARGET = Target(np.array([0, 10_000_000]), np.array([0.0, 1.0]))

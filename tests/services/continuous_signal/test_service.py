@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags
-from services.base.flags import parse
-from services.base.manifest import load_manifest
+from services.base.flags import load_manifest, parse
 from services.continuous_signal.service import ContinuousSignal
 from tests.services.built import refusal
 from tests.services.continuous_signal.test_target import recording

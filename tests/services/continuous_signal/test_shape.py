@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.continuous_signal.shape import RepeatedValue, lag, likeness, longest_run
+from services.continuous_signal.measures import RepeatedValue, lag, likeness, longest_run
 from services.continuous_signal.target import MICROSECONDS, Target
 
 TIMES = np.arange(0, 8 * MICROSECONDS, MICROSECONDS // 10)

@@ -5,12 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.continuous_signal.csv_target import read_table
-from services.continuous_signal.recorded_target import read_recording
-from services.continuous_signal.signals import Signal, check
-from services.continuous_signal.target import Target, TargetError, in_order
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from services.continuous_signal.target import Signal, Target, TargetError, check, in_order, read_recording, read_table
 
 SECOND = 1_000_000
 STEERING = Signal("opendlv.proxy.GroundSteeringRequest", 3, "groundSteering")

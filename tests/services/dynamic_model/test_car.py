@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs.car import KEYS, KIWI, CarError, read_car
+from dodo_dsl.opendlv.assets.car import KEYS, KIWI, CarError, read_car
 
 
 def written(folder: Path, text: str, name: str = "car.yml") -> Path:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs.car import KIWI
+from dodo_dsl.opendlv.assets.car import KIWI
 from services.dynamic_model.model import BodyMotion, Condition, Vehicle, pedal_position, step, wheel_angle
 
 SECOND = 1_000_000

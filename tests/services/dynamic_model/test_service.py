@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags, Output
 from services.dynamic_model.service import DynamicModel
 from tests.services.process import receive, running, send

@@ -7,13 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from services.gantry import health_check, manual, start
-from services.gantry.conversion import Conversion
-from services.gantry.health_check import INDEX, home, run_checks
-from services.gantry.link import Link, LinkAnswers, RigError
+from services.gantry import manual, start
+from services.gantry.link import Link, LinkAnswers, RigError, SerialPort
+from services.gantry.manual import INDEX, find_home, run_checks
 from services.gantry.memory import wanted
-from services.gantry.motion import MotionLimits, Shaper, Velocity, box
-from services.gantry.port import SerialPort
+from services.gantry.motion import Conversion, MotionLimits, Shaper, Velocity, box
 from services.gantry.protocol import Circle, Position, Refusal, answer
 from services.gantry.rig_table import TURN
 from tests.services.gantry.fake_rig import FakeRig
@@ -24,9 +22,9 @@ LIMITS = MotionLimits(low=LOW, high=HIGH)
 
 @pytest.fixture
 def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[FakeRig, Link]]:
-    monkeypatch.setattr(health_check, "ROUNDS", 3)
-    monkeypatch.setattr(health_check, "TRIES", 1)
-    monkeypatch.setattr(health_check, "REPEATS", dict.fromkeys(("x", "y", "yaw"), 1.0))
+    monkeypatch.setattr(manual, "ROUNDS", 3)
+    monkeypatch.setattr(manual, "TRIES", 1)
+    monkeypatch.setattr(manual, "REPEATS", dict.fromkeys(("x", "y", "yaw"), 1.0))
     with FakeRig(tmp_path / "rig") as rig:
         rig.turn = TURN
         link = Link(str(rig.path), lambda: SerialPort(str(rig.path)), conversion=Conversion(circle=True))
@@ -91,7 +89,7 @@ def test_headings_have_no_edge_and_places_do() -> None:
         velocity = shaper.step(Velocity(yaw=1), Position(0, 0, 3.14), 0.05)
     assert (velocity.yaw, shaper.cut) == (1, 0)
     assert LIMITS.holds(Position(0, 0, math.pi)) and not LIMITS.holds(Position(1, 0, 0))
-    assert home(LIMITS, Conversion(circle=True)) == Position(LOW.x, LOW.y, INDEX)
+    assert find_home(LIMITS, Conversion(circle=True)) == Position(LOW.x, LOW.y, INDEX)
 
 
 def test_a_heading_may_have_the_name_of_another_turn() -> None:

@@ -10,15 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.base import Flags
-from services.base.flags import parse
-from services.base.manifest import load_manifest
+from services.base.flags import load_manifest, parse
 from services.gantry import manual
-from services.gantry.conversion import BUILT_IN, AxisConstants, Conversion
-from services.gantry.health_check import home
-from services.gantry.motion import FARTHEST, HOME, MotionLimits, box
-from services.gantry.port import PortError
+from services.gantry.link import PortError
+from services.gantry.manual import find_home
+from services.gantry.memory import conversion_of, kept_limits, motion_limits, true_box
+from services.gantry.motion import BUILT_IN, FARTHEST, HOME, AxisConstants, Conversion, MotionLimits, box
 from services.gantry.protocol import Position
-from services.gantry.rig_limits import conversion_of, kept_limits, motion_limits, true_box
 from services.gantry.rig_table import CIRCLE_YAW, MICROSTEP
 from tests.services.gantry.fake_rig import FakeRig
 
@@ -131,7 +129,7 @@ def test_the_yaw_of_a_circle_has_an_offset_only() -> None:
 
 def test_a_circle_at_its_index_by_measured_constants() -> None:
     conversion = conversion_of(flags_of("--kind=circle", "--offset-yaw=105"))
-    at = home(motion_limits(flags_of("--kind=circle", "--offset-yaw=105")), conversion)
+    at = find_home(motion_limits(flags_of("--kind=circle", "--offset-yaw=105")), conversion)
     assert abs(conversion.to_firmware(at).yaw) == pytest.approx(math.pi) and math.degrees(at.yaw) == pytest.approx(171)
 
 

@@ -3,13 +3,11 @@ from pathlib import Path
 
 import pytest
 
-from services.gantry import health_check
-from services.gantry.conversion import Conversion
-from services.gantry.health_check import home, read_state, run_checks
-from services.gantry.link import Link
+from services.gantry import manual
+from services.gantry.link import Link, SerialPort
+from services.gantry.manual import find_home, read_state, run_checks
 from services.gantry.memory import wanted
-from services.gantry.motion import MotionLimits
-from services.gantry.port import SerialPort
+from services.gantry.motion import Conversion, MotionLimits
 from services.gantry.protocol import Status
 from tests.services.gantry.fake_rig import FakeRig
 
@@ -17,8 +15,8 @@ from tests.services.gantry.fake_rig import FakeRig
 @pytest.fixture
 def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[FakeRig, Link]":
     """A rig whose home is found at once, wherever it is."""
-    monkeypatch.setattr(health_check, "ROUNDS", 3)
-    monkeypatch.setattr(health_check, "TRIES", 1)
+    monkeypatch.setattr(manual, "ROUNDS", 3)
+    monkeypatch.setattr(manual, "TRIES", 1)
     with FakeRig(tmp_path / "rig") as rig:
         link = Link(str(rig.path), lambda: SerialPort(str(rig.path)))
         yield rig, link
@@ -27,7 +25,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> "tuple[FakeRig, Lin
 
 def test_the_home_is_inside_the_limits_by_less_than_a_millimetre() -> None:
     limits = MotionLimits()
-    at = home(limits, Conversion())
+    at = find_home(limits, Conversion())
     assert limits.holds(at) and at.yaw - limits.low.yaw == pytest.approx(1e-4)
     assert math.dist((at.x, at.y), (limits.low.x, limits.low.y)) == 0
 

@@ -8,12 +8,10 @@ from pathlib import Path
 import pytest
 
 from services.gantry import manual, memory
-from services.gantry.conversion import Conversion
-from services.gantry.health_check import run_checks
-from services.gantry.link import Link, RigError
+from services.gantry.link import Link, PortError, RigError, SerialPort
+from services.gantry.manual import run_checks
 from services.gantry.memory import agree, wanted
-from services.gantry.motion import MotionLimits
-from services.gantry.port import PortError, SerialPort
+from services.gantry.motion import Conversion, MotionLimits
 from services.gantry.protocol import Limits, answer
 from services.gantry.rig_table import CIRCLE_YAW, LIMITS, Source
 from tests.services.built import built, refusal
@@ -177,7 +175,7 @@ def test_by_hand_they_are_written_by_calibrate_and_shown_by_status(
 @pytest.mark.thorough
 def test_the_health_check_writes_them_first(line: tuple[FakeRig, Link], monkeypatch: pytest.MonkeyPatch) -> None:
     rig, link = line
-    monkeypatch.setattr("services.gantry.health_check._homing", lambda *_: [])
+    monkeypatch.setattr("services.gantry.manual._homing", lambda *_: [])
     assert run_checks(link, MotionLimits(), wanted(TEXT, Conversion()), 5.0)["ok"]
     order = words(rig)
     assert order.index("SETLIMITS") < order.index("CALIBRATE")

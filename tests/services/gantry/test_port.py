@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from services.gantry.port import SerialPort
+from services.gantry.link import SerialPort
 
 GROUP = next(group for group in grp.getgrall() if group.gr_gid and not group.gr_mem)
 

@@ -12,14 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 from services.base import Context
-from services.base.flags import parse
-from services.base.manifest import load_manifest
+from services.base.flags import load_manifest, parse
 from services.gantry import link, start
-from services.gantry.link import Link, RigError
-from services.gantry.port import SerialPort
+from services.gantry.link import Link, RigError, SerialPort
 from services.gantry.rig_table import TURN, Error
 from services.gantry.service import Gantry
 from tests.services.built import built, hand, refusal

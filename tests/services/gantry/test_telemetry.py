@@ -1,6 +1,6 @@
 import pytest
 
-from services.gantry.telemetry import LinkTelemetry
+from services.gantry.service import LinkTelemetry
 
 
 def test_jitter_is_the_distance_of_each_period_and_latency_that_of_the_answer() -> None:

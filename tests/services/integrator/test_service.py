@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.odvd import parser
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags, Output
 from services.integrator.service import OLD_FRAME, Integration
 from tests.services.process import receive, running, send
@@ -52,7 +52,7 @@ def test_frames_of_set_09_and_copies() -> None:
     body = service(euler=True, yaw=30.0, pitch=20.0, roll=10.0, **{"copy-id": 9})
     outputs = list(body.update(5))
     assert [type(o) for o in outputs] == [Output, Envelope] * 2
-    old = MessageSet(parser.load(OLD_FRAME))
+    old = MessageSet(odvd.load(OLD_FRAME))
     for (new, before), stamp in zip((outputs[:2], outputs[2:]), (4, 9), strict=True):
         assert isinstance(new, Output) and isinstance(before, Envelope)
         assert (new.sender_stamp, before.sender_stamp, before.data_type, before.sample_time) == (stamp, stamp, 1001, 5)
@@ -89,11 +89,11 @@ def test_frames_of_set_09_on_the_bus(cid: int, tmp_path: Path) -> None:
         while (envelope := session.receive(20)) is not None and envelope.data_type != 1001:
             pass
         assert envelope is not None
-        assert MessageSet(parser.load(OLD_FRAME)).decode(1001, envelope.payload).yaw == pytest.approx(math.pi / 2)
+        assert MessageSet(odvd.load(OLD_FRAME)).decode(1001, envelope.payload).yaw == pytest.approx(math.pi / 2)
 
 
 def test_real_frames_of_set_09_have_this_layout(shared_data: Callable[[str], Path]) -> None:
-    messages = MessageSet(parser.load(OLD_FRAME))
+    messages = MessageSet(odvd.load(OLD_FRAME))
     payloads = [e.payload for e in read_envelopes(shared_data("sim-2023-04-27.rec")) if e.data_type == 1001]
     frames = [messages.decode(1001, payload) for payload in payloads]
     assert len(frames) > 100

@@ -5,9 +5,8 @@ from hypothesis import strategies as st
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-from services.object_detection.boxes import Box, LabelledBox
-from services.object_detection.counts import Counts, CountsByClass, compare
-from services.object_detection.frames import Detections, TypeNumber
+from services.object_detection.boxes import Box, Detections, LabelledBox, TypeNumber
+from services.object_detection.score import Counts, CountsByClass, compare
 
 A, B, FAR = Box(0, 0, 0.1, 0.1), Box(0.3, 0, 0.1, 0.1), Box(0.8, 0.8, 0.1, 0.1)
 LABELS = ("yellow", "blue", "orange")

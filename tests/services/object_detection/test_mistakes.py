@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from services.object_detection.boxes import Box, LabelledBox
-from services.object_detection.counts import CountsByClass, compare
+from services.object_detection.score import CountsByClass, compare
 
 TRUE = [LabelledBox(label, Box(0.1 + 0.2 * n, 0.5, 0.04, 0.05 + 0.03 * n)) for n, label in enumerate(("a", "a", "b"))]
 

@@ -3,11 +3,9 @@ import json
 import pytest
 
 from services.base import UnjudgeableError, Verdict
-from services.object_detection.boxes import Box, LabelledBox
-from services.object_detection.frames import FrameKey, TypeNumber
+from services.object_detection.boxes import Box, FrameKey, LabelledBox, Truth, TypeNumber
 from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import DetectionLimits, Rules
-from services.object_detection.truth import Truth
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND

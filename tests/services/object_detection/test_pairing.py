@@ -8,9 +8,8 @@ from hypothesis.extra.numpy import arrays
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-from services.object_detection.boxes import Box, LabelledBox, Scores, overlaps
-from services.object_detection.counts import compare
-from services.object_detection.pairing import best_pairs
+from services.object_detection.boxes import Box, LabelledBox, Scores, best_pairs, overlaps
+from services.object_detection.score import compare
 
 shapes = st.tuples(st.integers(0, 5), st.integers(0, 5))
 scores = shapes.flatmap(lambda shape: arrays(np.float64, shape, elements=st.sampled_from([0, 0.2, 0.5, 0.6, 0.75, 1])))

@@ -1,6 +1,5 @@
-from services.object_detection.counts import Counts, CountsByClass
-from services.object_detection.reason import verdict
-from services.object_detection.score import DetectionLimits, Score
+from services.object_detection.model import verdict
+from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score
 
 
 def score(hits: int, false: int, missed: int, **about: int) -> Score:

@@ -6,12 +6,10 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags
-from services.base.flags import parse
-from services.base.manifest import load_manifest
-from services.base.usage import help_text
+from services.base.flags import help_text, load_manifest, parse
 from services.object_detection.service import ANNOUNCEMENT, LOGIC, ObjectDetection
 from tests.services.built import hand, refusal
 from tests.services.object_detection.test_truth import single, write

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.object_detection.silence import Gap, JudgedFrame, Silence
+from services.object_detection.score import Gap, JudgedFrame, Silence
 
 times = st.lists(st.floats(-1, 11, width=32), max_size=20)
 

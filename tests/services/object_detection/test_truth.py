@@ -8,9 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.object_detection.boxes import Box, LabelledBox
-from services.object_detection.frames import FrameKey
-from services.object_detection.truth import TruthFileError, load
+from services.object_detection.boxes import Box, FrameKey, LabelledBox, TruthFileError, load
 from tests.services.process import ROOT
 
 COCO = {

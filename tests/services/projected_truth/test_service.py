@@ -9,12 +9,11 @@ from typing import Any
 import pytest
 
 from dodo_dsl import package_data
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Output
 from services.base.clock import RealTimeClock
-from services.base.flags import parse
-from services.base.manifest import load_manifest
+from services.base.flags import load_manifest, parse
 from services.projected_truth.service import PATIENCE, ProjectedTruth, build
 from services.virtual_camera import service as virtual_camera
 from tests.services.process import ROOT

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import read_envelopes
 from services.rec_recorder.model import RecordingFile, RecordingFileError
 
 times = st.integers(0, 2**31 * 1_000_000 - 1)

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from services.rec_recorder.model import RecordingFileError
-from services.rec_recorder.newest import NewestPictures
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import read_envelopes
+from services.rec_recorder.model import NewestPictures, RecordingFileError
 
 
 def picture(number: int, size: int = 100) -> Envelope:

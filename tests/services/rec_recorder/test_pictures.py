@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.memory import pixels
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
-from dodo_dsl.opendlv.video.decoder import VideoDecoder
-from dodo_dsl.opendlv.video.encoder import VideoEncoder
+from dodo_dsl.opendlv import pixels
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+from dodo_dsl.opendlv.video import VideoDecoder, VideoEncoder
 from services.rec_recorder import service
 from services.rec_recorder.service import Recorder
 from services.rec_recorder.source import SourceError

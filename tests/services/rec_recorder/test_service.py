@@ -4,9 +4,9 @@ import time
 from itertools import pairwise
 from pathlib import Path
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.session import Session
 from tests.services.built import refusal
 from tests.services.process import PATIENCE, ROOT, running, send
 

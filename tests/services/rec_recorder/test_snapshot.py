@@ -5,8 +5,8 @@ import cv2
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.memory import pixels
-from dodo_dsl.opendlv.recordings.recording import read_envelopes
+from dodo_dsl.opendlv import pixels
+from dodo_dsl.opendlv.recording import read_envelopes
 from services.rec_recorder.snapshot import SnapshotWriter
 from services.rec_recorder.source import MemorySpec, PictureSource
 from tests.services.built import built, refusal

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.rec_recorder.source import MemorySpec, PictureSource, SourceError, parse
 
 PERIOD = 100_000

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.memory import pixels
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.writer import RecordingWriter
-from dodo_dsl.opendlv.video.encoder import VideoEncoder
+from dodo_dsl.opendlv import pixels
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from dodo_dsl.opendlv.video import VideoEncoder
 
 S = 1_000_000
 T0 = 1_600_000_000 * S

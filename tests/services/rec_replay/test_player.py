@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from services.rec_replay.player import PAUSE, PLAY, SEEK, STEP, Player
+from services.rec_replay.selection import PAUSE, PLAY, SEEK, STEP, Player
 
 S = 1_000_000
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.recordings.writer import RecordingWriter
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from services.rec_replay.selection import Selection, SelectionError, select
 
 S = 1_000_000

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import Recording, read_envelopes
+from dodo_dsl.opendlv.session import Session
 from services.base import Output
 from services.rec_replay.service import Replay
 from tests.services.built import built, hand, refusal

@@ -3,12 +3,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from dodo_dsl.opendlv.recordings.recording import Recording
-from dodo_dsl.opendlv.video.decoder import VideoError
-from services.rec_replay.pictures import PictureMemories, first_frame, pixels
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.video import VideoError
 from services.rec_replay.selection import Selection, select
-from services.rec_replay.stream import EntryStream
+from services.rec_replay.stream import EntryStream, PictureMemories, first_frame, pixels
 from tests.services.rec_replay.recordings import IMAGE, S, images, message, picture, write
 
 

@@ -8,12 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.scene.camera import CameraPose, Pinhole, still
 from services.scene.lens import Alignment, Distortion, Lens, lens_of
-from services.scene.motion import still
-from services.virtual_camera.image.optics import Optics
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
+from services.virtual_camera.optics import Optics
 
 CAMERA = Pinhole(160, 120, 1.0)
 

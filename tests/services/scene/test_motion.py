@@ -3,11 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
-from services.scene.motion import MOST, CameraMotion, between, still
-from services.virtual_camera.image.optics import Optics
+from services.scene.camera import MOST, CameraMotion, CameraPose, Pinhole, between, still
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
+from services.virtual_camera.optics import Optics
 
 BODY = CameraPose.at(0, 0, 0)
 

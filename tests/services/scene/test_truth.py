@@ -6,13 +6,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl import package_data
-from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.camera import CameraPose, Pinhole, still
 from services.scene.lens import Distortion
-from services.scene.motion import still
+from services.scene.render import Renderer
+from services.scene.scene import SceneOptions, load_scene
 from services.scene.truth import SceneTruth, TrueBox, TruthLimits, classes_of
-from services.virtual_camera.image.optics import Optics
+from services.virtual_camera.optics import Optics
 
 STRAIGHT = package_data.registry() / "maps" / "straight"
 FOVY = math.radians(48.8)

@@ -15,10 +15,10 @@ import pytest
 import yaml
 
 from dodo_dsl import package_data
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
 from services.virtual_camera.model import to_i420
 from tests.services.built import refusal
 

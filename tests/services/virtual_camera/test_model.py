@@ -6,10 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
-from services.scene.vehicle import mount
+from services.scene.camera import CameraPose, mount
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
 from services.virtual_camera.model import VirtualCamera, to_i420
 
 

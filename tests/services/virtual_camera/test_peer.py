@@ -9,8 +9,8 @@ import pytest
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
 from services.scene.truth import SceneTruth, TruthLimits, classes_of
 
 MAPS = package_data.registry() / "maps"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import package_data
-from dodo_dsl.spec.deployment.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 
 
 def loaded(folder: Path, text: str) -> tuple[Deployment, list[tuple[str, str]]]:

@@ -8,7 +8,7 @@ import pytest
 
 from dodo_dsl import package_data
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.deployment.rig import (
+from dodo_dsl.spec.rig import (
     CIRCLE,
     EMULATED,
     EMULATED_CIRCLE,

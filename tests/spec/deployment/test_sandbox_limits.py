@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.spec.deployment.deployment import load_deployment
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.spec.deployment import load_deployment
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 
 def deployed(folder: Path, text: str) -> tuple[SandboxLimits, list[str]]:

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.diagnostics import format_text, has_errors
-from dodo_dsl.spec.deployment.deployment import load_deployment
+from dodo_dsl.spec.deployment import load_deployment
 from dodo_dsl.spec.model import MAX_SERVICES
 from tests.check import examples
 from tests.emit.readers import compose

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.instances.matrix import MAX_INSTANCES, PLACEHOLDERS, SLUG, choices, problems, substitute
+from dodo_dsl.spec.matrix import MAX_INSTANCES, PLACEHOLDERS, SLUG, choices, problems, substitute
 from tests.source.nodes import mapping
 
 

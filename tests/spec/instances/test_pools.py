@@ -4,12 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.deployment.rig import Rig
-from dodo_dsl.spec.instances.matrix import Choice
-from dodo_dsl.spec.instances.pools import members, of_test, on_each
-from dodo_dsl.spec.model import Spec, spec_of
-from dodo_dsl.spec.pool import Pool, pool_of
+from dodo_dsl.spec.load import members, of_test, on_each
+from dodo_dsl.spec.matrix import Choice
+from dodo_dsl.spec.model import Pool, Spec, pool_of, spec_of
 from dodo_dsl.spec.registry import Location
+from dodo_dsl.spec.rig import Rig
 from tests.source.nodes import mapping
 
 RIGS = {

@@ -5,7 +5,7 @@ from decimal import Decimal
 import pytest
 
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.instances.vary import PLACEHOLDERS, Range, corners, nominal, problems, read
+from dodo_dsl.spec.vary import PLACEHOLDERS, Range, corners, nominal, problems, read
 from tests.source.nodes import mapping
 
 RANGES = (

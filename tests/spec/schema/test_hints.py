@@ -9,8 +9,8 @@ import yaml
 
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import parse
-from dodo_dsl.spec.schema.validation import validate
-from dodo_dsl.spec.schema.validity import schema_of
+from dodo_dsl.spec.schema_errors import schema_of
+from dodo_dsl.spec.validation import validate
 from tests.spec.schema.test_unknown_keys import Step, shown
 
 WRONG = (

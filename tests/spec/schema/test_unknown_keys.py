@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 from dodo_dsl.source import parse
-from dodo_dsl.spec.schema.validation import validate
-from dodo_dsl.spec.schema.validity import schema_of
+from dodo_dsl.spec.schema_errors import schema_of
+from dodo_dsl.spec.validation import validate
 
 UNKNOWN = "zzq"
 NAMES = {

@@ -3,7 +3,7 @@
 import pytest
 
 from dodo_dsl import __version__
-from dodo_dsl.spec.schema.validation import validate
+from dodo_dsl.spec.validation import validate
 from tests.check import examples
 from tests.source.nodes import mapping
 

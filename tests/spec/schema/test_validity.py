@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from dodo_dsl.source import plain, read
-from dodo_dsl.spec.schema.validation import _validator, validate
-from dodo_dsl.spec.schema.validity import is_valid
+from dodo_dsl.spec.schema_errors import is_valid
+from dodo_dsl.spec.validation import _validator, validate
 
 ROOT = Path(__file__).parents[3]
 FILES = {
@@ -56,7 +56,7 @@ def test_it_lets_pass_only_what_has_no_error(schema: str) -> None:
 
 
 def test_what_is_valid_does_without_the_slow_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr("dodo_dsl.spec.schema.validation._validator")
+    monkeypatch.delattr("dodo_dsl.spec.validation._validator")
     node, _ = read(FILES["dodo"])
     assert node
     assert validate(node, "dodo") == []

@@ -5,31 +5,31 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.rules.inputs.references import check
+from dodo_dsl.check.file_rules import check_references
 from tests.check.contexts import context, found
 
 GOAL = "evaluation: {track: {uses: collision, with: {goal: finnish}}}\n"
 
 
 def test_an_entry_that_is_missing(tmp_path: Path) -> None:
-    (problem,) = check(context(GOAL, tmp_path))
+    (problem,) = check_references(context(GOAL, tmp_path))
     assert (problem.rule, problem.message) == ("unknown-name", "'finnish' is not among the obstacles of plain/map.json")
     assert problem.hint == "did you mean 'finish'?"
 
 
 def test_each_entry_of_a_list(tmp_path: Path) -> None:
     example = "evaluation: {track: {uses: collision, with: {goal: finish, walls: [a, finish, b]}}}\n"
-    assert [message.split("'")[1] for _, message in found(check, example, tmp_path)] == ["a", "b"]
+    assert [message.split("'")[1] for _, message in found(check_references, example, tmp_path)] == ["a", "b"]
 
 
 @pytest.mark.parametrize("content", ["{", "[]", '{"obstacles": 3}'])
 def test_a_file_that_has_no_entries_is_told_with_the_file(content: str, tmp_path: Path) -> None:
-    assert found(check, f"{GOAL}# tests/maps/plain/map.json\n{content}\n", tmp_path) == []
+    assert found(check_references, f"{GOAL}# tests/maps/plain/map.json\n{content}\n", tmp_path) == []
 
 
 def test_a_file_of_another_map(tmp_path: Path) -> None:
     other = json.dumps({"obstacles": [{"name": "finnish"}, {"other": 1}]})
-    assert found(check, f"{GOAL}# tests/maps/plain/map.json\n{other}\n", tmp_path) == []
+    assert found(check_references, f"{GOAL}# tests/maps/plain/map.json\n{other}\n", tmp_path) == []
 
 
 @pytest.mark.parametrize(("timeout", "rules"), [("40 s", ["short-timeout"]), ("1 min", [])])
@@ -37,6 +37,6 @@ def test_a_timeout_shorter_than_an_evaluator_waits(timeout: str, rules: list[str
     example = (
         f"timeout: {timeout}\nevaluation: {{track: {{uses: collision, with: {{goal: finish, max-time: 40 s}}}}}}\n"
     )
-    problems = list(check(context(example, tmp_path)))
+    problems = list(check_references(context(example, tmp_path)))
     assert [problem.rule for problem in problems] == rules
     assert all(problem.severity == "warning" for problem in problems)

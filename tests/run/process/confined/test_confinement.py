@@ -11,10 +11,9 @@ import msgspec
 import pytest
 
 from dodo_dsl import package_data
-from dodo_dsl.run.process.confined import confinement as module
-from dodo_dsl.run.process.confined.bubblewrap import Mounts, words
-from dodo_dsl.run.process.confined.confinement import Confinement, confinement
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.run.process import confinement as module
+from dodo_dsl.run.process.confinement import Confinement, Mounts, confinement, sandbox_words
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 MOUNTS = Mounts(Path("/tmp/x/folder"), True, Path("/tmp/x/home"), {"/tmp": Path("/tmp/x/tmp")})
 
@@ -74,7 +73,7 @@ def test_a_repository_where_every_application_sees_the_machine_is_hidden_around_
     """But not what may be read there, in which there may be tests again."""
     folder, python = "/usr/share/doc", "/usr/share/common-licenses"
     inner, tests = f"{python}/{next(Path(python).iterdir()).name}", f"{folder}/bash"
-    argv = words(
+    argv = sandbox_words(
         Confinement(folder, "network", 1, (python,), ("/usr/share", inner, tests, "/usr/share/perl5")),
         MOUNTS,
         "/usr/bin/x",
@@ -95,20 +94,20 @@ def test_it_goes_to_the_sandbox_and_back() -> None:
 
 
 def test_a_program_elsewhere_is_shown_and_its_folder_is_not() -> None:
-    argv = words(Confinement("/app", "network", 130), MOUNTS, "/srv/bin/drive", None, 5)
+    argv = sandbox_words(Confinement("/app", "network", 130), MOUNTS, "/srv/bin/drive", None, 5)
     bound = [argv[n + 1] for n, word in enumerate(argv) if word == "--ro-bind-try"]
     assert "/srv/bin/drive" in bound
     assert not {"/srv", "/srv/bin", "/", "/home", "/var"} & set(bound)
 
 
 def test_as_root_another_user_starts_it() -> None:
-    argv = words(Confinement("/app", "network", 130), MOUNTS, "/usr/bin/true", 64_130, 5)
+    argv = sandbox_words(Confinement("/app", "network", 130), MOUNTS, "/usr/bin/true", 64_130, 5)
     assert argv[argv.index("setpriv") + 1 :][:2] == ["--reuid=64130", "--regid=64130"]
     assert argv.index("setpriv") > argv.index("ALL")
 
 
 def test_on_the_host_it_sees_what_dodo_sees_in_a_process_namespace() -> None:
-    argv = words(Confinement("/app", "host", 130), None, "/usr/bin/true", None, 5)
+    argv = sandbox_words(Confinement("/app", "host", 130), None, "/usr/bin/true", None, 5)
     assert "--unshare-pid" in argv
     assert argv[argv.index("--dev-bind") :][:3] == ["--dev-bind", "/", "/"]
 
@@ -119,7 +118,9 @@ def test_nothing_is_mounted_in_what_is_hidden_but_what_may_be_read(tmp_path: Pat
     for folder in (report, python):
         folder.mkdir(parents=True)
     hidden = (str(report), str(tests), str(tests))
-    argv = words(Confinement(str(tmp_path), "network", 1, (str(python),), hidden), MOUNTS, "/usr/bin/x", None, 5)
+    argv = sandbox_words(
+        Confinement(str(tmp_path), "network", 1, (str(python),), hidden), MOUNTS, "/usr/bin/x", None, 5
+    )
     assert [path for word, path in itertools.pairwise(argv) if word == "--tmpfs"] == [str(tests)]
     inside = argv[argv.index("--bind", argv.index(str(MOUNTS.folder))) :]
     inside = inside[inside.index(str(tests)) + 1 :]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.confined import launcher
+from dodo_dsl.run.process import confinement
 from tests.run.helpers import PASS, READY, Bench
 
 TELLS = "import json; print(json.dumps(dict(os.environ)), flush=True); time.sleep(60)"
@@ -19,12 +19,12 @@ def launched(
     program: Path, environment: dict[str, str], *words: str
 ) -> "tuple[subprocess.CompletedProcess[bytes], bool]":
     """How it ended, and whether it began."""
-    source = launcher.variables(environment)
+    source = confinement.launcher_variables(environment)
     reader, began = os.pipe()
     try:
-        argv = [*launcher.words(source, began, str(program)), program.name, *words]
+        argv = [*confinement.launcher_words(source, began, str(program)), program.name, *words]
         done = subprocess.run(argv, pass_fds=(source, began), env={}, capture_output=True, check=False)
-        return done, os.read(reader, 9) == launcher.BEGAN
+        return done, os.read(reader, 9) == confinement.BEGAN
     finally:
         for descriptor in (source, reader, began):
             os.close(descriptor)

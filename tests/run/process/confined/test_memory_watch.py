@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.confined.memory_watch import above
+from dodo_dsl.run.process.confined_process import above
 
 PARENTS = {10: 1, 11: 10, 12: 11, 20: 1, 30: 2}
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run.process import namespaces
-from dodo_dsl.run.process.confined.places import Places
-from dodo_dsl.run.process.entered import Entered
+from dodo_dsl.run.process.places import Places
+from dodo_dsl.run.process.slot import Entered
 
 USER = 64_250
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.run.process.confined import seccomp_filter
+from dodo_dsl.run.process import seccomp_filter
 
 
 @pytest.fixture(autouse=True)

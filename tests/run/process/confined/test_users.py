@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.confined import process_group, users
-from dodo_dsl.spec.deployment.sandbox_limits import SandboxLimits
+from dodo_dsl.run.process import places, process_group
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.run.desk import ROOT
 from tests.run.helpers import AFTER_START, PASS, READY, STARTED, WAIT, Bench
 
 as_root = pytest.mark.skipif(os.getuid() != 0, reason="who is no root has one user id")
-LEASES = "import json, sys\nfrom dodo_dsl.run.process.confined import users\n"
+LEASES = "import json, sys\nfrom dodo_dsl.run.process import places as users\n"
 USER, CID = 64_517, 244
 """No CID leads to this user."""
 THREADS = """
@@ -52,7 +52,7 @@ def leased(preferred: Sequence[int]) -> list[int]:
 def test_each_gets_an_id_of_its_own() -> None:
     first, second = leased((USER, USER))
     assert first == USER
-    assert second in range(users.FIRST, users.LAST + 1)
+    assert second in range(places.FIRST, places.LAST + 1)
     assert first != second
 
 
@@ -74,20 +74,20 @@ def test_an_id_of_other_work_is_left_alone() -> None:
 @as_root
 def test_an_id_of_the_machines_own_users_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[int] = []
-    monkeypatch.setattr(users, "_known_ids", lambda: {USER, users.FIRST})
+    monkeypatch.setattr(places, "_known_ids", lambda: {USER, places.FIRST})
 
     def is_held(user: int) -> bool:
         tried.append(user)
         return True
 
-    monkeypatch.setattr(users, "_is_held", is_held)
-    assert users.lease(USER) == tried[0] == users.FIRST + 1
+    monkeypatch.setattr(places, "_is_held", is_held)
+    assert places.lease(USER) == tried[0] == places.FIRST + 1
 
 
 def test_where_none_is_free_the_reason_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(users, "_is_held", lambda _: False)
+    monkeypatch.setattr(places, "_is_held", lambda _: False)
     with pytest.raises(OSError, match="no user id from 64000 to 64999 is free: other processes"):
-        users.lease(USER)
+        places.lease(USER)
 
 
 def drive(folder: Path) -> str:
@@ -105,7 +105,7 @@ def test_other_work_of_the_same_id_does_not_count(tmp_path: Path, hides: tuple[s
     """Also where the kernel counts by user, as there are no control groups."""
     program = f"from tests.run.process.confined.test_users import *\nprint(drive(Path({str(tmp_path)!r})))"
     words = ["bwrap", "--dev-bind", "/", "/", *hides, "--cap-add", "ALL", sys.executable, "-c", program]
-    with sleeping(users.FIRST + CID, 60):
+    with sleeping(places.FIRST + CID, 60):
         done = subprocess.run(words, capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout == "passed: it drove\n"
 

@@ -3,11 +3,11 @@
 import subprocess
 import sys
 
-from dodo_dsl.opendlv.bus.proof import KEY_VARIABLE
+from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 
 PROGRAM = """
 import os, pathlib
-from services.base.identity.key import take_key
+from services.base.members import take_key
 before = pathlib.Path("/proc/self/environ").read_bytes()
 print(take_key().hex(), os.environ.get("DODO_KEY"), b"c0ffee" in before)
 print(b"c0ffee" in pathlib.Path("/proc/self/environ").read_bytes(), repr(take_key()))

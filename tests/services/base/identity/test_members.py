@@ -5,11 +5,10 @@ from contextlib import ExitStack
 
 import pytest
 
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
-from services.base.identity.members import Members
-from services.base.identity.senders import VARIABLE, SenderTable
 from services.base.loop import Loop
+from services.base.members import VARIABLE, Members, SenderTable
 from services.base.service import Service
 
 FRAME = "opendlv.sim.Frame"

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.proof import with_proof
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base.identity.senders import VARIABLE, Producers, SenderTable
+from dodo_dsl.opendlv.authentication import with_proof
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from services.base.members import VARIABLE, Producers, SenderTable
 
 MESSAGES = MessageSet.standard()
 

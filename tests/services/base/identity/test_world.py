@@ -5,15 +5,13 @@ from contextlib import ExitStack
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.proof import with_proof
-from dodo_dsl.opendlv.bus.session import Session, SessionError
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.authentication import with_proof
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import RealTimeClock
-from services.base.identity.members import Members
-from services.base.identity.senders import SenderTable
-from services.base.identity.world import TOLD, TRUTH, VARIABLE, World
 from services.base.loop import Loop
+from services.base.members import TOLD, TRUTH, WORLD_VARIABLE, Members, SenderTable, World
 from services.base.service import Output, Service
 
 KEY = b"a key of this test"
@@ -45,7 +43,7 @@ class Relaying(RealTimeClock):
 @pytest.fixture
 def enter(cid: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Join]:
     """Makes a service of the test with its session, which joins the others."""
-    monkeypatch.setenv(VARIABLE, "pose track own?=opendlv.sim.KinematicState/0")
+    monkeypatch.setenv(WORLD_VARIABLE, "pose track own?=opendlv.sim.KinematicState/0")
     with ExitStack() as stack:
 
         def one(name: str, key: bytes = KEY) -> tuple[Session, Members]:
@@ -114,7 +112,7 @@ def test_truth_it_is_never_told(enter: Join, application: Session, monkeypatch: 
 
 @pytest.mark.parametrize("truth", ["", f"{READING}/0"])
 def test_in_lockstep_the_clock_gets_everything(cid: int, monkeypatch: pytest.MonkeyPatch, truth: str) -> None:
-    monkeypatch.setenv(VARIABLE, "pose")
+    monkeypatch.setenv(WORLD_VARIABLE, "pose")
     monkeypatch.setenv(TRUTH, truth)
     clock = Relaying()
     with Session(cid) as session, Session(cid) as listener:
@@ -126,14 +124,14 @@ def test_in_lockstep_the_clock_gets_everything(cid: int, monkeypatch: pytest.Mon
 def test_what_reaches_no_service_of_the_test_does_not_come_to_the_bus(
     application: Session, cid: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(VARIABLE, "pose track")
+    monkeypatch.setenv(WORLD_VARIABLE, "pose track")
     with Session(cid) as session, pytest.raises(SessionError, match=f"'{FRAME}' must not come to the bus"):
         tell(session, None)
     assert taken(application) == []
 
 
 def test_truth_without_services_that_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.delenv(WORLD_VARIABLE, raising=False)
     monkeypatch.setenv(TRUTH, f"{READING}/0")
     with pytest.raises(
         ValueError, match="DODO_TRUTH names what the application must not get, and DODO_WORLD no service"
@@ -142,7 +140,7 @@ def test_truth_without_services_that_get_it(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_services_that_may_not_say_where_they_listen_are_a_world(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, f"own?={FRAME}/0")
+    monkeypatch.setenv(WORLD_VARIABLE, f"own?={FRAME}/0")
     assert World.load(MESSAGES)
 
 
@@ -223,7 +221,7 @@ def test_who_is_missing_is_asked_for_again(enter: Join, application: Session, mo
     pose, track = enter("pose"), enter("track")
     while pose[0].receive(0.0) is not None:
         pass
-    monkeypatch.setattr("services.base.identity.members._MISSING_S", 0.0)
+    monkeypatch.setattr("services.base.members._MISSING_S", 0.0)
     pose[1].ask_for_missing()
     taken(*track), taken(*pose)
     pose[1].send(frame())

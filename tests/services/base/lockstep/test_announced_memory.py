@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from dodo_dsl.opendlv.memory.shared_memory import SharedMemory
-from services.base.lockstep.announced_memory import AnnouncedMemory, Announcer
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+from services.base.lockstep_clock import AnnouncedMemory, Announcer
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, FrameError
-from services.base.lockstep.datagrams import PART_BYTES, Reassembly, decode, encode, split
+from dodo_dsl.opendlv.envelope import Envelope, FrameError
+from services.base.clock_link import PART_BYTES, Reassembly, decode, encode, split
 
 TIMES = st.integers(0, 2**31 * 1_000_000 - 1)
 ENVELOPES = st.builds(

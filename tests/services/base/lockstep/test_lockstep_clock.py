@@ -6,11 +6,10 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from dodo_dsl.opendlv.bus.session import Session
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
 from services.base import Context, Inbox, RealTimeClock, Service, period_of, run
-from services.base.lockstep.lockstep_clock import in_order
-from services.base.lockstep.observer import EPOCH, LONGEST
+from services.base.lockstep_clock import EPOCH, LONGEST, in_order
 
 STEP = 2950
 MANIFEST = "{name: stepped, process: [stepped], description: Steps.}"
@@ -87,6 +86,6 @@ def test_a_clock_driven_by_messages(
 
 
 def _step(time: int) -> Any:
-    from dodo_dsl.opendlv.bus.envelope import Envelope
+    from dodo_dsl.opendlv.envelope import Envelope
 
     return Envelope(STEP, b"", 0, 0, time, 0)

@@ -1,7 +1,7 @@
 """One who looks at everything sees each message of a lockstep test once, in the step that it belongs to."""
 
-from dodo_dsl.opendlv.bus.envelope import Envelope
-from services.base.lockstep.observer import EPOCH, Observer
+from dodo_dsl.opendlv.envelope import Envelope
+from services.base.lockstep_clock import EPOCH, Observer
 
 STEP = 100_000
 

@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from services.base.clock_link import STEP_DONE
 from services.base.evaluator import UnjudgeableError
-from services.base.lockstep.datagrams import STEP_DONE
-from services.base.lockstep.observer import EPOCH, Observer
-from services.base.recorded.recorded_steps import RecordedSteps, read_steps
-from services.base.recorded.step_marks import StepMarks
+from services.base.lockstep_clock import EPOCH, Observer, StepMarks
+from services.base.recorded_clock import RecordedSteps, read_steps
 from tests.services.base.lockstep.test_observer import Seen
 
 STEP = 100_000

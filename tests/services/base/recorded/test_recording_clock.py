@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from dodo_dsl.opendlv.bus.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.messages.message_set import MessageSet
-from services.base.recorded.recording_clock import RecordingClock
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from services.base.recorded_clock import RecordingClock
 from tests.services.base.lockstep.test_observer import Seen
 
 MESSAGES = MessageSet.standard()

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs.map_file import Instance
-from services.scene.draw.bsp import Tree
-from services.scene.draw.faces import Face, box_faces
+from dodo_dsl.opendlv.assets.map_file import Instance
+from services.scene.bsp import Tree
+from services.scene.surfaces import Face, box_faces
 
 WHITE = (255.0, 255.0, 255.0, 255.0)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from services.scene.camera import CameraPose
-from services.scene.draw.light import DIRECTION, Light, direction_of
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.render import Renderer
+from services.scene.scene import SceneOptions, load_scene
+from services.scene.shading import DIRECTION, Light, direction_of
 
 
 def draw(folder, light, *pose, **angles):

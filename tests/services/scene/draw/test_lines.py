@@ -2,11 +2,10 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from dodo_dsl.opendlv.inputs.json_node import MapError
+from dodo_dsl.opendlv.assets.json_file import MapError
 from services.scene.camera import CameraPose
-from services.scene.draw.lines import TAPE
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.render import Renderer
+from services.scene.scene import TAPE, SceneOptions, load_scene
 
 STRAIGHT = package_data.registry() / "maps" / "straight"
 

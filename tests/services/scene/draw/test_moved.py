@@ -4,8 +4,8 @@ import pytest
 from benchmarks.pictures.gl_peer import ssim
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.render import Renderer
+from services.scene.scene import SceneOptions, load_scene
 
 AT = CameraPose.at(0.3, 2, 0.095, yaw=1.9)
 

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.scene.draw.raster import fill, inset
+from services.scene.raster import fill, inset
 
 
 def covered(polygon: np.ndarray, size: int) -> np.ndarray:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
 
 FOVY = math.radians(48.8)
 FOCAL = 240 / math.tan(FOVY / 2)

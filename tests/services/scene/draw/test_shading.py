@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.light import Light
-from services.scene.draw.raster import SHIFT
-from services.scene.draw.shading import Group, cut, gather, silhouettes, whole
-from services.scene.draw.shape import make_shape
+from services.scene.raster import SHIFT
+from services.scene.shading import Group, Light, cut, gather, silhouettes, whole
+from services.scene.shape import make_shape
 
 CORNERS = np.array([[x, y, z] for z in (0.0, 1.0) for x, y in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))])
 SIDES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])

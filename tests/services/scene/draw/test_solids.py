@@ -3,13 +3,12 @@ import math
 import numpy as np
 import pytest
 
+from services.scene.bodies import MAX_FACES, Bodies, groups
+from services.scene.bsp import Tree
 from services.scene.camera import CameraPose
-from services.scene.draw.bodies import Bodies
-from services.scene.draw.bsp import Tree
-from services.scene.draw.light import Light
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import load_scene
-from services.scene.draw.solids import MAX_FACES, groups
+from services.scene.render import Renderer
+from services.scene.scene import load_scene
+from services.scene.shading import Light
 
 
 def crossing(folder_of, *places, block=()):

@@ -5,11 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs.json_node import MapError
+from dodo_dsl.opendlv.assets.json_file import MapError
 from services.scene.camera import CameraPose, Pinhole
-from services.scene.draw.faces import Face, TextureMap
-from services.scene.draw.surfaces import draw_backdrop, draw_face
-from services.scene.map.textures import Texture, default_ground, load_picture
+from services.scene.surfaces import Face, TextureMap, draw_backdrop, draw_face
+from services.scene.textures import Texture, default_ground, load_picture
 
 SKY, GROUND = (255.0, 0.0, 0.0, 255.0), (0.0, 255.0, 0.0, 255.0)
 

@@ -3,9 +3,8 @@ import pytest
 
 from dodo_dsl import package_data
 from services.scene.camera import CameraPose
-from services.scene.draw.render import Renderer
-from services.scene.draw.scene import SceneOptions, load_scene
-from services.scene.map.clutter import FARTHEST, NEAREST, clutter
+from services.scene.render import Renderer
+from services.scene.scene import FARTHEST, NEAREST, SceneOptions, clutter, load_scene
 
 STRAIGHT = package_data.registry() / "maps" / "straight"
 

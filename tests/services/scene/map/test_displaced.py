@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dodo_dsl import package_data
-from services.scene.draw.scene import SceneOptions, load_scene
+from services.scene.scene import SceneOptions, load_scene
 
 STRAIGHT = package_data.registry() / "maps" / "straight"
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.inputs import map_file
-from dodo_dsl.opendlv.inputs.json_node import MAX_BYTES, MapError, Node
-from dodo_dsl.opendlv.inputs.map_file import MAX_BLOCKS, read_map
+from dodo_dsl.opendlv.assets import map_file
+from dodo_dsl.opendlv.assets.json_file import MAX_BYTES, MapError, Node
+from dodo_dsl.opendlv.assets.map_file import MAX_BLOCKS, read_map
 
 GOOD_MODEL = {"name": "cube", "file": "cube.obj", "color": [1, 0, 0.5], "instances": [[1, 2, 3, 0.5]]}
 GOOD_BLOCK = {"name": "floor", "dimension": [10, 10, 0.2], "color": [0, 0, 0], "instances": [[0, 0, 0, 0]]}

@@ -3,10 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.inputs.json_node import MapError
-from services.scene.draw.polygons import convex_parts, join
-from services.scene.draw.shape import make_shape
-from services.scene.map.meshes import is_closed, load_obj, oriented, volume
+from dodo_dsl.opendlv.assets.json_file import MapError
+from services.scene.meshes import is_closed, load_obj, oriented, volume
+from services.scene.shape import convex_parts, join, make_shape
 
 
 def cylinder(sides: int, radius: float = 0.5, height: float = 2.0) -> str:

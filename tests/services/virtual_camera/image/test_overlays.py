@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from dodo_dsl.opendlv.inputs.json_node import MapError
-from services.scene.draw.scene import load_scene
-from services.virtual_camera.image.overlays import Overlay, load_overlays
+from dodo_dsl.opendlv.assets.json_file import MapError
+from services.scene.scene import load_scene
+from services.virtual_camera.optics import Overlay, load_overlays
 
 
 def overlay(name="t.png", size=(0.5, 0.25), place=(0.25, 0.5)):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from services.virtual_camera.image.sensor import GAMMA, Development, Sensor
+from services.virtual_camera.optics import GAMMA, Development, Sensor
 
 
 def developed(sensor, value=100, sample_time=5, size=(120, 200)):

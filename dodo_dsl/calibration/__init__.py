@@ -1,1 +1,0 @@
-"""Calibration of a rig: the constants of its axes, and its camera's intrinsics."""

@@ -1,0 +1,178 @@
+"""``wrong-file``: what is in the files that parameters name, read as the services read it, at the place in the file."""
+
+import functools
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.resolve import known_ids
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix
+from dodo_dsl.opendlv.assets import formats
+from dodo_dsl.opendlv.assets.problem import InputError
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
+from dodo_dsl.spec.arguments import Argument, ResolvedService
+from dodo_dsl.spec.registry import SUFFIX
+
+RULE = "wrong-file"
+_TEXT = (".json", ".csv", ".obj", ".yml", ".yaml")
+"""Endings of files whose lines can be shown."""
+
+
+def check_files(context: RuleContext) -> Iterator[Diagnostic]:
+    for service in context.services:
+        if service.use.layer not in service.manifest.layers:
+            continue
+        for argument in service.arguments.values():
+            yield from file_problems(context, service, argument)
+
+
+def is_own(diagnostic: Diagnostic) -> bool:
+    """Whether a problem is one of a file that several tests name, and the same in each of them."""
+    return diagnostic.rule == RULE and not diagnostic.span.file.endswith(SUFFIX)
+
+
+def file_problems(context: RuleContext, service: ResolvedService, argument: Argument) -> tuple[Diagnostic, ...]:
+    """The problems of the file that a parameter names; none without a format."""
+    name, path = argument.parameter.format, argument.value.path if argument.value else None
+    if not name or path is None:
+        return ()
+    given = tuple((key, service.texts.get(key, "")) for key in formats.SETTINGS.get(name, ()))
+    return problems(name, path, given, context.deployment.messages)
+
+
+@functools.lru_cache(maxsize=1024)
+def problems(
+    name: str, path: Path, given: tuple[tuple[str, str], ...], own: tuple[Path, ...]
+) -> tuple[Diagnostic, ...]:
+    """The problems of a file of a format, for parameters of the service and files with messages."""
+    ids: Mapping[str, int] = known_ids(own)
+    return tuple(
+        _diagnostic(error, formats.HELP.get(name, "")) for error in formats.problems(name, path, dict(given), ids)
+    )
+
+
+def _diagnostic(error: InputError, help_: str) -> Diagnostic:
+    line, column = error.position()
+    is_text = error.file.suffix in _TEXT
+    span = Span(str(error.file), line, column, 1 if is_text else 0)
+    return Diagnostic(span, RULE, error.what, error.hint or help_, "warning" if error.is_slip else "error")
+
+
+MAP = "map.json"
+"""The map in its folder."""
+_MAX_BYTES = 20 << 20
+_ATTEMPT = re.compile(r"\$\{(matrix|vary)")
+"""A placeholder that nothing has replaced, which another rule reports."""
+_CLASSES = "categories"
+_HELP = {"obstacles": "see docs/reference/maps.md"}
+
+
+def check_references(context: RuleContext) -> Iterator[Diagnostic]:
+    for service in context.services:
+        for name, entry in service.use.parameters.items():
+            argument = service.arguments.get(name)
+            if argument and argument.value and argument.parameter.among:
+                yield from _among(context, service, argument, entry)
+            if argument and argument.value and argument.parameter.within_timeout:
+                yield from _within(context, service, argument.value.text, entry)
+
+
+def _among(context: RuleContext, service: ResolvedService, argument: Argument, entry: Entry) -> Iterator[Diagnostic]:
+    source, _, key = argument.parameter.among.partition(".")
+    file = _file(service.arguments[source])
+    if file is None:
+        return
+    names = _names(file, key)
+    if has_errors(file_problems(context, service, service.arguments[source])):
+        return  # told with the file
+    if isinstance(names, str):
+        yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(key, ""))
+        return
+    items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
+    for item in items[:MAX_PROBLEMS]:
+        if isinstance(item, Scalar) and item.text not in names and not _ATTEMPT.search(item.text):
+            message = f"'{item.text}' is not among the {key} of {file.parent.name}/{file.name}"
+            hint, fix = did_you_mean(item.text, names), only_fix(item.text, names)
+            yield Diagnostic(item.span, "unknown-name", message, hint, fix=fix)
+
+
+def _file(argument: Argument) -> Path | None:
+    path = argument.value.path if argument.value else None
+    if path is None:
+        return None
+    return path / MAP if path.is_dir() else path
+
+
+def _names(file: Path, key: str) -> tuple[str, ...] | str:
+    """The names of the entries of a list in a JSON file, or the problem of the file."""
+    found = entries(file, key)
+    return found if isinstance(found, str) else tuple(dict.fromkeys(name for name in found if name))
+
+
+@functools.lru_cache(maxsize=256)
+def entries(file: Path, key: str) -> tuple[str, ...] | str:
+    """The entries of a list in a JSON file by name, empty for those without one, or the problem of the file.
+
+    A class may be written with ``color:`` before its name, as in messages.
+    """
+    try:
+        if file.exists() and not file.is_file():
+            return "not a regular file"
+        if file.stat().st_size > _MAX_BYTES:
+            return f"larger than {_MAX_BYTES >> 20} MiB"
+        document = json.loads(file.read_text(encoding="utf-8"))
+        found = document.get(key, []) if isinstance(document, dict) else None
+        if not isinstance(found, list):
+            return f"expected an object with a list '{key}'"
+        plain = _plain if key == _CLASSES else str
+        return tuple(plain(e["name"]) if isinstance(e, dict) and "name" in e else "" for e in found)
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    except (ValueError, RecursionError) as error:
+        return f"not JSON: {str(error)[:120]}"
+
+
+def _plain(name: object) -> str:
+    return str(name).strip().removeprefix("color:").strip()
+
+
+def _within(context: RuleContext, service: ResolvedService, seconds: str, entry: Entry) -> Iterator[Diagnostic]:
+    timeout = context.spec.timeout_s
+    if timeout is not None and float(seconds) >= timeout:
+        written = entry.value.text if isinstance(entry.value, Scalar) else seconds
+        message = f"'{service.use.name}' waits up to {written}, but the test's timeout of {timeout:g} s ends it first"
+        hint = "use a longer timeout, so that the evaluator can judge"
+        yield Diagnostic(entry.value.span, "short-timeout", message, hint, "warning")
+
+
+def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
+    for service in context.services:
+        if service.use.layer in service.manifest.layers:
+            yield from _limits(service)
+            yield from _files(service)
+
+
+def _limits(service: ResolvedService) -> Iterator[Diagnostic]:
+    for names in service.manifest.one_of:
+        given = [name for name in names if name in service.use.parameters or service.texts.get(name)]
+        if not given:
+            message = f"'{service.use.name}' has nothing to judge by"
+            yield Diagnostic(
+                service.use.span, "no-limit", message, f"write one or more of {', '.join(names)} under 'with'"
+            )
+
+
+def _files(service: ResolvedService) -> Iterator[Diagnostic]:
+    for argument in service.arguments.values():
+        entry, file = argument.entry, argument.value.path if argument.value else None
+        for key in argument.parameter.not_empty if entry and file else ():
+            found = entries(file, key) if file else ""
+            if isinstance(found, str) and argument.parameter.format:
+                continue  # told with the file
+            if entry and file and isinstance(found, str):
+                yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {found}")
+            elif entry and file and not found:
+                message = f"{file.parent.name}/{file.name} has no {key}, so there is nothing to judge by"
+                yield Diagnostic(entry.value.span, "empty-file", message)

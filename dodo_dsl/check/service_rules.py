@@ -1,0 +1,238 @@
+"""``unknown-service``: ``uses`` names a service with a manifest; ``service-taken``: names in a test are unique.
+
+``service-reserved``: DoDo adds services of its own to every test.
+"""
+
+import math
+from collections.abc import Collection, Iterator
+from pathlib import PurePath
+
+from dodo_dsl.check.context import RuleContext
+from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
+from dodo_dsl.spec.arguments import Argument, ResolvedService
+from dodo_dsl.spec.deployment import MANIFEST
+from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
+from dodo_dsl.spec.slips import meant, slip_in_key
+
+
+def check_services(context: RuleContext) -> Iterator[Diagnostic]:
+    first_layer: dict[str, str] = {}
+    for use in context.spec.uses:
+        if use.uses.text not in context.manifests and not _is_broken(context, use.uses.text):
+            hint = did_you_mean(use.uses.text, context.manifests)
+            message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
+            yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
+        if use.name == "sandbox" or use.name.startswith("dodo-"):
+            message = f"the name '{use.name}' is reserved for DoDo's own services"
+            hint = "choose another name; 'sandbox' and 'dodo-...' are reserved"
+            yield Diagnostic(use.span, "service-reserved", message, hint)
+        if use.name in first_layer:
+            message = f"the name '{use.name}' is already used in layer {first_layer[use.name]}"
+            yield Diagnostic(use.span, "service-taken", message, "the names of a test's services are unique")
+        first_layer.setdefault(use.name, use.layer)
+
+
+def _is_broken(context: RuleContext, name: str) -> bool:
+    """Whether there is a service of the user's own in a folder of this name, whose manifest is reported itself."""
+    read = {manifest.folder for manifest in context.manifests.values()}
+    parts = (name, name.replace("-", "_"))
+    named = context.deployment.services
+    folders = [*(above / part for above in named for part in parts), *(own for own in named if own.name in parts)]
+    return any(folder not in read and (folder / MANIFEST).is_file() for folder in folders)
+
+
+def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
+    for service in context.services:
+        use, manifest = service.use, service.manifest
+        if use.layer not in manifest.layers:
+            message = f"service '{manifest.name}' does not fit layer {use.layer}"
+            hint = f"move it to {' or '.join(manifest.layers)}"
+            yield Diagnostic(use.uses.span, "wrong-layer", message, hint, about=tuple(manifest.layers))
+
+
+def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
+    for service in context.services:
+        if service.use.layer not in service.manifest.layers:
+            continue  # another service may be meant
+        yield from _written(service)
+        yield from _from_elsewhere(service)
+        yield from _missing(context, service)
+
+
+def _written(service: ResolvedService) -> Iterator[Diagnostic]:
+    for name, entry in service.use.parameters.items():
+        argument = service.arguments.get(name)
+        if argument is None:
+            known = service.manifest.parameters
+            slip = slip_in_key(name, known, is_empty=_is_empty(entry))
+            message = slip.message if slip else f"service '{service.manifest.name}' has no parameter '{name}'"
+            hint = slip.hint if slip else did_you_mean(name, known)
+            fix = slip.fix if slip else only_fix(name, known, service.use.parameters)
+            yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
+        elif argument.problem:
+            yield argument.problem
+
+
+def _is_empty(entry: Entry) -> bool:
+    return isinstance(entry.value, Scalar) and entry.value.value is None
+
+
+def _misspelt(service: ResolvedService) -> set[str]:
+    """The parameters that unknown ones most likely mean, which are not missing as well."""
+    known = service.manifest.parameters
+    unknown = ((name, entry) for name, entry in service.use.parameters.items() if name not in known)
+    return {meant(name, known, is_empty=_is_empty(entry)) for name, entry in unknown}
+
+
+def _from_elsewhere(service: ResolvedService) -> Iterator[Diagnostic]:
+    """Values of the rig or of another service that do not fit here."""
+    for name, argument in service.arguments.items():
+        if argument.problem and name not in service.use.parameters:
+            yield argument.problem
+
+
+def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnostic]:
+    use, manifest, misspelt = service.use, service.manifest, _misspelt(service)
+    for parameter in manifest.parameters.values():
+        if not parameter.required or parameter.name in use.parameters or parameter.name in misspelt:
+            continue
+        if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else _wants_rig(context)):
+            continue  # a rig that is unknown or missing may give it, too
+        if parameter.shared and not context.spec.is_whole:
+            continue  # a service that could not be read may give it
+        givers = _givers(context, parameter.name) if parameter.shared else {}
+        if len(givers) == 1:
+            continue
+        message = f"service '{manifest.name}' needs parameter '{parameter.name}': {parameter.help}"
+        hint = f"write '{parameter.name}: ...' under 'with'"
+        if parameter.rig and context.rig:
+            hint += f", or give the rig '{context.rig.name}' its '{parameter.rig}'"
+        if len(givers) > 1:
+            hint = f"{' and '.join(givers.values())} give different values, so write the one to use"
+        yield Diagnostic(use.span, "missing-parameter", message, hint)
+
+
+def _wants_rig(context: RuleContext) -> bool:
+    return bool(context.spec.rig) or context.spec.level == "hil"
+
+
+def _givers(context: RuleContext, name: str) -> dict[str, str]:
+    """The values that services of the test give to a parameter, each with the first service's name."""
+    givers: dict[str, str] = {}
+    for use in context.spec.uses:
+        if name in use.parameters:
+            givers.setdefault(getattr(use.parameters[name].value, "text", ""), use.name)
+    return givers
+
+
+def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
+    for service in context.services:
+        for name, entry in service.use.parameters.items():
+            argument = service.arguments.get(name)
+            if argument and argument.parameter.type == "message" and argument.value:
+                yield from _known(context, argument.value.text, entry.value.span)
+            if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.manifest.messages.inputs):
+                for item in entry.value.items[:MAX_PROBLEMS]:
+                    if isinstance(item, Scalar):
+                        yield from _known(context, item.text.partition("/")[0], item.span)
+    declared = context.application.declared.values() if context.application else ()
+    for own in declared:
+        for name, span in (*own.inputs, *own.outputs, *own.answers) if own else ():
+            yield from _known(context, name.partition("/")[0], span)
+
+
+def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:
+    yield from unknown_message(name, context.messages, span)
+
+
+def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[Diagnostic]:
+    """The problem of a name that is none of the ``known`` messages."""
+    if name and name not in known:
+        hint = did_you_mean(name, known) or "add the files of your own messages under 'messages' in dodo.yml"
+        fix = only_fix(name, known)
+        yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint, fix=fix)
+
+
+_FILE = "file"
+_NAMES = (RPICAM, _FILE, EMULATED)
+_ALIGNED = 64
+"""Rows of other widths are padded in the pipe of ``rpicam-vid``."""
+
+_I420 = "name.i420"
+_OPTICS = "camera.intrinsics"
+
+
+def check_camera_sources(context: RuleContext) -> Iterator[Diagnostic]:
+    for service in context.services:
+        yield from _size(context.rig, service)
+        yield from _odd(service)
+        for argument in service.arguments.values():
+            if argument.parameter.rig == CAMERA_SOURCE and argument.text:
+                yield from _problems(context, service, argument)
+                yield from _exposure(service, argument.text)
+
+
+def _problems(context: RuleContext, service: ResolvedService, argument: Argument) -> Iterator[Diagnostic]:
+    source, span = argument.text or "", _span(service, argument)
+    if source not in _NAMES and not source.startswith("/dev/") and not PurePath(source).suffix:
+        known = "write a device such as /dev/video0, rpicam or file"
+        hint = did_you_mean(source, _NAMES) if closest(source, _NAMES) else known
+        yield Diagnostic(span, "camera-source", f"'{source}' is not a source of pictures", hint)
+    elif source == EMULATED and context.rig is not None and not context.rig.is_emulated:
+        message = f"rig '{context.rig.name}' is hardware, and an emulated camera sees nothing of it"
+        yield Diagnostic(span, "camera-source", message, "write a device such as /dev/video0, or rpicam")
+    elif source == _FILE and _FILE not in service.use.parameters:
+        message = f"'{service.use.name}' has the source 'file', but no 'file' to take pictures from"
+        yield Diagnostic(span, "camera-source", message, "write 'file: ...' under 'with' in the test, or a device")
+    elif source == RPICAM and (width := service.texts.get("width", "")).isdigit() and int(width) % _ALIGNED:
+        message = f"rpicam-vid gives pictures whose width is a multiple of {_ALIGNED}, not {width}"
+        hint = f"write a width of {max(int(width) // _ALIGNED, 1) * _ALIGNED}"
+        yield Diagnostic(span, "camera-source", message, hint)
+
+
+def _odd(service: ResolvedService) -> Iterator[Diagnostic]:
+    """Sizes that pictures in I420 cannot have, where a colour is that of two by two pixels."""
+    for name in ("width", "height") if _I420 in service.arguments else ():
+        argument, text = service.arguments.get(name), service.texts.get(name, "")
+        if argument and text.isdigit() and int(text) % 2 and (name, service.texts.get("source")) != ("width", RPICAM):
+            message = f"parameter '{name}' is {text}, expected an even number"
+            yield Diagnostic(
+                _span(service, argument), "out-of-range", message, f"write for example {max(int(text) - 1, 2)}"
+            )
+
+
+def _exposure(service: ResolvedService, source: str) -> Iterator[Diagnostic]:
+    """Pictures of a real camera that would come faster than it can expose them."""
+    if source != RPICAM and not source.startswith("/dev/"):
+        return
+    try:
+        rate, exposure = (float(service.texts[name]) for name in ("freq", "exposure"))
+    except (KeyError, ValueError):
+        return
+    if rate * exposure > 1 + 1e-9:
+        places = (service.use.parameters.get(name) for name in ("exposure", "freq"))
+        span = next((entry.value.span for entry in places if entry), service.use.span)
+        message = f"an exposure of {exposure * 1e3:g} ms does not fit into the {1e3 / rate:.3g} ms between two pictures"
+        most, fastest = math.floor(1e4 / rate) / 10, math.floor(10 / exposure) / 10
+        hint = f"write an exposure of at most {most:g} ms, or a freq of at most {fastest:g} Hz"
+        yield Diagnostic(span, "camera-source", message, hint)
+
+
+def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
+    """A service that takes optics from the rig and works on pictures of another size."""
+    taken = (a.parameter for a in service.arguments.values() if (a.parameter.rig or "").startswith(_OPTICS))
+    if rig is None or not any(p.name not in service.use.parameters and rig.entry(p.rig or "") for p in taken):
+        return
+    measured = [rig.text(f"{_OPTICS}.{name}") for name in ("width", "height")]
+    given = [service.texts.get(name, "") for name in ("width", "height")]
+    if all(measured) and all(given) and measured != given:
+        where = service.use.parameters.get("width") or rig.entry(f"{_OPTICS}.width")
+        message = f"the camera of rig '{rig.name}' was measured in pictures of {' x '.join(measured)}, "
+        message += f"and '{service.use.name}' has them of {' x '.join(given)}"
+        hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take pictures of the measured size"
+        yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)
+
+
+def _span(service: ResolvedService, argument: Argument) -> Span:
+    return argument.entry.value.span if argument.entry else service.use.span

@@ -1,0 +1,190 @@
+"""``name-differs``: a test's name equals its file's; ``name-taken``: it is unique.
+
+``name-reserved``: a test is a job of its name, and GitLab reads some names as keywords.
+"""
+
+import os
+from collections.abc import Iterator
+
+from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.goals import resolved_goals
+from dodo_dsl.check.lockstep import answers, rates, rates_fit, step_hz
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, shown_path
+from dodo_dsl.source import Scalar
+from dodo_dsl.spec.arguments import Argument
+from dodo_dsl.spec.load import members
+from dodo_dsl.spec.model import Use
+from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, as_file, is_free, is_name
+from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, EMULATED_RIGS, KIND_TAGS, MEMORY, PORT, Rig, is_simulated
+
+
+def check_names(context: RuleContext) -> Iterator[Diagnostic]:
+    spec = context.spec
+    if spec.name is None:
+        return
+    if spec.name in KEYWORDS:
+        message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
+        yield Diagnostic(spec.span("name"), "name-reserved", message, as_file(spec.location.stem, SUFFIX))
+    elif spec.name != spec.location.stem and is_name(spec.name):  # the schema says what is wrong with any other
+        message, stem = f"the name '{spec.name}' differs from the file's name", spec.location.stem
+        written = f"write 'name: {stem}', or " if is_free(stem) else ""
+        hint = f"{written}rename the file to {spec.name}{SUFFIX}"
+        yield Diagnostic(spec.span("name"), "name-differs", message, hint)
+    others = [other for other in context.by_name[spec.name] if other.path != spec.path]
+    if others:
+        message = f"the name '{spec.name}' is taken by {shown_path(str(others[0].path))}"
+        yield Diagnostic(spec.span("name"), "name-taken", message, "names are unique across all registries")
+
+
+def check_levels(context: RuleContext) -> Iterator[Diagnostic]:
+    spec = context.spec
+    if spec.level == "dil" and spec.kind == "closed-loop":
+        message = "a dil test cannot be closed-loop: a recording does not react to what the application does"
+        yield Diagnostic(
+            spec.span("kind"), "level-kind", message, "use kind open-loop or perception, or level sil or hil"
+        )
+    if spec.level == "hil" and spec.clock == "lockstep":
+        message = "a hil test cannot run in lockstep: hardware does not wait"
+        yield Diagnostic(spec.span("clock"), "clock-level", message, "use clock realtime")
+
+
+def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
+    if context.spec.clock != "lockstep" or not context.spec.is_whole:
+        return
+    wiring = context.wiring
+    yield from _rates(context)
+    if wiring.has_application and not wiring.done and not answers(wiring):
+        message = "no declared message completes a frame: the application's answer ends when it waits for the next one"
+        hint = "declare x-dodo.answers, or x-dodo.done, at the application's service that sends last"
+        yield Diagnostic(context.spec.span("clock"), "clock-answers", message, hint, severity="warning")
+
+
+def _rates(context: RuleContext) -> Iterator[Diagnostic]:
+    known = rates(context.services)
+    step = step_hz(context.wiring, known)
+    for use in context.spec.uses:
+        rate = known.get(use.name)
+        if rate is None or rates_fit(rate, step):
+            continue
+        written = use.parameters.get("freq")
+        message = (
+            f"'{use.name}' has {rate:g} Hz, not a whole multiple or fraction of the {step:g} Hz of the test's frames"
+        )
+        hint = f"in lockstep a step takes {1000 / step:g} ms; use for example {_near(rate, step):g} Hz"
+        yield Diagnostic(written.key if written else use.span, "clock-rate", message, hint)
+
+
+def _near(rate: float, step: float) -> float:
+    return step * round(rate / step) if rate > step else step / round(step / rate)
+
+
+def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
+    pool, rigs = context.spec.pool, context.deployment.rigs
+    if pool is None:
+        return
+    if pool.kind:
+        yield from _kind(pool.kind, rigs)
+    for word in pool.names:
+        if word.text in EMULATED_RIGS:
+            message = f"'{word.text}' is in no pool, as every test has one of its own"
+            yield Diagnostic(word.span, "rig-pool", message, f"write 'rig: {word.text}'")
+        elif word.text not in rigs:
+            yield Diagnostic(word.span, "unknown-rig", f"unknown rig '{word.text}'", did_you_mean(word.text, rigs))
+    found = members(pool, rigs)
+    places = {word.text: word.span for word in pool.names}
+    for number, rig in enumerate(found):
+        span = places.get(rig.name, pool.kind.span if pool.kind else context.spec.span("rig"))
+        if rig.kind != found[0].kind:
+            message = f"rig '{rig.name}' is {rig.kind}, and '{found[0].name}' is {found[0].kind}"
+            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can take each other's place")
+        for other in found[:number]:
+            if device := _same_device(other, rig):
+                message = (
+                    f"rigs '{other.name}' and '{rig.name}' both have '{device}', so it is unknown which one is there"
+                )
+                hint = "name ports by their serial numbers, as /dev/serial/by-id/... does"
+                yield Diagnostic(span, "rig-pool", message, hint)
+
+
+def _kind(word: Scalar, rigs: dict[str, Rig]) -> Iterator[Diagnostic]:
+    if word.text in rigs:
+        hint = f"write 'rig: {word.text}', or a list: [{', '.join(rigs)}]"
+        yield Diagnostic(word.span, "rig-pool", f"'{word.text}' is a rig, expected a kind", hint)
+    elif word.text not in KIND_TAGS:
+        hint = did_you_mean(word.text.removeprefix("hil-"), KIND_TAGS)
+        yield Diagnostic(word.span, "rig-pool", f"'{word.text}' is no kind of rig", hint)
+    elif all(rig.kind != word.text for rig in rigs.values()):
+        said = ", ".join(f"'{rig.name}' ({rig.kind})" for rig in rigs.values())
+        message = f"dodo.yml has no rig of kind '{word.text}'"
+        yield Diagnostic(word.span, "rig-pool", message, f"it has {said}" if said else "add it under 'rigs'")
+
+
+def _same_device(one: Rig, other: Rig) -> str:
+    """What tells rigs apart, where both have the same: the port, or the camera of rigs without one."""
+    own = one.text(PORT) or one.text(CAMERA_SOURCE)
+    return own if own == (other.text(PORT) or other.text(CAMERA_SOURCE)) else ""
+
+
+def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:
+    yield from _devices(context)
+    spec = context.spec
+    if spec.level == "hil" and "rig" not in spec.spans:
+        message = "a hil test needs a rig to run on"
+        yield Diagnostic(spec.span("level"), "rig-level", message, "write 'rig: emulated', or a rig of dodo.yml")
+    if spec.level in ("sil", "dil") and (spec.rig or spec.pool):
+        message = f"a {spec.level} test runs without a rig"
+        yield Diagnostic(spec.span("rig"), "rig-level", message, "remove it, or use level hil")
+    if spec.rig is None:
+        return
+    rig = context.rig
+    if rig is None:
+        hint = did_you_mean(spec.rig, [*EMULATED_RIGS, *context.deployment.rigs])
+        yield Diagnostic(spec.span("rig"), "unknown-rig", f"unknown rig '{spec.rig}'", hint)
+    elif not rig.is_emulated and spec.isolation == "network":
+        message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have a network of its own"
+        hint = "remove 'isolation'" if "isolation" in spec.spans else "run it without --isolation"
+        yield Diagnostic(spec.span("isolation"), "rig-isolation", message, hint)
+
+
+def _devices(context: RuleContext) -> Iterator[Diagnostic]:
+    """Ports that are not the rig's: nothing would lease or check them, or ask the machine's operator."""
+    rig = context.rig
+    for service in context.services:
+        for argument in service.arguments.values():
+            if argument.parameter.rig != PORT:
+                yield from _strangers(context, service.use, argument)
+                yield from _memory(service.use, argument)
+                continue
+            port = argument.value.text if argument.value else EMULATED
+            if is_simulated(port) or (rig is not None and port == rig.text(PORT)):
+                continue
+            span = argument.entry.value.span if argument.entry else service.use.span
+            owner = f"rig '{rig.name}' does not have it" if rig else "the test runs on no rig"
+            message = f"'{service.use.name}' would move what is at '{port}', and {owner}"
+            yield Diagnostic(span, "rig-device", message, "name the rig of dodo.yml that has the port with 'rig'")
+
+
+def _memory(use: Use, argument: Argument) -> Iterator[Diagnostic]:
+    """Limits that a test writes itself: each test would write the rig's memory, and the next one would not fit."""
+    if argument.parameter.rig == MEMORY and argument.parameter.name in use.parameters:
+        message = f"'{use.name}' would write limits into the rig's memory, which are those of dodo.yml"
+        hint = "write them in 'limits' of the rig in dodo.yml, or use parameters such as max-speed"
+        yield Diagnostic(use.parameters[argument.parameter.name].key, "rig-device", message, hint)
+
+
+def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[Diagnostic]:
+    """Ports of rigs in other parameters: their services do not move the rig, and may not open its port."""
+    written = argument.text or ""
+    if argument.entry is None or not written.startswith(("/", "socket:")):
+        return
+    names = {written, os.path.realpath(written)}
+    for rig in context.deployment.rigs.values():
+        port = rig.text(PORT)
+        if port and not names.isdisjoint({port, os.path.realpath(port)}):
+            message = f"'{use.name}' would open '{written}', the port of rig '{rig.name}'"
+            hint = "only the service that moves the rig opens its port; name another device"
+            yield Diagnostic(argument.entry.value.span, "rig-device", message, hint)
+
+
+def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
+    yield from resolved_goals(context.test).problems

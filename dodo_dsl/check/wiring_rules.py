@@ -1,0 +1,229 @@
+"""Each message or memory that a service consumes has a producer in the test, or is required of the application.
+
+``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
+message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces),
+``true-pose`` (it consumes what only a simulation knows, and the test hides that).
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+
+from dodo_dsl.application import opendlv_flags, slips
+from dodo_dsl.application.access import secret_problems
+from dodo_dsl.application.access.compose_keys import SERVICE, removed
+from dodo_dsl.application.interpolation import RequiredVariable, interpolate, interpolated
+from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
+from dodo_dsl.application.opendlv_flags import CID_VARIABLES
+from dodo_dsl.application.variables import owner, split_by
+from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.resolve import IMAGE, without_pictures
+from dodo_dsl.check.senders import HIDDEN, told
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
+from dodo_dsl.source import Scalar
+from dodo_dsl.spec.manifest import Manifest
+
+
+def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
+    fits = all(service.use.layer in service.manifest.layers for service in context.services)
+    if not context.spec.is_whole or not context.test.is_complete or not fits:
+        return  # unknown services and wrong layers come first
+    wiring = context.wiring
+    known = {*context.messages, ANYTHING}
+    misspelt = any(_is_unknown(end, known) for end in wiring.application_produces)
+    own_misspelt = any(_is_unknown(end, known) for end in wiring.produced)
+    for end in wiring.consumed:
+        if (misspelt and end.port.can_be_required) or (own_misspelt and end.port.kind == "message"):
+            continue  # the misspelt one may be meant
+        if _is_unknown(end, known):
+            continue  # its name is reported itself
+        if not (end.port.optional or wiring.application_may_produce(end.port) or wiring.producers(end.port)):
+            yield _unsatisfied(context, wiring, end)
+    yield from _twice(wiring)
+    yield from _unsatisfied_application(wiring)
+
+
+def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
+    """``true-pose``: the application takes what only a simulation knows, and the test hides that."""
+    if context.spec.pose != HIDDEN:
+        return
+    name = context.spec.name or context.spec.location.stem
+    for end in told(context.wiring):
+        message = f"the application's '{end.service}' takes {end.port}, which only a simulation has: '{name}' hides it"
+        hint = "take it out of x-dodo.in, or write 'pose: declared' in a test of your own"
+        yield Diagnostic(end.span, "true-pose", message, hint)
+
+
+def _is_unknown(end: End, known: Collection[str]) -> bool:
+    """Whether it is an unknown message, which is reported where it is written."""
+    return end.port.kind == "message" and end.port.name not in known
+
+
+def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
+    rule = "no-sample" if end.layer == "evaluation" else "no-producer"
+    what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
+    if end.port.can_be_required:
+        message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
+        hint = "list it under x-dodo.out of the application's service that sends it"
+    else:
+        message = f"'{end.service}' needs {what}, which no service of the test sends"
+        hint = _who_could(context, wiring, end)
+    if rule == "no-sample":
+        message += ", so it could never judge"
+    return Diagnostic(end.span, rule, message, hint)
+
+
+def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
+    """A hint: another sender stamp that is sent, or services that send such messages."""
+    stamps = sorted(str(e.port) for e in wiring.produced if e.port.name == end.port.name)
+    if stamps:
+        return f"the test sends {' and '.join(stamps)}"
+    names = sorted(m.name for m in context.manifests.values() if _sends(m, end.port.name))
+    return f"add a service that sends it: {', '.join(names)}" if names else ""
+
+
+def _sends(manifest: Manifest, name: str) -> bool:
+    return any(port.partition("/")[0] == name for port in manifest.messages.outputs)
+
+
+def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
+    first: dict[tuple[str, str, int | None], End] = {}
+    for end in (*wiring.produced, *wiring.application_produces):
+        if end.port.name == ANYTHING:
+            continue
+        key = (end.port.kind, end.port.name, end.port.stamp)
+        other = first.setdefault(key, end)
+        if other is not end and "application" not in (other.layer,):
+            who = f"the application's '{end.service}'" if end.layer == "application" else f"'{end.service}'"
+            does, what = ("send", "sender stamp") if end.port.kind == "message" else ("write the memory", "name")
+            message = f"'{other.service}' and {who} both {does} {end.port}"
+            hint = f"give one of them another {what}"
+            yield Diagnostic(end.span, "two-producers", message, hint)
+
+
+def _unsatisfied_application(wiring: Wiring) -> Iterator[Diagnostic]:
+    for end in wiring.application_consumes:
+        own = any(end.port.consumes(other.port) for other in wiring.application_produces)
+        if not own and not wiring.producers(end.port) and not wiring.undeclared:
+            message = f"the application's '{end.service}' consumes {end.port}, which no service of the test sends"
+            yield Diagnostic(end.span, "application-input", message, severity="warning")
+
+
+Asked = dict[str, Span]
+"""Memories by name, with where they are written."""
+
+
+def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
+    """A service that reads one memory of the test may make others, and so may services that share one."""
+    ends = [end for end in context.wiring.produced if end.port.kind == "memory"]
+    made = {end.port.name for end in ends}
+    if not made or context.application is None or not context.spec.is_whole or not context.test.is_complete:
+        return
+    set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
+    known = {**context.application.known, **set_here}
+    for service in context.application.services.values():
+        yield from _slips(service, known, made)
+    asked = {service.name: _asked(service, known) for service in context.application.services.values()}
+    players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
+    shown = {end.port.name for end in ends if end.service not in players}
+    yield from _blank(asked, {end.port.name: players[end.service] for end in ends if end.port.name not in shown})
+    for asking, names in asked.items():
+        others = {name for other, own in asked.items() if other != asking for name in own}
+        if made.isdisjoint(names) and others.isdisjoint(names):
+            for name, span in names.items():
+                yield _missing(asking, name, span, made)
+
+
+def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
+    """Memories in which no picture will ever be: their services play recordings without."""
+    for service, names in asked.items():
+        for name in sorted(names.keys() & recordings.keys()):
+            file = recordings[name].name
+            message = f"the application's '{service}' reads pictures from '{name}', and '{file}' has none"
+            hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
+            yield Diagnostic(names[name], "application-memory", message, hint, "warning")
+
+
+def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:
+    """The services of an application that ask for one of these memories."""
+    services = application.services.values()
+    return [each.name for each in services if not set(names).isdisjoint(_asked(each, dict(application.known)))]
+
+
+def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
+    message = f"the application's '{service}' asks for the memory '{name}', which no service of the test makes"
+    near = closest(name, made)
+    hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
+    return Diagnostic(span, "application-memory", message, hint, "warning")
+
+
+def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> Iterator[Diagnostic]:
+    """Flags that are almost ``--name=``, with a memory of the test."""
+    for word, item in slips.words(service):
+        flag = slips.meant(interpolated(word, known), "--name")
+        if flag.partition("=")[2].removeprefix("/") in made:
+            message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
+            yield Diagnostic(item.span, "application-memory", message, f"did you mean '{flag}'?", "warning")
+
+
+def _asked(service: ComposeService, known: dict[str, str]) -> Asked:
+    found: Asked = {}
+    for word, item in slips.words(service):
+        names = opendlv_flags.memories([interpolated(word, known)])
+        found.update((name, item.span) for name in names if "$" not in name)
+    return found
+
+
+_RULE = "application-variable"
+_FOR_ALL = ("command", "environment", "env_file")
+"""Keys whose variables processes need, too."""
+_GIVEN = ("command", "entrypoint", "environment")
+"""Keys whose variables a test may set."""
+_UNSURE = (
+    "cap_add", "depends_on", "deploy", "device_cgroup_rules", "devices", "ipc", "logging", "name", "network_mode",
+    "networks", "pid", "privileged", "security_opt", "volumes_from",
+)  # fmt: skip
+"""Keys of which a test's copy may not have what is written."""
+
+
+def check_variables(context: RuleContext) -> Iterator[Diagnostic]:
+    if context.application:
+        yield from _required(context, context.application)
+    for name, entry in context.spec.variables.items():
+        if why := owner(name):
+            message = f"a test cannot set '{name}': {why}"
+            yield Diagnostic(entry.key, _RULE, message, "set a variable that the application itself reads")
+        elif isinstance(entry.value, Scalar):
+            yield from _value(context, name, entry.value)
+            yield from secret_problems.written([entry.value])
+
+
+def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnostic]:
+    if not value.text.isprintable():
+        yield Diagnostic(value.span, _RULE, f"the value of '{name}' has control characters, expected one line of text")
+    elif context.application and (service := split_by(context.application, name, value.text)):
+        message = f"the value of '{name}' has quotation marks or the like, at which the command of '{service}' is split"
+        yield Diagnostic(value.span, _RULE, message, f"write the command of '{service}' as a list")
+
+
+def _required(context: RuleContext, application: ApplicationSource) -> Iterator[Diagnostic]:
+    in_containers = any(s.node.get("x-dodo-process") is None for s in application.services.values())
+    given = {
+        name: entry.value.text for name, entry in context.spec.variables.items() if isinstance(entry.value, Scalar)
+    }
+    maybe = {**dict.fromkeys((*CID_VARIABLES, *application.access.passed), "?"), **application.known}
+    for service, key, part in application.demanding:
+        if key.startswith("x-") or key in _UNSURE or (service and key in removed(SERVICE)):
+            continue
+        if key == "image" and image_variable(service) in application.known:
+            continue
+        try:
+            interpolate(part.text, {**maybe, **given} if service and key in _GIVEN else maybe)
+        except RequiredVariable as problem:
+            is_sure = key in _FOR_ALL or (in_containers and key != "image")
+            severity: Severity = "error" if is_sure else "warning"
+            ways = [f"set it in .env beside this file, or pass it with environment: [{problem.name}] in dodo.yml"]
+            ways += [f"or in the test with application: {{env: {{{problem.name}: ...}}}}"] if key in _GIVEN else []
+            ways += [f"or let a pipeline set {image_variable(service)}"] if key == "image" else []
+            message = f"variable '{problem.name}' has no value: {problem.why}"
+            yield Diagnostic(part.span, "application-required", message, ", ".join(ways), severity)

@@ -1,0 +1,361 @@
+"""dodo compile: check tests and write their compose files and child pipeline."""
+
+import argparse
+import difflib
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any, TextIO
+from urllib.parse import quote
+
+from dodo_dsl import __version__, atomic, package_data
+from dodo_dsl.check import catalogue
+from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
+from dodo_dsl.cli.display import Verbosity, write_diagnostics
+from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError
+from dodo_dsl.cli.numbers import patience, positive
+from dodo_dsl.compiler import Checked, NoApplication, plan
+from dodo_dsl.diagnostics import (
+    Diagnostic,
+    Fix,
+    Span,
+    fingerprints,
+    forget_lines,
+    format_gitlab,
+    format_json,
+    format_text,
+    has_errors,
+    ordered,
+    shown_path,
+)
+from dodo_dsl.emit.output_folder import add_images, differences, stale_folders, write
+from dodo_dsl.emit.pipeline import SearchJobs
+from dodo_dsl.emit.pipeline_jobs import JobOptions
+from dodo_dsl.plan.model import Suite
+from dodo_dsl.terminal import WIDE, json_text, printable
+
+Fixes = dict[Span, Fix]
+
+
+def apply_fixes(diagnostics: Iterable[Diagnostic], root: Path) -> str:
+    """Mends the files of the repository at ``root`` and returns the diff; each file appears whole. Raises OSError."""
+    by_file: dict[Path, Fixes] = defaultdict(dict)
+    for diagnostic in diagnostics:
+        path = Path(diagnostic.span.file)
+        if diagnostic.fix and path.is_file() and _is_own(path, root):
+            by_file[path.resolve()][diagnostic.span] = diagnostic.fix
+    return "".join(_mended(path, fixes) for path, fixes in sorted(by_file.items()))
+
+
+def _is_own(path: Path, root: Path) -> bool:
+    return path.resolve().is_relative_to(root.resolve()) and not package_data.is_shipped(path, root)
+
+
+def _mended(path: Path, fixes: Fixes) -> str:
+    """Writes one file and returns its diff; line ends, comments and layout stay."""
+    before = path.read_bytes().decode().splitlines(keepends=True)
+    after = list(before)
+    for span, fix in sorted(fixes.items(), reverse=True):
+        if span.line <= len(after):
+            after[span.line - 1] = _line(after[span.line - 1], span, fix)
+    if after == before:
+        return ""
+    atomic.write_bytes(path, "".join(after).encode())
+    name = shown_path(str(path))
+    return "".join(_shown(difflib.unified_diff(before, after, name, name, n=1)))
+
+
+def _line(line: str, span: Span, fix: Fix) -> str:
+    start, end = span.column - 1, span.column - 1 + span.length
+    return line[:start] + fix.mended(line[start:end]) + line[end:]
+
+
+def _shown(lines: Iterable[str]) -> Iterator[str]:
+    return (printable(line.rstrip("\r\n")) + "\n" for line in lines)
+
+
+_SARIF = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+
+
+def format_sarif(diagnostics: Sequence[Diagnostic]) -> str:
+    """A SARIF log, as code scanning and editors read it; columns count characters."""
+    pages = catalogue.pages()
+    rules = sorted({d.rule for d in diagnostics})
+    marks = fingerprints(diagnostics)
+    results = [_result(d, rules.index(d.rule), mark) for d, mark in zip(diagnostics, marks, strict=True)]
+    driver = {"name": "DoDo", "version": __version__, "rules": [_rule(pages[rule]) for rule in rules]}
+    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
+    return json_text({"$schema": _SARIF, "version": "2.1.0", "runs": [run]})
+
+
+def _rule(page: catalogue.Page) -> dict[str, Any]:
+    return {
+        "id": page.name,
+        "shortDescription": {"text": page.summary},
+        "fullDescription": {"text": page.why},
+    }
+
+
+def _result(diagnostic: Diagnostic, index: int, fingerprint: str) -> dict[str, Any]:
+    span = diagnostic.span
+    region = {"startLine": span.line, "startColumn": span.column, "endColumn": span.column + max(1, span.length)}
+    place = {"artifactLocation": {"uri": _uri(span.file)}, "region": region}
+    return {
+        "ruleId": diagnostic.rule,
+        "ruleIndex": index,
+        "level": diagnostic.severity,
+        "message": {"text": _sentence(diagnostic)},
+        "locations": [{"physicalLocation": place}],
+        "partialFingerprints": {"dodo/v1": fingerprint},
+    }
+
+
+def _uri(file: str) -> str:
+    """Relative to the working folder, or a file's whole address."""
+    shown = shown_path(file)
+    return Path(shown).as_uri() if Path(shown).is_absolute() else quote(shown)
+
+
+def _sentence(diagnostic: Diagnostic) -> str:
+    return diagnostic.sentence + (f" ({diagnostic.hint})" if diagnostic.hint else "")
+
+
+def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -> str:
+    """A test case a file: it fails by its errors; warnings are its output. ``files`` are those that were checked."""
+    from junitparser import Failure, JUnitXml, TestCase, TestSuite
+
+    from dodo_dsl.report.for_gitlab import xml_text
+
+    by_file = {file: list(found) for file, found in groupby(diagnostics, lambda d: d.span.file)}
+    suite = TestSuite("dodo compile --check")
+    for file in sorted({*files, *by_file}):
+        name = xml_text(shown_path(file))
+        case = TestCase(name, classname="dodo")
+        case._elem.set("file", name)
+        found = by_file.get(file, [])
+        errors, warnings = ([d for d in found if d.severity == severity] for severity in ("error", "warning"))
+        if errors:
+            failure = Failure(xml_text(f"{errors[0].span.line}: {errors[0].sentence}"), errors[0].rule)
+            failure.text = xml_text(format_text(errors, WIDE))
+            case.result = [failure]
+        if warnings:
+            case.system_out = xml_text(format_text(warnings, WIDE))
+        suite.add_testcase(case)
+    document = JUnitXml("dodo")
+    document.add_testsuite(suite)
+    document.update_statistics()  # type: ignore[no-untyped-call]
+    text: bytes = document.tostring()  # type: ignore[no-untyped-call]
+    return text.decode() + "\n"
+
+
+def rendered(style: str, diagnostics: Sequence[Diagnostic], files: Sequence[str]) -> str:
+    """The diagnostics in a format of ``FORMATS``; ``files`` are the specs that were checked."""
+    return format_junit(diagnostics, files) if style == "junit" else _OTHERS[style](diagnostics)
+
+
+_OTHERS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {
+    "text": format_text,
+    "json": format_json,
+    "gitlab": format_gitlab,
+    "sarif": format_sarif,
+}
+FORMATS = (*_OTHERS, "junit")
+
+EXAMPLES = """examples:
+  dodo compile                             all tests of the deployment, into generated/
+  dodo compile tests/my-test -o out        one folder of tests
+  dodo compile --check                     problems of all tests; writes nothing
+  dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
+  dodo compile --check --format gitlab     the same as a code quality report; sarif and junit are others
+  dodo compile --forecast 4 --times dodo-report    how long the pipeline takes with four runners
+  dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
+  dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
+  dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
+  dodo compile --files repository          its jobs take recordings from their checkout, and not from an artifact
+"""
+
+
+_OVERHEAD_S = 10.0  # from when GitLab gives a job to a runner until its test begins, and at its end
+_WORKERS = 4
+_SHORT_DIFF = 30  # lines that are shown without --diff
+_MOST_NAMES = 8
+_MOST_PASSES = 5
+_MOST_PROBLEMS = 1000
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "path",
+        nargs="*",
+        metavar="PATH",
+        help="specs, folders or names of tests; DIR then holds only these (default: all)",
+    )
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"),
+                        help="output folder (default: generated)")  # fmt: skip
+    parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
+    parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
+    display.add(parser, "print only problems, and what is stale", "print the name of each test, too")
+    parser.add_argument("--fix", action="store_true",
+                        help="with --check: correct names, units and spaces where there is one way to")  # fmt: skip
+    parser.add_argument("--format", choices=FORMATS, default="text",
+                        help="format of the diagnostics (default: text); with gitlab, sarif and junit the text goes to "
+                        "standard error")  # fmt: skip
+    parser.add_argument("--forecast", type=positive, metavar="R", help="say how long the pipeline takes with R runners")
+    parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
+                        help="results or report with times; repeatable (default: the history here)")  # fmt: skip
+    parser.add_argument("--overhead", type=patience, default=_OVERHEAD_S, metavar="S",
+                        help="seconds that a runner needs to begin a job (default: %(default)g)")  # fmt: skip
+    parser.add_argument("--search", action="append", default=[], metavar="TEST",
+                        help="add jobs that together search TEST; repeatable")  # fmt: skip
+    parser.add_argument("--workers", type=positive, metavar="N",
+                        help=f"with --search: jobs of each search (default: {_WORKERS})")  # fmt: skip
+    pipeline_options.add(parser)
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    if options.forecast and options.check:
+        raise UsageError("--forecast needs the pipeline, which --check does not write: call dodo compile without it")
+    if options.fix and not options.check:
+        raise UsageError("--fix applies to --check")
+    if options.images and options.check:
+        raise UsageError("--images are for what is written: call dodo compile without --check")
+    if options.workers and not options.search:
+        raise UsageError("--workers are jobs of a search: name its test with --search")
+    checked = selection.select(options.path, (), options.application)
+    if options.fix:
+        checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
+    if options.verbosity is not Verbosity.QUIET:
+        (stdout if options.format == "text" else stderr).write(selection.left_out(checked))
+    if options.check:
+        return _check(checked, options, stdout, stderr)
+    return _write(checked, options, stdout, stderr)
+
+
+def _fixed(checked: Checked, options: argparse.Namespace, out: TextIO) -> Checked:
+    """The tests as they are with all fixes, one of which may bring the next to light."""
+    for _ in range(_MOST_PASSES):
+        diff = apply_fixes(checked.diagnostics, checked.deployment.root)
+        if not diff:
+            break
+        out.write(diff)
+        forget_lines()
+        checked = selection.select(options.path, (), options.application)
+    return checked
+
+
+def _log(style: str, stdout: TextIO, stderr: TextIO) -> TextIO | None:
+    """Where people read what is wrong: a report is for a file, and the log of its job tells the same as text.
+
+    None for JSON, which a program reads, and where the report itself is on the terminal.
+    """
+    if style == "text":
+        return stdout
+    return None if style == "json" or stdout.isatty() else stderr
+
+
+def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: TextIO, stderr: TextIO) -> None:
+    if style != "text":
+        stdout.write(rendered(style, diagnostics, [str(spec.path) for spec in checked.specs]))
+    log = _log(style, stdout, stderr)
+    if diagnostics and log:
+        write_diagnostics(log, diagnostics[:_MOST_PROBLEMS])
+        if len(diagnostics) > _MOST_PROBLEMS:
+            log.write(f"... {len(diagnostics) - _MOST_PROBLEMS} more problems\n")
+        rules = {diagnostic.rule for diagnostic in diagnostics}
+        log.write(f"dodo explain {rules.pop() if len(rules) == 1 else 'RULE'} says more\n")
+
+
+def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
+    if checked.ok and checked.application is not None and checked.specs:
+        made = plan(checked, options.output, _searches(options), pipeline_options.job_options(options))
+        diagnostics = ordered([*diagnostics, *made.problems])
+        if options.output.is_dir() and not has_errors(diagnostics):
+            stale = differences(made.compiled, made.pipeline, options.output)
+    _show(diagnostics, options.format, checked, stdout, stderr)
+    if has_errors(diagnostics):
+        return Exit.USAGE
+    outdated = f"{options.output} is stale; dodo compile brings it up to date"
+    if log := _log(options.format, stdout, stderr):
+        log.write(_difference(stale, options.output, options.diff))
+        warnings = [_count(len(diagnostics), "warning")] if diagnostics else []
+        state = ", ".join([*warnings, *([outdated] if stale else [])])
+        _list(options, log, "checked", [(spec.title, shown_path(str(spec.path))) for spec in checked.specs])
+        if options.verbosity is not Verbosity.QUIET or stale:
+            log.write(f"{_count(len(checked.specs))} checked: {state or 'no problems'}\n")
+    elif stale:
+        stderr.write(f"{outdated}\n")
+    return Exit.PROBLEMS if stale else Exit.OK
+
+
+def _list(options: argparse.Namespace, stdout: TextIO, done: str, tests: Sequence[tuple[str, str]]) -> None:
+    """What was done with each test, by name and path, if that is wanted."""
+    if options.verbosity is Verbosity.VERBOSE:
+        width = max((len(name) for name, _ in tests), default=0)
+        stdout.writelines(f"{done} {printable(f'{name:<{width}}  {path}')}\n" for name, path in tests)
+
+
+def _difference(stale: Mapping[str, str], out: Path, in_full: bool) -> str:
+    """The diff if it is wanted or short, otherwise the names of what differs."""
+    text = "".join(stale.values())
+    if in_full or text.count("\n") <= _SHORT_DIFF:
+        return text
+    return f"stale in {out}: {_names(list(stale))}; --diff shows how\n"
+
+
+def _names(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more
+
+
+def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    jobs = pipeline_options.job_options(options)
+    if not checked.ok:
+        _show(list(checked.diagnostics), options.format, checked, stdout, stderr)
+        return Exit.USAGE
+    try:
+        made = plan(checked, options.output, _searches(options), jobs)
+    except NoApplication:
+        raise UsageError(NO_APPLICATION) from None
+    diagnostics = ordered([*checked.diagnostics, *made.problems])
+    _show(diagnostics, options.format, checked, stdout, stderr)
+    if has_errors(diagnostics):
+        return Exit.USAGE
+    expected = _forecast(made.compiled.suite, jobs, options)
+    gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
+    write(made.compiled, made.pipeline, options.output)
+    if options.images:
+        add_images(made.compiled, jobs.images, options.output)
+    if options.format == "text" and options.verbosity is not Verbosity.QUIET:
+        plans = made.compiled.suite.plans
+        _list(options, stdout, "compiled", [(plan.name, str(options.output / plan.slug)) for plan in plans])
+        stdout.write(f"{_count(len(plans))} compiled into {options.output}\n")
+        if gone:
+            stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
+    (stdout if options.format == "text" else stderr).write(expected)
+    return Exit.OK
+
+
+def _searches(options: argparse.Namespace) -> tuple[SearchJobs, ...]:
+    if not options.search:
+        return ()
+    from dodo_dsl.cli.search_session import search_jobs
+
+    return search_jobs(options.search, options.workers or _WORKERS, options.application)
+
+
+def _forecast(suite: Suite, jobs: JobOptions, options: argparse.Namespace) -> str:
+    """How long the pipeline or its longest job takes, if that is wanted; raises UsageError for what has no times."""
+    if not (options.forecast or options.jobs) or not suite.plans:
+        return ""
+    from dodo_dsl.cli.forecast import forecast_text, packing_text
+
+    if options.forecast:
+        return forecast_text(suite, options.forecast, jobs, options.overhead)
+    return packing_text(suite, jobs)
+
+
+def _count(number: int, what: str = "test") -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,1 +1,0 @@
-"""``dodo compile``."""

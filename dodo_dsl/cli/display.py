@@ -1,0 +1,113 @@
+"""Colours of verdicts and diagnostics: on a terminal, or where FORCE_COLOR asks for them, and never with NO_COLOR.
+
+The codes are those of ECMA-48, section 8.3.117 (SGR), in the terminal's own palette.
+"""
+
+import argparse
+import contextlib
+import io
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from typing import TextIO
+
+from dodo_dsl.diagnostics import Diagnostic, Piece, pieces
+from dodo_dsl.terminal import columns, printable, unescaped
+
+_CODES = {
+    "passed": "32",
+    "failed": "31",
+    "error": "1;31",
+    "in error": "33",
+    "warning": "1;33",
+    "not run": "2",
+    "hint": "36",
+    "mark": "1;31",
+    "gutter": "2",
+    "place": "1",
+}
+_RESET = "\x1b[0m"
+_WITHOUT_COLOURS = ("dumb", "unknown")
+"""Values of TERM."""
+OF_OUTCOMES = {"passed": "passed", "failed": "failed", "error": "in error"}
+"""The styles of outcomes."""
+
+
+def commands_terminal(stream: TextIO) -> bool:
+    """Whether the stream is a terminal that obeys escape sequences."""
+    return stream.isatty() and os.environ.get("TERM") not in _WITHOUT_COLOURS
+
+
+def are_wanted(stream: TextIO) -> bool:
+    """NO_COLOR comes first, then FORCE_COLOR; an empty variable counts as none (no-color.org, force-color.org)."""
+    if os.environ.get("NO_COLOR"):
+        return False
+    return bool(os.environ.get("FORCE_COLOR")) or commands_terminal(stream)
+
+
+def write(stream: TextIO, parts: Iterable[Piece]) -> None:
+    """Writes the text of all parts, those with a style coloured where that is wanted."""
+    if not are_wanted(stream):
+        stream.writelines(text for text, _ in parts)
+        return
+    codes = unescaped(stream)  # a harmless stream shows them instead
+    for text, style in parts:
+        if not style:
+            stream.write(text)
+            continue
+        codes.write(f"\x1b[{_CODES[style]}m")
+        stream.write(text)
+        codes.write(_RESET)
+
+
+def write_diagnostics(stream: TextIO, diagnostics: Iterable[Diagnostic]) -> None:
+    """As ``format_text`` has them."""
+    width = columns(stream)
+    write(stream, (piece for diagnostic in diagnostics for piece in pieces(diagnostic, width)))
+
+
+class Verbosity(IntEnum):
+    QUIET = -1
+    NORMAL = 0
+    VERBOSE = 1
+
+
+def add(parser: argparse.ArgumentParser, quiet: str, verbose: str) -> None:
+    """The two flags, with their help."""
+    group = parser.add_mutually_exclusive_group()
+    parser.set_defaults(verbosity=Verbosity.NORMAL)
+    for flags, value, text in (
+        (("-q", "--quiet"), Verbosity.QUIET, quiet),
+        (("-v", "--verbose"), Verbosity.VERBOSE, verbose),
+    ):
+        group.add_argument(*flags, dest="verbosity", action="store_const", const=value, help=text)
+
+
+@contextlib.contextmanager
+def chatter(stream: TextIO, verbosity: Verbosity) -> Iterator[TextIO]:
+    """A stream for what is not asked for with ``-q``; it is shown all the same when an error ends this."""
+    if verbosity is not Verbosity.QUIET:
+        yield stream
+        return
+    unsaid = io.StringIO()
+    try:
+        yield unsaid
+    except Exception:
+        stream.write(unsaid.getvalue())
+        raise
+
+
+@contextmanager
+def progress_bar(stream: TextIO, text: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Yields a function that takes how much of ``total`` is done."""
+    if not stream.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress, TextColumn
+
+    columns = (TextColumn("{task.description}", markup=False), *Progress.get_default_columns()[1:])
+    with Progress(*columns, console=Console(file=unescaped(stream)), transient=True) as progress:
+        task = progress.add_task(printable(text), total=total)
+        yield lambda done: progress.update(task, completed=done)

@@ -1,1 +1,0 @@
-"""How commands look on a terminal."""

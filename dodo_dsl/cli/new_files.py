@@ -1,0 +1,188 @@
+"""Files that a repository with tests needs: dodo.yml, schemas for editors, and those of ``dodo new --deployment``."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+import jinja2
+
+from dodo_dsl import __version__, package_data, source
+from dodo_dsl.diagnostics import shown_path
+from dodo_dsl.spec.deployment import FILE_NAME
+from dodo_dsl.terminal import printable
+
+
+@dataclass(frozen=True)
+class New:
+    """A file to write: its path and its content."""
+
+    path: Path
+    content: bytes
+
+
+@functools.cache
+def _templates() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(package_data.templates() / "new"),
+        undefined=jinja2.StrictUndefined,
+        autoescape=False,  # noqa: S701  (YAML and Markdown of names that are checked)
+        keep_trailing_newline=True,
+        trim_blocks=True,
+    )
+
+
+def filled(template: str, **values: object) -> bytes:
+    return _templates().get_template(template).render(**values).encode()
+
+
+COMPOSE_FILES = ("docker-compose.yml", "docker-compose.yaml", "compose.yml", "compose.yaml")
+REGISTRY = "tests"
+_SCHEMAS = ".dodo"
+_PROCESSES = {"python": "python, steering.py", "cpp": "build/steering"}
+LANGUAGES = tuple(_PROCESSES)
+"""Of the application that ``dodo new --application`` writes."""
+PIPELINES = ("application", "deployment", "run")
+"""The templates for GitLab, each of them a component in its folder."""
+_SPEC_SCHEMA = "dodo.schema.json"
+
+
+def compose_file(root: Path) -> str:
+    """The name of the compose file in a folder, empty when there is none."""
+    return next((name for name in COMPOSE_FILES if (root / name).is_file()), "")
+
+
+def schema_of_specs(root: Path) -> Path:
+    """Where editors find the schema of specs in a repository, whether it is there yet or not."""
+    own = root / "schemas" / _SPEC_SCHEMA
+    return own if own.is_file() else root / _SCHEMAS / _SPEC_SCHEMA
+
+
+def missing_schemas(root: Path) -> list[New]:
+    """The schemas for editors, as far as the repository lacks them."""
+    return [] if schema_of_specs(root).is_file() else [file for file in _schemas(root) if not file.path.exists()]
+
+
+def pipeline_template(name: str) -> bytes:
+    """The text of one of ``PIPELINES``."""
+    return (package_data.templates() / name / "template.yml").read_bytes()
+
+
+def _schemas(root: Path) -> list[New]:
+    paths = [package_data.schemas() / name for name in ("deployment.schema.json", _SPEC_SCHEMA)]
+    return [New(root / _SCHEMAS / path.name, path.read_bytes()) for path in paths]
+
+
+def dodo_yml(root: Path, application: str) -> New:
+    """A dodo.yml; ``application`` is the name of its compose file, empty when there is none yet."""
+    return New(root / FILE_NAME, filled("deployment/dodo.yml", application=application, registry=REGISTRY))
+
+
+def application_files(root: Path, language: str) -> list[New]:
+    """A small application that drives, and how it starts."""
+    folder = f"application/{language}"
+    values = {"base": f"dodo/vision:{__version__}"}
+    templates = (package_data.templates() / "new" / folder).iterdir()
+    sources = sorted(path.name for path in templates if path.is_file())  # an installed one has __pycache__ beside them
+    compose = filled("application/docker-compose.yml", process=_PROCESSES[language])
+    files = [New(root / name, filled(f"{folder}/{name}", **values)) for name in sources]
+    return [*files, New(root / COMPOSE_FILES[0], compose)]
+
+
+def included(images: bool) -> tuple[str, ...]:
+    """The templates that a repository's pipeline includes to run its tests, and with ``images`` to build them first."""
+    return ("deployment", "application") if images else ("deployment",)
+
+
+def deployment_files(root: Path, *, images: bool = False) -> list[New]:
+    """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas.
+
+    With ``images`` the pipeline builds them, as the application has to be built.
+    """
+    application = compose_file(root) or COMPOSE_FILES[0]
+    return [
+        dodo_yml(root, application),
+        New(root / application, filled("deployment/docker-compose.yml")),
+        New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
+        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", templates=included(images))),
+        *(New(root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml", pipeline_template(name)) for name in PIPELINES),
+        *_schemas(root),
+        New(root / ".gitignore", filled("deployment/gitignore", builds=images)),
+    ]
+
+
+PIPELINE = ".gitlab-ci.yml"
+IGNORED = ".gitignore"
+_JOB = "compile"
+_STAGE = "test"
+_OWN = ("script", "trigger", "extends", "run")
+"""What a job of its own has, and no change to a job of the template."""
+
+
+@dataclass(frozen=True)
+class KeptPipeline:
+    """``warning`` is empty where no job has the name of DoDo's; ``stages`` where the stage of DoDo's jobs is there."""
+
+    includes_dodo: bool = False
+    warning: str = ""
+    stages: tuple[str, ...] = ()
+
+    def step(self, templates: Sequence[str]) -> str:
+        """What the user has to do so that the pipeline includes these templates."""
+        files = " and ".join(f".gitlab/dodo/{name}.gitlab-ci.yml" for name in templates)
+        if not self.stages:
+            return f"include {files} in {PIPELINE}"
+        reason = f"'{_STAGE}' is not among its stages: {', '.join(self.stages)}"
+        return f"include {files} in {PIPELINE}, with 'inputs: {{stage: {self.stages[0]}}}', as {reason}"
+
+
+def kept_pipeline(path: Path) -> KeptPipeline:
+    """What a pipeline file that is kept says; one that cannot be read says nothing, as GitLab will refuse it."""
+    node, _ = source.read(path)
+    if not isinstance(node, source.Mapping):
+        return KeptPipeline()
+    return KeptPipeline(_includes_dodo(node), _warning(node, path), _stages(node))
+
+
+def missing_lines(file: New) -> list[str]:
+    """The lines of a new file that the one in its place lacks; slashes around a path make no difference."""
+    there = {line.strip().strip("/") for line in file.path.read_text(encoding="utf-8", errors="replace").splitlines()}
+    return [line for line in file.content.decode().splitlines() if line.strip("/") not in there]
+
+
+def _includes_dodo(root: source.Mapping) -> bool:
+    included = root.get("include")
+    return included is not None and any(
+        isinstance(node, source.Scalar) and "dodo" in node.text for node in source.walk(included)
+    )
+
+
+def _warning(root: source.Mapping, path: Path) -> str:
+    entry = root.entries.get(_JOB)
+    if entry is None or not isinstance(entry.value, source.Mapping) or not entry.value.entries.keys() & set(_OWN):
+        return ""
+    place = f"{shown_path(str(path))}:{entry.key.line}:{entry.key.column}"
+    return f"{place}: GitLab merges this job '{_JOB}' with DoDo's job of the same name; give yours another name"
+
+
+def _stages(root: source.Mapping) -> tuple[str, ...]:
+    node = root.get("stages")
+    if not isinstance(node, source.Sequence) or node.tag:
+        return ()
+    names = tuple(printable(item.text) for item in node.items if isinstance(item, source.Scalar))
+    return () if _STAGE in names or len(names) < len(node.items) else names
+
+
+def write(files: Sequence[New], stdout: TextIO) -> None:
+    """Writes new files, none of which may be there."""
+    for file in files:
+        file.path.parent.mkdir(parents=True, exist_ok=True)
+        with file.path.open("xb") as stream:
+            stream.write(file.content)
+        stdout.write(f"wrote {shown_path(str(file.path))}\n")
+
+
+def say_next(steps: Sequence[str], stdout: TextIO) -> None:
+    """What the user may do now, one step a line."""
+    stdout.write("\nnext: " + "\n      ".join(steps) + "\n")

@@ -1,0 +1,155 @@
+"""dodo rec: inspect, cut and export recordings."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl.cli.errors import Exit, files_of_the_user
+from dodo_dsl.opendlv.numbers import is_whole, number, whole
+
+EXAMPLES = """examples:
+  dodo rec info drive.rec                                         messages, rates, gaps, frames, damage
+  dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5         a time range, in seconds since the start
+  dodo rec cut drive.rec -o front.rec --message opendlv.proxy.DistanceReading/0
+  dodo rec export drive.rec --csv -o tables                       the same as cluon-rec2csv
+  dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
+  dodo rec export drive.rec --video -o drive.mp4                  what the camera saw
+  dodo rec export drive.rec --mcap -o drive.mcap                  for Foxglove, Lichtblick or rerun
+"""
+_CUT = """examples:
+  dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5
+  dodo rec cut drive.rec -o front.rec --message opendlv.proxy.DistanceReading/0 --message 1090
+"""
+_EXPORT = """examples:
+  dodo rec export drive.rec --csv -o tables
+  dodo rec export drive.rec --frames -o pictures --pictures jpg
+  dodo rec export drive.rec --video -o drive.mp4 --camera 0
+  dodo rec export drive.rec --mcap -o drive.mcap
+  dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
+  dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
+  dodo rec export desk.rec --coco -o labelled --truth desk.json
+  dodo rec export drive.rec old.rec --coco -o set --labels 3 --validation 50%
+  dodo rec export drive.rec old.rec --steering -o pairs --validation 50%
+"""
+_FORMATS = {
+    "csv": "write one table per message and sender stamp",
+    "coco": "write pictures with the boxes of the detections",
+    "steering": "write pictures with the steering and the pedal that answered them, for programs that learn to drive",
+    "frames": "write the camera's frames as pictures, named by sender stamp and sample time",
+    "video": "write the camera's packets into an MP4, h264 as recorded and other formats encoded again",
+    "mcap": "write an MCAP file for Foxglove, Lichtblick or rerun (needs DoDo's extra 'mcap')",
+}
+_INFO = """examples:
+  dodo rec info drive.rec
+  dodo rec info drive.rec --json --no-decode
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    info = _action(actions, "info", "show messages, rates, gaps, frames and damage of a recording", _INFO)
+    info.add_argument("--json", action="store_true", help="output as JSON")
+    info.add_argument("--no-decode", action="store_true", help="count camera frames without decoding them")
+    cut = _action(actions, "cut", "copy a part of a recording into a new one, byte for byte", _CUT)
+    cut.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="new recording")
+    export = _action(actions, "export", "export a recording for other tools", _EXPORT)
+    what = export.add_mutually_exclusive_group(required=True)
+    for name, text in _FORMATS.items():
+        what.add_argument(f"--{name}", dest="format", action="store_const", const=name, help=text)
+    export.add_argument(
+        "-o",
+        "--output",
+        metavar="PATH",
+        type=Path,
+        help="output folder or file (default: the recording's name with another ending)",
+    )
+    export.add_argument(
+        "--pictures", choices=("png", "jpg"), default="png", help="file type for --coco and --frames (default: png)"
+    )
+    export.add_argument("--camera", metavar="N", type=_stamp, help="sender stamp of the camera, if there are several")
+    export.add_argument(
+        "--labels", metavar="N", type=_stamp, help="sender stamp of the detections for --coco (default: all)"
+    )
+    export.add_argument(
+        "--truth", metavar="FILE.json", type=Path, help="truth file with the boxes for --coco, the same for every frame"
+    )
+    export.add_argument(
+        "--validation", metavar="SHARE", type=_share, default=0.0,
+        help="with --coco or --steering: folders train and validation, the latter with this share of the recordings",
+    )  # fmt: skip
+    export.add_argument("--seed", metavar="N", type=_stamp, default=0, help="chooses those recordings (default: 0)")
+    export.add_argument("--all", action="store_true", help="with --coco: also export frames without a detection")
+    for action in (cut, export):
+        _selection(action)
+
+
+def _action(
+    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str, examples: str
+) -> argparse.ArgumentParser:
+    action = actions.add_parser(
+        name, help=text, description=text, epilog=examples, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    if name == "export":
+        action.add_argument(
+            "files", metavar="FILE.rec", type=Path, nargs="+", help="--coco and --steering take several"
+        )
+    else:
+        action.add_argument("file", metavar="FILE.rec", type=Path)
+    action.add_argument(
+        "--messages",
+        metavar="SET",
+        action="append",
+        default=[],
+        help="message set 0.9 or 1.0 (default: detected from the content), or an additional .odvd file; repeatable",
+    )
+    return action
+
+
+def _selection(action: argparse.ArgumentParser) -> None:
+    action.add_argument(
+        "--start", metavar="S", type=_seconds, help="start time, in seconds since the recording's start or since 1970"
+    )
+    action.add_argument("--end", metavar="S", type=_seconds, help="end time (exclusive), as --start")
+    action.add_argument(
+        "--message",
+        metavar="M",
+        action="append",
+        default=[],
+        help="message by name or id, with /senderStamp for one sender; repeatable (default: all)",
+    )
+    action.add_argument("--force", action="store_true", help="replace existing files")
+
+
+def _stamp(text: str) -> int:
+    if not is_whole(text):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a sender stamp, expected a whole number")
+    return whole(text)
+
+
+def _share(text: str) -> float:
+    try:
+        value = number(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a share, expected more than 0% and less than 100%")
+    return value
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = number(text.removesuffix("s"))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or value < 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds, expected for example 2.5")
+    return value
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    from dodo_dsl.cli import rec_actions
+
+    with files_of_the_user():
+        rec_actions.run(options, stdout, stderr)
+    return Exit.OK

@@ -1,0 +1,161 @@
+"""The actions of ``dodo rec``."""
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl import atomic
+from dodo_dsl.atomic import refuse_existing
+from dodo_dsl.cli.display import progress_bar
+from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.odvd import OdvdError
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.rec import contents, excerpt
+from dodo_dsl.rec.contents import contents_text
+from dodo_dsl.rec.excerpt import Excerpt, NothingSelected
+from dodo_dsl.rec.frames import IMAGE
+from dodo_dsl.spec.deployment import find_deployment, load_deployment
+from dodo_dsl.terminal import json_text, printable
+
+
+@dataclass(frozen=True)
+class RecJob:
+    """A command line, the recording that it names, opened, and its messages."""
+
+    options: argparse.Namespace
+    recording: Recording
+    messages: MessageSet
+    stdout: TextIO
+    stderr: TextIO
+
+    def tell(self, text: str) -> None:
+        """A sentence for the user, beside the result."""
+        tell(self.stderr, text)
+
+    @contextmanager
+    def progress(self, text: str, total: int) -> Iterator[Callable[[int], None]]:
+        """Yields a function that takes how much of ``total`` is done."""
+        with progress_bar(self.stderr, text, total) as progress:
+            yield progress
+
+    def rows(self) -> Numbers:
+        """The rows that the command line selects; reports damage first."""
+        if self.recording.damage:
+            self.tell(f"{self.recording.path}: {self.recording.damage}")
+        options = self.options
+        return Excerpt(options.message, options.start, options.end).rows(self.recording, self.messages)
+
+    def folder(self) -> Path:
+        """The output folder; raises NothingSelected for what is none."""
+        folder: Path = self.options.output or self.options.file.with_suffix("")
+        if folder.exists() and not folder.is_dir():
+            raise NothingSelected(f"'{folder}' is not a folder; name one with -o")
+        return folder
+
+    def file(self, suffix: str = "") -> Path:
+        """The output file; raises NothingSelected for the recording itself, OutputExists for one that stays."""
+        output: Path = self.options.output or self.options.file.with_suffix(suffix)
+        if output.exists() and output.samefile(self.recording.path):
+            raise NothingSelected(f"'{output}' is the recording itself; name another file with -o")
+        refuse_existing([output], self.options.force)
+        return output
+
+
+def tell(stderr: TextIO, text: str) -> None:
+    """A line for the user."""
+    stderr.write(f"dodo rec: {printable(text)}\n")
+
+
+Tell = Callable[[str], None]
+
+
+def messages_for(recording: Recording, wanted: Sequence[str], tell: Tell) -> tuple[str, MessageSet]:
+    """The version of the set and its messages; ``wanted`` are versions and ODVD files of the command line.
+
+    The ODVD files of the nearest ``dodo.yml`` are added. If they cannot be used, ``tell`` gets a sentence, and the rest
+    is used without them. Raises OdvdError for files of the command line.
+    """
+    chosen = [word for word in wanted if word in (message_versions.OLD, message_versions.NEW)]
+    files = [Path(word) for word in wanted if word not in chosen]
+    version = chosen[-1] if chosen else message_versions.version_of(recording)
+    messages = message_versions.load(version, *files)
+    deployment = find_deployment(Path.cwd())
+    if deployment is None:
+        return version, messages
+    try:
+        return version, message_versions.load(version, *_own(deployment, tell), *files)
+    except OdvdError as error:
+        tell(f"{error}; the messages of {deployment} are skipped")
+        return version, messages
+
+
+def _own(path: Path, tell: Tell) -> tuple[Path, ...]:
+    """The ODVD files that a ``dodo.yml`` names, as ``dodo run`` takes them; none if it would refuse the file."""
+    deployment, problems = load_deployment(path)
+    errors = [problem for problem in problems if problem.severity == "error"]
+    if errors:
+        tell(f"{_place(errors[0])}: {errors[0].message}; its messages are skipped")
+        return ()
+    return deployment.messages
+
+
+def _place(problem: Diagnostic) -> str:
+    return f"{problem.span.file}:{problem.span.line}:{problem.span.column}"
+
+
+def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
+    """Carries out one action; raises OSError and what else ``cli.errors`` has a sentence for."""
+    if options.action == "export":
+        from dodo_dsl.cli import rec_export
+
+        if rec_export.is_data_set(options):
+            rec_export.run(options, stdout, stderr)
+            return
+        options.file = _only_one(options)
+    path: Path = options.file
+    with progress_bar(stderr, f"reading {path.name}", path.stat().st_size) as progress:
+        recording = Recording(path, progress)
+    with recording:
+        version, messages = messages_for(recording, options.messages, lambda text: tell(stderr, text))
+        job = RecJob(options, recording, messages, stdout, stderr)
+        if options.action == "info":
+            _info(job, version)
+        elif options.action == "cut":
+            _cut(job)
+        else:
+            from dodo_dsl.cli import rec_export
+
+            rec_export.EXPORTS[options.format](job)
+
+
+def _only_one(options: argparse.Namespace) -> Path:
+    """The recording, for what takes one; raises NothingSelected for several."""
+    files: list[Path] = options.files
+    if len(files) > 1:
+        raise NothingSelected(f"--{options.format} takes one recording; only --coco and --steering join several")
+    return files[0]
+
+
+def _info(job: RecJob, version: str) -> None:
+    images = len(job.recording.rows(messages=[IMAGE]))
+    with job.progress("decoding frames", images) as progress:
+        decoding = None if job.options.no_decode else progress
+        found = contents.look(job.recording, job.messages, version, decoding, job.tell)
+    if job.options.json:
+        job.stdout.write(json_text(found.as_json(job.recording)))
+    else:
+        job.stdout.write(contents_text(found, job.recording))
+
+
+def _cut(job: RecJob) -> None:
+    output = job.file()
+    rows = job.rows()
+    with atomic.replacing(output, durable=True) as place, job.progress(f"writing {output.name}", len(rows)) as progress:
+        excerpt.write(job.recording, rows, place, progress)
+    job.stdout.write(f"{output}: {len(rows)} of {len(job.recording)} messages\n")

@@ -1,0 +1,219 @@
+"""A test of a recording of one's own: what is played, and the signal that is judged, as the recording has them."""
+
+import json
+import math
+import re
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check import wiring_rules
+from dodo_dsl.cli.errors import UsageError, files_of_the_user
+from dodo_dsl.cli.new_files import New, filled
+from dodo_dsl.cli.new_test import spec_files
+from dodo_dsl.cli.rec_actions import messages_for
+from dodo_dsl.diagnostics import shown_path
+from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.envelope import encode_frame
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import OWN_IDS, MessageError, MessageSet
+from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.rec import contents
+from dodo_dsl.rec.contents import MessageStream
+from dodo_dsl.rec.frames import IMAGE
+
+SIGNALS = {
+    "opendlv.proxy.GroundSteeringRequest": "groundSteering",
+    "opendlv.proxy.PedalPositionRequest": "position",
+    "opendlv.proxy.GroundSpeedRequest": "groundSpeed",
+    "opendlv.proxy.GroundAccelerationRequest": "groundAcceleration",
+    "opendlv.proxy.AxleAngularVelocityRequest": "axleAngularVelocity",
+    "opendlv.proxy.AngleRequest": "angle",
+}
+"""Messages with a signal that can be judged and its field, the preferred ones first."""
+SHARE_OF_MEAN, SHARE_OF_DISTANCE = 10, 50
+"""Limits of the distance to the recorded signal, in percent of its range."""
+FEWEST = 10
+DEFAULT_GAP_S = 1
+"""Longer gaps are shortened by the player unless it is told otherwise, but not in a target."""
+LARGEST_BYTES = 200 << 20
+_START_UP_S = 10
+_MEMORIES = ("video0.argb", "video0.i420")
+"""In which rec-replay shows pictures by default."""
+_APART = 1_000_000
+"""Microseconds between the delays of two senders from which on one of them sends by another clock."""
+_PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
+
+
+@dataclass(frozen=True)
+class RecordedDrive:
+    """What a recording holds: ``cameras`` are sender stamps, that with most pictures first; ``duration`` is in s.
+
+    ``gap`` is the longest time without a message in s. ``retimed`` are messages with their times of receipt, where
+    sample times come from different drives; None elsewhere.
+    """
+
+    duration: float
+    gap: float
+    retimed: bytes | None
+    cameras: tuple[int, ...]
+    target: MessageStream
+    values: tuple[float, ...]
+    requests: tuple[str, ...]
+    others: tuple[int, ...]
+
+    @property
+    def range(self) -> float:
+        """Of the signal; its largest value where it is constant, 1 where that is 0."""
+        return max(self.values) - min(self.values) or max(map(abs, self.values)) or 1.0
+
+
+def look(path: Path, sent: Collection[str]) -> RecordedDrive:
+    """Looks into a recording; ``sent`` are messages of the application. Raises UsageError without a signal to judge."""
+    with files_of_the_user(), Recording(path) as recording:
+        if recording.size > LARGEST_BYTES:
+            raise UsageError(f"'{path}' is larger than {LARGEST_BYTES >> 20} MB; cut out a part: dodo rec cut --help")
+        _, messages = messages_for(recording, (), lambda _: None)
+        index = recording.index
+        played = np.flatnonzero(~np.isin(index["data_type"], list(OWN_IDS)))
+        if fault := recording_times.fault(recording, played):
+            raise UsageError(f"'{path}' cannot be played: {fault}; 'dodo rec cut' writes a part without them")
+        received = _receipts(recording, played)
+        streams = sorted(contents.streams(recording, messages), key=lambda stream: -stream.count)
+        target = _target(path, streams)
+        rows = recording.rows(messages=[target.id], sender_stamps=[target.sender_stamp])
+        values = _values(path, recording, messages, target, recording.by_time(rows))
+        times = np.sort(index["time"][played] if received is None else received[played])
+        gap = float(np.diff(times).max(initial=0)) / 1e6
+        retimed = None if received is None else _retimed(recording, received)
+    names = {stream.name for stream in streams if stream.name}
+    return RecordedDrive(
+        float(times[-1] - times[0]) / 1e6,
+        gap,
+        retimed,
+        tuple(stream.sender_stamp for stream in streams if stream.id == IMAGE),
+        target,
+        values,
+        tuple(sorted(name for name in names if name.endswith("Request") or name in sent)),
+        tuple(s.sender_stamp for s in streams if s.id == target.id and s is not target),
+    )
+
+
+def _receipts(recording: Recording, rows: Numbers) -> Numbers | None:
+    """When each message was received, in us, where the sample times of rows come from several drives; else None."""
+    received = np.concatenate([batch.times[1] for batch in recording.batches()])
+    sampled = recording.index["sampled"]
+    known = rows[(received[rows] != 0) & (sampled[rows] != 0)]
+    delays = [np.median((received - sampled)[part]) for part in recording_times.streams(recording.index, known)]
+    is_apart = len(delays) > 1 and max(delays) - min(delays) > _APART
+    return np.where(received == 0, recording.index["time"], received) if is_apart and received[rows].all() else None
+
+
+def _retimed(recording: Recording, times: Numbers) -> bytes:
+    """The recording with these sample times."""
+    pairs = zip(recording.envelopes(), times.tolist(), strict=True)
+    return b"".join(encode_frame(envelope._replace(sample_time=time)) for envelope, time in pairs)
+
+
+def _target(path: Path, streams: list[MessageStream]) -> MessageStream:
+    for name in SIGNALS:
+        found = [stream for stream in streams if stream.name == name and stream.count >= FEWEST]
+        if found:
+            return min(found, key=lambda stream: stream.sender_stamp != 0)  # as applications send it
+    expected = ", ".join(SIGNALS)
+    raise UsageError(f"'{path}' has no signal to judge, expected {FEWEST} or more messages of one of {expected}")
+
+
+def _values(
+    path: Path, recording: Recording, messages: MessageSet, target: MessageStream, rows: Numbers
+) -> tuple[float, ...]:
+    field = SIGNALS[target.name or ""]
+    try:
+        values = [float(getattr(messages.decode(e.data_type, e.payload), field)) for e in recording.envelopes(rows)]
+    except MessageError as error:
+        raise UsageError(f"'{path}': {error}") from None
+    return tuple(value for value in values if math.isfinite(value)) or (0.0,)
+
+
+def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path) -> tuple[list[New], str]:
+    """The test's files, its spec first, with the recording where the registry has it not yet; and what was found."""
+    place = path.resolve()
+    copies = []
+    if drive.retimed is not None or not place.is_relative_to(registry.resolve()):
+        name_of_copy = path.name if drive.retimed is None else f"{path.stem}-as-received{path.suffix}"
+        content = place.read_bytes() if drive.retimed is None else drive.retimed
+        copies = [New(registry / "recordings" / name_of_copy, content)]
+        place = registry.resolve() / "recordings" / name_of_copy
+        if place.is_file() and place.read_bytes() == copies[0].content:
+            copies = []
+    message, field = drive.target.name or "", SIGNALS[drive.target.name or ""]
+    spec = filled(
+        "recording/dil-open-loop.dodo.yml",
+        name=name,
+        description=_quoted(f"Send {message.rpartition('.')[2]} as in the recorded drive {path.name}."),
+        path=_quoted(f"../{place.relative_to(registry.resolve()).as_posix()}"),
+        timeout=math.ceil(drive.duration) + 2 * _START_UP_S,
+        max_time=math.ceil(drive.duration) + _START_UP_S,
+        cameras=drive.cameras,
+        max_gap=math.ceil(drive.gap) if drive.gap > DEFAULT_GAP_S else 0,
+        without=drive.requests,
+        message=message,
+        field=field,
+        sender=drive.target.sender_stamp,
+        mean=_limit(drive.range * SHARE_OF_MEAN / 100),
+        distance=_limit(drive.range * SHARE_OF_DISTANCE / 100),
+        share_of_mean=SHARE_OF_MEAN,
+        share_of_distance=SHARE_OF_DISTANCE,
+    )
+    return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)
+
+
+def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None) -> str:
+    """A warning where services of the application read pictures, of which the recording has none."""
+    readers = [] if drive.cameras or application is None else wiring_rules.readers(application, _MEMORIES)
+    if not readers:
+        return ""
+    named = " and ".join(f"'{name}'" for name in readers)
+    waits = "waits" if len(readers) == 1 else "wait"
+    of_it = f"and '{path.name}' has none, so the test cannot pass"
+    return f"warning: {named} of the application {waits} for pictures, {of_it}\n"
+
+
+def _quoted(text: str) -> str:
+    """A text as a value of YAML."""
+    return text if _PLAIN.fullmatch(text) else json.dumps(text)
+
+
+def _limit(value: float) -> str:
+    """Two significant digits."""
+    digits = max(0, 1 - math.floor(math.log10(value)))
+    return f"{value:.{min(digits, 9)}f}"
+
+
+def _found(path: Path, drive: RecordedDrive, field: str) -> str:
+    target = f"{drive.target.name}/{drive.target.sender_stamp}"
+    lines = [
+        f"{shown_path(str(path))}: {drive.duration:.1f} s, {_cameras(drive.cameras)}",
+        f"judged: {field} of {target}, {len(drive.values)} values from {min(drive.values):g} to {max(drive.values):g}",
+    ]
+    if drive.others:
+        lines.append(
+            f"other sender stamps of it are {', '.join(map(str, drive.others))}: change 'target-sender' for them"
+        )
+    if drive.retimed is not None:
+        lines.append(
+            "its sample times are of several drives: the test has a copy with the times of receipt in their place"
+        )
+    if not drive.cameras:
+        lines.append("the test is in real time, as only pictures can be waited for in lockstep")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _cameras(cameras: tuple[int, ...]) -> str:
+    if not cameras:
+        return "no camera"
+    others = f", not of {', '.join(map(str, cameras[1:]))}" if cameras[1:] else ""
+    return f"pictures of the camera with sender stamp {cameras[0]}{others}"

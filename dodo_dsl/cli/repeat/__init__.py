@@ -1,1 +1,0 @@
-"""What is noted of a run, so that it can be repeated."""

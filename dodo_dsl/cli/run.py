@@ -1,0 +1,268 @@
+"""dodo run: run tests and judge the application."""
+
+import argparse
+import asyncio
+import contextlib
+import fcntl
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TextIO, cast
+
+from dodo_dsl.cli import display, progress, run_report, selection
+from dodo_dsl.cli.display import Verbosity, chatter
+from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
+from dodo_dsl.cli.forecast import at_once, expectation, run_forecast, usage
+from dodo_dsl.cli.numbers import positive, seconds, seed
+from dodo_dsl.cli.provenance import Origin, origin, recording
+from dodo_dsl.cli.report import REPORT
+from dodo_dsl.cli.run_jobs import Loading, loading, prepare
+from dodo_dsl.cli.run_report import drawable, save_report
+from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, signals_interrupt, undisturbed
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.addresses import subnets
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.report.next_report import Drawings, next_report
+from dodo_dsl.report.results import Circumstances
+from dodo_dsl.report.viewer.names import LOGS
+from dodo_dsl.run.backends import Backends, Job, Processes
+from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.rigs.session import is_real
+from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
+from dodo_dsl.run.schedule import schedule
+from dodo_dsl.run.work_folder import reap_folders, work_folder
+from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.model import LEVELS
+from dodo_dsl.terminal import printable
+
+
+@contextlib.contextmanager
+def reserved(folder: Path, stdout: TextIO) -> Iterator[None]:
+    """Holds the folder, as long as this process lives at most; says so when another run holds it already.
+
+    Both go on: their tests have folders of their own there, and the pages and results are those of the later end.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        if not _locked(descriptor):
+            stdout.write(f"note: another run writes into '{folder}', too, and the report will be of the last to end; ")
+            stdout.write("--report names another folder\n")
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _locked(descriptor: int) -> bool:
+    """Whether nobody else holds the lock; True as well on file systems without locks."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def choose(plans: Sequence[Plan]) -> BackendName:
+    """Processes where the application allows it; else mixed on rigs and without DoDo's images; else docker."""
+    by_application = default_backend(plans)
+    if by_application == "process":
+        return by_application
+    from dodo_dsl.run.mixed import may_enter
+
+    if any(is_real(plan) for plan in plans) or (may_enter() and _lacks_images(plans)):
+        return "mixed"
+    return by_application
+
+
+def _lacks_images(plans: Sequence[Plan]) -> bool:
+    """Whether an engine of this machine lacks an image of DoDo's."""
+    from docker.errors import DockerException, ImageNotFound
+
+    from dodo_dsl.run.docker.client import connect
+
+    try:
+        client = connect()
+        if not client.api.base_url.startswith("http+docker:"):
+            return False
+        for image in {service.image for plan in plans for service in plan.services}:
+            client.api.inspect_image(image)
+    except ImageNotFound:
+        return True
+    except (BackendError, DockerException, OSError):
+        return False
+    return False
+
+
+EXAMPLES = """examples:
+  dodo run                                     all tests of the deployment
+  dodo run sil-closed-straight                 one test
+  dodo run 'sil-*' -j 4                        by pattern, four at a time
+  dodo run --application ../app/docker-compose.yml --level sil
+  dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
+  dodo run sil-closed-straight --samples 16    at 16 values of its ranges, the same ones for each --seed
+  dodo run sil-closed-straight --watch         again whenever spec, map or application are saved
+  dodo run -q                                  only what did not pass, and the counts
+  dodo run --compiled generated/sil-closed-straight --report dodo-report
+
+exit codes: 0 all passed, 1 some failed, 2 wrong usage or spec, 3 some ended in error, 130 interrupted
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("test", nargs="*", metavar="TEST", help="names, patterns, specs or folders (default: all)")
+    parser.add_argument(
+        "--level",
+        action="append",
+        choices=LEVELS,
+        default=[],
+        help="only tests of this level: software, data or hardware in the loop; repeatable",
+    )
+    parser.add_argument(
+        "--backend",
+        choices=("process", "docker", "mixed"),
+        help="where services run; mixed: the application in containers, DoDo's own as processes (default: process, if "
+        "the application allows it; else mixed on a rig, or where DoDo's images are missing; else docker)",
+    )
+    parser.add_argument(
+        "-j", "--jobs", type=positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
+    )
+    parser.add_argument("--clock", choices=("realtime", "lockstep"), help="replaces the specs' clock")
+    parser.add_argument("--wall-timeout", type=seconds, metavar="S", help="maximum wall time of a test in lockstep")
+    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the specs' isolation")
+    parser.add_argument(
+        "--report", type=Path, default=REPORT, metavar="DIR", help="folder of the report (default: dodo-report)"
+    )
+    parser.add_argument("--seed", type=seed, metavar="N", help="replaces the specs' seed")
+    parser.add_argument("--repeat", type=positive, default=1, metavar="N", help="run every test N times")
+    parser.add_argument("--samples", type=positive, metavar="N",
+                        help="run each test with 'vary' at N values of its ranges")  # fmt: skip
+    parser.add_argument("--fail-fast", action="store_true", help="start no further test after one that did not pass")
+    parser.add_argument("--retry-errors", type=positive, nargs="?", const=1, default=0, metavar="N",
+                        help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
+    parser.add_argument("--compiled", type=Path, action="append", default=[], metavar="DIR/SLUG",
+                        help="folder of a compiled test; repeatable")  # fmt: skip
+    parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
+    parser.add_argument("--watch", action="store_true",
+                        help="run again, in lockstep, what a saved file affects, and show the change")  # fmt: skip
+    display.add(
+        parser,
+        "print only what did not pass, and a last line with the counts",
+        "print each test's phases, checks, what the application used, and errors and warnings in logs",
+    )
+    selection.add_application(parser)
+
+
+def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    with signals_interrupt():
+        return _main(options, stdout)
+
+
+def _main(options: argparse.Namespace, stdout: TextIO) -> int:
+    more_descriptors()
+    stdout = cast(TextIO, UninterruptedStream(stdout))
+    reap_folders()
+    if options.watch:
+        from dodo_dsl.cli import watch
+
+        return watch.main(options, stdout)
+    with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
+        with chatter(stdout, options.verbosity) as quietly:
+            jobs, deployment = prepare(options, folder.path, quietly)
+            _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
+            runner = runner_of(options, jobs, deployment, quietly, load)
+        with reserved(options.report, stdout):
+            source, said = origin(options, deployment), options.verbosity
+            outcomes, is_reported = run(runner, jobs, options.report, stdout, source, said=said)
+        if runner.kept:
+            stdout.write("\n".join(["", *runner.kept, ""]))
+            folder.kept = True
+    return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
+
+
+def _refuse_to_keep(plans: Sequence[Plan]) -> None:
+    for plan in plans:
+        if is_real(plan):
+            raise UsageError(
+                f"{plan.name} runs on rig '{plan.rig}', which --keep would leave in motion: run it without --keep"
+            )
+
+
+def runner_of(
+    options: argparse.Namespace, jobs: Sequence[Job], deployment: Deployment, stdout: TextIO, load: Loading
+) -> Runner:
+    """The runner of these jobs, announced."""
+    plans = [job.plan for job in jobs]
+    backend = options.backend or choose(plans)
+    order = schedule(options.jobs, expectation(backend), usage(backend))
+    stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
+    stdout.write(f"{run_forecast(order, jobs, backend)}\n")
+    shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)
+    backends = _backends(options, backend, plans, deployment, load)
+    return Runner(shown, backends, order, Policy(options.fail_fast, options.retry_errors), options.keep)
+
+
+def _backends(
+    options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, load: Loading
+) -> Backends:
+    roots = _roots(options, deployment)
+    if backend != "process":
+        from dodo_dsl.run.docker.containers import Containers
+        from dodo_dsl.run.mixed import Mixed
+
+        if options.compiled and any(options.isolation not in (None, plan.isolation) for plan in plans):
+            raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
+        containers = Containers(subnets(deployment.subnets), roots)
+        return containers if backend == "docker" else Mixed(containers, (load.descriptor,), roots, load.take)
+    without = sorted({s.name for p in plans for s in p.application.services if not s.process})
+    if without:
+        advice = "add for example 'x-dodo-process: [python, main.py]', or run with --backend mixed or docker"
+        raise UsageError(
+            f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
+        )
+    return Processes(deployment.cids, options.isolation, (load.descriptor,), roots, load.take)
+
+
+def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:
+    """The folders that the tests come from: the deployment's, and those of the command line."""
+    named = options.compiled or [Path(word) for word in options.test if Path(word).exists()]
+    return [deployment.root, *named]
+
+
+def run(
+    runner: Runner,
+    jobs: Sequence[Job],
+    report: Path,
+    stdout: TextIO,
+    source: Origin,
+    others: Sequence[Outcome] = (),
+    said: Verbosity = Verbosity.NORMAL,
+) -> tuple[list[Outcome], bool]:
+    """The outcomes, and whether the report holds all of them; they are printed in any case.
+
+    ``others`` are outcomes of tests that did not run again and stay in the report.
+    """
+    slugs, kept = [job.plan.slug for job in jobs], {outcome.slug for outcome in others}
+    in_place = runner.keep
+    with recording(source) as record, next_report(report.resolve(), slugs, kept, in_place) as target:
+        jobs = [replace(job, report=target.folder / job.plan.slug) for job in jobs]
+        with Drawings(target.folder) as drawings, runner.progress:
+            outcomes = asyncio.run(runner.run(jobs, lambda job, outcome: drawings.begin(outcome, drawable(job))))
+        not_run = runner.not_run()
+        logs = {job.plan.slug: job.report / LOGS for job in jobs}
+        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, logs)
+        stdout.flush()
+        with undisturbed():
+            circumstances = Circumstances((record(),), tuple(not_run))
+            written = save_report(
+                target, report, jobs, runner.backends.name, outcomes, others, circumstances, drawings.problems()
+            )
+    stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
+    if said is not Verbosity.QUIET or not written.is_whole:
+        stdout.write(f"{written.sentence}\n")
+    return outcomes, written.is_whole
+
+
+def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:
+    return Exit.INTERRUPTED if interrupted else of_outcomes(outcome.outcome for outcome in outcomes)

@@ -1,0 +1,255 @@
+"""From a command line of ``dodo run`` to jobs: compiled tests and the folders of their reports."""
+
+import argparse
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TextIO
+
+from dodo_dsl import atomic, compiler
+from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.cli import selection
+from dodo_dsl.cli.display import write_diagnostics
+from dodo_dsl.cli.errors import NO_APPLICATION, UsageError, require_extra
+from dodo_dsl.compiler import Checked, NoApplication, narrowed, plan
+from dodo_dsl.diagnostics import has_errors, ordered, told_once
+from dodo_dsl.emit.output_folder import PLAN_FILE, write
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.plan_json import PlanError, from_json
+from dodo_dsl.plan.runs import named, runs
+from dodo_dsl.plan.test_files import file_problem
+from dodo_dsl.run.backends import Job
+from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.rigs.session import is_real
+from dodo_dsl.search.space import space_of, sweep
+from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.load import Settings, of_test
+from dodo_dsl.spec.registry import SUFFIX
+from dodo_dsl.spec.rig import EMULATED, PORT
+from dodo_dsl.spec.vary import Values
+from dodo_dsl.terminal import printable
+
+
+def without_unbuilt(checked: Checked, backend: str | None) -> tuple[Checked, str]:
+    """The same without such tests, and a line about them; with containers, the rig is in an image."""
+    if not _runs_processes(checked, backend):
+        return checked, ""
+    left_out = {test.spec.path for test in checked.tests if test.spec.path in checked.unasked and _is_emulated(test)}
+    if not left_out or _is_built():
+        return checked, ""
+    known, kept = set(checked.diagnostics), [spec for spec in checked.specs if spec.path not in left_out]
+    fewer = narrowed(checked, kept)
+    names = printable(", ".join(sorted({spec.location.stem for spec in checked.specs if spec.path in left_out})))
+    said = f"skipped shipped tests on the emulated rig, which is not built: {names} (see dodo doctor)\n"
+    return replace(fewer, diagnostics=tuple(d for d in fewer.diagnostics if d in known)), said
+
+
+def _runs_processes(checked: Checked, backend: str | None) -> bool:
+    if checked.application is None:
+        return False
+    services = checked.application.services.values()
+    by_default = all("x-dodo-process" in service.node.entries for service in services)
+    return by_default if backend is None else backend != "docker"
+
+
+def _is_emulated(test: ResolvedTest) -> bool:
+    """Whether the rig's firmware runs in the simulator; for a camera alone, nothing has to be built."""
+    ports = (
+        service.texts.get(name)
+        for service in test.services
+        for name, parameter in service.manifest.parameters.items()
+        if parameter.rig == PORT
+    )
+    return EMULATED in ports
+
+
+def _is_built() -> bool:
+    from dodo_dsl.run.capabilities import emulator_folder
+
+    return emulator_folder() is not None
+
+
+def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
+    """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
+    settings = Settings(options.clock, options.isolation, options.seed, options.wall_timeout, options.repeat)
+    tests: dict[str, str] = {}
+    if options.compiled:
+        if options.test or options.level or options.application or options.samples:
+            raise UsageError(
+                "--compiled runs a test as it was compiled: TEST, --level, --samples and --application do not apply"
+            )
+        plans, deployment = [load_compiled(folder, settings) for folder in options.compiled], _deployment(stdout)
+        folders = {plan.slug: path.resolve() for plan, path in zip(plans, options.compiled, strict=True)}
+        if len(folders) < len(plans):
+            raise UsageError("--compiled names two tests of one name, or one of them twice")
+    else:
+        plans, deployment, tests = compile_tests(options, settings, folder, stdout, options.samples)
+        folders = {plan.slug: folder / plan.slug for plan in plans}
+    report = _usable(options.report, [named(p).slug for p in plans])
+    families = {plan.slug: tests.get(plan.slug, named(plan).slug) for plan in plans}
+    found: dict[str, Job] = {}
+    for run in runs(plans, settings.repeat):
+        plan = named(run.plan)
+        job = Job(plan, folders[run.test], report / plan.slug, families[run.test])
+        first = found.get(plan.slug)
+        found[plan.slug] = replace(first, others=(*first.others, job)) if first else job
+    return list(found.values()), deployment
+
+
+def load_compiled(folder: Path, settings: Settings) -> Plan:
+    """The Plan of a compiled test, whose clock and isolation are settled, and whose files are those that it needs."""
+    plan = _load_plan(folder, settings)
+    if problem := file_problem(folder.resolve(), plan.shared):
+        raise UsageError(f"{plan.name}: {problem}")
+    if settings.clock not in (None, plan.clock):
+        raise UsageError(f"this test is compiled for clock {plan.clock}; compile it again for another")
+    if settings.isolation == "network" and is_real(plan):
+        raise UsageError(f"rig '{plan.rig}' is reached through the host, not with --isolation network")
+    return plan
+
+
+def _deployment(stdout: TextIO) -> Deployment:
+    """The deployment that the command is called in, for its CIDs and subnets."""
+    deployment, problems = load_deployment(find_deployment(Path.cwd()))
+    write_diagnostics(stdout, problems)
+    if has_errors(problems):
+        raise UsageError("dodo.yml has errors, so its CIDs and subnets are unknown")
+    return deployment
+
+
+def _usable(report: Path, slugs: Sequence[str]) -> Path:
+    """The report's folder, made, and then left out of git; a folder of specs or of compiled tests is refused."""
+    is_new = not report.exists()
+    try:
+        report.mkdir(parents=True, exist_ok=True)
+        if is_new:
+            atomic.write_text(report / ".gitignore", "*\n")
+    except OSError as error:
+        raise UsageError(f"'{report}' cannot take the report: {error.strerror}") from error
+    for slug in slugs:
+        if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
+            raise UsageError(f"'{report}' holds tests; name another folder with --report")
+    if not os.access(report, os.W_OK):
+        raise UsageError(f"'{report}' cannot take the report: no write permission")
+    return report.resolve()
+
+
+def _load_plan(folder: Path, settings: Settings) -> Plan:
+    try:
+        return from_json(regular_file.text(folder / PLAN_FILE), settings)
+    except OSError as error:
+        raise UsageError(f"there is no compiled test at '{folder}': {error.strerror}") from error
+    except (PlanError, UnicodeDecodeError) as error:
+        raise UsageError(f"{folder / PLAN_FILE}: {error}") from error
+
+
+def _kept_clock(names: Sequence[str]) -> str:
+    """A note about tests on hardware, which keep their own clock."""
+    if not names:
+        return ""
+    who = f"{names[0]} runs" if len(names) == 1 else f"{names[0]} and {len(names) - 1} more run"
+    return f"note: {who} in real time, as hardware does not wait\n"
+
+
+def compile_tests(
+    options: argparse.Namespace, settings: Settings, folder: Path, stdout: TextIO, samples: int | None = None
+) -> tuple[list[Plan], Deployment, dict[str, str]]:
+    """The Plans of the tests that ``options`` select, compiled into ``folder``; raises UsageError.
+
+    With ``samples`` those of tests with ranges at so many of their values, and the slug of each one's test by its own.
+    """
+    checked = selection.select(options.test, options.level, options.application, settings)
+    stdout.write(selection.left_out(checked))
+    checked, unbuilt = without_unbuilt(checked, options.backend)
+    stdout.write(unbuilt)
+    if not checked.specs:
+        raise UsageError("no tests to run")
+    if settings.clock:
+        stdout.write(_kept_clock([s.title for s in checked.specs if s.clock != settings.clock]))
+    if not checked.ok:
+        write_diagnostics(stdout, told_once(checked.diagnostics, SUFFIX))
+        raise UsageError("the tests above cannot be compiled")
+    tests: dict[str, str] = {}
+    if samples:
+        pass
+
+        checked, tests = sample(checked, samples)
+    try:
+        made = plan(checked, folder)
+    except NoApplication:
+        raise UsageError(NO_APPLICATION) from None
+    problems = ordered([*checked.diagnostics, *made.problems])
+    write_diagnostics(stdout, told_once(problems, SUFFIX))
+    if has_errors(problems):
+        raise UsageError("the tests above cannot be compiled")
+    write(made.compiled, made.pipeline, folder)
+    return list(made.compiled.suite.plans), checked.deployment, tests
+
+
+def sample(checked: compiler.Checked, number: int) -> tuple[compiler.Checked, dict[str, str]]:
+    """The tests with ranges at the first values of a sweep, which depend on their seed alone.
+
+    With them the slug of each one's test by its own slug. Raises UsageError where no test has a range.
+    """
+    require_extra("--samples", "search")
+    if not any(test.spec.ranges for test in checked.tests):
+        raise UsageError("--samples is for tests with ranges: none of these has 'vary'")
+    origins: dict[str, str] = {}
+
+    def swept(test: ResolvedTest) -> list[Values]:
+        values = list(sweep(space_of(test), number, test.spec.seed))
+        slugs = (f"{test.spec.slug}--{compiler.SAMPLE}-{n}" for n in range(1, len(values) + 1))
+        origins.update(dict.fromkeys(slugs, of_test(test.spec).slug))
+        return values
+
+    return compiler.sampled(checked, swept), origins
+
+
+_WITHOUT = {"-h", "--help", "docker", "--backend=docker", "host", "--isolation=host"}
+"""Words of commands that hardly need one; a test of such a name only begins later."""
+_USUAL = ("clock", "rec_recorder", "virtual_camera", "integrator", "dynamic_model", "collision")
+"""Services of most tests: which ones they have is known only when they are compiled."""
+_ahead: list[ForkServer] = []
+
+
+def begin(words: Sequence[str]) -> None:
+    """Starts one for ``dodo run`` with these words, before its modules are loaded and the words are understood."""
+    if not _WITHOUT & set(words):
+        server = ForkServer()
+        server.load(f"services.{name}" for name in _USUAL)
+        _ahead.append(server)
+
+
+@dataclass
+class Loading:
+    """A fork server until a backend takes it; ``descriptor`` is that of a lease which its sandboxes hold, too."""
+
+    descriptor: int
+    fork_server: ForkServer | None
+
+    def take(self) -> ForkServer | None:
+        taken, self.fork_server = self.fork_server, None
+        return taken
+
+
+@contextlib.contextmanager
+def loading(options: argparse.Namespace, descriptor: int) -> Iterator[Loading]:
+    """The one that has begun, or one that starts now, unless the options of ``dodo run`` say that none is needed.
+
+    One that nobody took ends.
+    """
+    load = Loading(descriptor, _ahead.pop() if _ahead else None)
+    try:
+        if options.backend == "docker" or options.isolation == "host":
+            if unneeded := load.take():
+                unneeded.kill()
+        else:
+            load.fork_server = load.fork_server or ForkServer()
+            load.fork_server.hold(descriptor)
+        yield load
+    finally:
+        if left := load.take():
+            left.kill()

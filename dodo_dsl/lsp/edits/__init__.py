@@ -1,1 +1,0 @@
-"""What the editor changes in a document for its user."""

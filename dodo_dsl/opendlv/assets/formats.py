@@ -1,0 +1,291 @@
+"""The formats of files that parameters name: each a function that yields what is wrong with a file.
+
+Readers are imported where they are needed, as few tests need all of them.
+"""
+
+import csv
+import os
+import re
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.assets import map_file, mesh_text
+from dodo_dsl.opendlv.assets.json_file import MapError, Node, read_bytes
+from dodo_dsl.opendlv.assets.problem import InputError
+from dodo_dsl.opendlv.numbers import number
+from dodo_dsl.opendlv.picture_size import problem_of
+
+Settings = Mapping[str, str]
+"""What the test gives to other parameters of the service, as text; empty where there is no value."""
+Ids = Mapping[str, int]
+"""The numbers of messages, by name."""
+Format = Callable[[Path, Settings, Ids], Iterator[InputError]]
+
+RECORDING = ".rec"
+PICTURES = (".png", ".jpg", ".jpeg")
+_BOXES = "annotations"
+_IMAGE, _IMAGE_NAME = 1055, "pictures"
+_POINTER = b"version https://git-lfs"
+_QUOTED = re.compile(r"'([^']+)'")
+
+
+def problems(name: str, path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
+    """What is wrong with a file of a format; nothing where the services of DoDo do not read it."""
+    yield from _pointer(map_file.find_map(path)) or _FORMATS[name](path, settings, ids)
+
+
+def _pointer(path: Path) -> list[InputError]:
+    """The problem of a file whose content is elsewhere, in Git LFS."""
+    try:
+        with regular_file.opened(path) as file:
+            is_pointer = file.read(len(_POINTER)) == _POINTER
+    except OSError:
+        return []
+    return [InputError(path, "a Git LFS pointer, not the file", hint=f"run: {_lfs(path)}")] if is_pointer else []
+
+
+def _lfs(path: Path) -> str:
+    """What fetches a file, in the folder where the command is typed."""
+    folder = path.resolve().parent
+    below = os.path.relpath(folder) if folder.is_relative_to(Path.cwd()) else str(folder)
+    return "git lfs pull" if below == "." else f"git -C {shlex.quote(below)} lfs pull"
+
+
+def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    read, found = map_file.problems(path)
+    yield from found
+    if read is None:
+        return
+    meshes = dict.fromkeys(model.file for model in read.models)
+    paints = [*(model.paint for model in read.models), *(block.paint for block in read.blocks)]
+    for file in meshes:
+        try:
+            pointer = _pointer(file)
+            yield from pointer
+            if not pointer:
+                mesh_text.check(file, read_bytes(file))
+        except MapError as error:
+            yield error
+    for paint in dict.fromkeys((*paints, *(overlay.file for overlay in read.overlays))):
+        if isinstance(paint, Path):
+            yield from _picture(paint)
+
+
+def _picture(file: Path) -> Iterator[InputError]:
+    pointer = _pointer(file)
+    yield from pointer
+    try:
+        problem = problem_of(read_bytes(file))
+    except MapError as error:
+        yield error
+    else:
+        if problem and not pointer:
+            yield InputError(file, problem, hint="save the picture again as PNG or JPEG")
+
+
+def _obstacles(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    file = map_file.find_map(path)
+    try:
+        found = list(map_file.unread_keys(Node.load(file)))
+    except MapError as error:
+        found = [error]
+    yield from found
+    if all(problem.is_slip for problem in found):
+        yield from _raised(path, lambda: map_file.read(path))
+
+
+def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.assets import truth_file
+
+    frames: truth_file.Frames = settings["truth-frames"]  # type: ignore[assignment]
+    try:
+        pictures = truth_file.read(path, frames)
+    except truth_file.TruthFileError as error:
+        if error.where != _BOXES:  # told by the rule on empty files
+            yield error
+        return
+    yield from truth_file.corners(path)
+    yield from truth_file.unread_keys(path)
+    labels = {label for boxes in pictures.values() for label, _ in boxes}
+    missing = [name for name in settings["classes"].split(",") if name and name not in labels]
+    known = truth_file.categories(path) if missing else ()
+    for name in missing:
+        if name in known:  # others are told by the rule on names
+            yield InputError(path, truth_file.no_box(name, labels), _BOXES)
+
+
+def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
+    field = settings["target-field"] or settings["field"]
+    if path.suffix != RECORDING:
+        from dodo_dsl.opendlv.assets import target_table
+
+        wrong = _table(path) or list(_raised(path, lambda: target_table.read(path, field)))
+        yield from wrong or target_table.misspelt(path, field)
+        return
+    message = settings["target-message"] or settings["message"]
+    sender = settings["target-sender"] or settings["sender"]
+    if message in ids and sender.isdecimal():
+        yield from _contents(path, ids[message], int(sender), message, is_needed=True)
+
+
+def _table(path: Path) -> list[InputError]:
+    """What is wrong with any table: services that read the same one tell it alike."""
+    pass
+
+    problem = problem_in_table(path)
+    return [] if problem is None else [problem]
+
+
+def _way_points(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.assets import trajectory
+    from dodo_dsl.opendlv.assets.trajectory import Trajectory
+
+    speed = float(settings["speed"] or 1)
+    yield from _table(path) or _raised(path, lambda: Trajectory(trajectory.read_table(path, 0.0), speed))
+
+
+def _car(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.assets import car
+
+    yield from _raised(path, lambda: car.read_car(path))
+
+
+def _recording(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
+    sender = settings["video-sender"] if settings["video"] == "true" else ""
+    wanted = (_IMAGE, int(sender)) if sender.isdecimal() else (-1, 0)
+    yield from _contents(path, *wanted, _IMAGE_NAME, is_needed=False)
+
+
+def _contents(path: Path, message: int, sender: int, name: str, *, is_needed: bool) -> Iterator[InputError]:
+    from dodo_dsl.opendlv.assets import recording_contents
+
+    return recording_contents.problems(path, message, sender, name, is_needed)
+
+
+def _pictures(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
+    if path.suffix == RECORDING:
+        yield from _recording(path, {"video": "", "video-sender": ""}, ids)
+    elif path.suffix.lower() in PICTURES:
+        yield from _picture(path)
+
+
+_FORMATS: Mapping[str, Format] = {
+    "map": _map,
+    "obstacles": _obstacles,
+    "truth": _truth,
+    "target": _target,
+    "way-points": _way_points,
+    "car": _car,
+    "recording": _recording,
+    "pictures": _pictures,
+}
+SETTINGS: Mapping[str, tuple[str, ...]] = {
+    "truth": ("truth-frames", "classes"),
+    "target": ("field", "message", "sender", "target-field", "target-message", "target-sender"),
+    "way-points": ("speed",),
+    "recording": ("video", "video-sender"),
+}
+"""The parameters that say how a file of a format is read."""
+HELP: Mapping[str, str] = {
+    "map": "docs/reference/maps.md has an example",
+    "obstacles": "docs/reference/maps.md has an example",
+    "truth": "services/object_detection/README.md says what a truth has",
+    "target": "services/continuous_signal/README.md says what a target has",
+    "way-points": "services/beacon/README.md says what a path has",
+    "car": "services/dynamic_model/README.md lists the parameters",
+}
+"""Where to read on, for problems without a hint of their own."""
+
+
+def _raised(path: Path, read: Callable[[], object]) -> Iterator[InputError]:
+    """What a reader raises, with the place that its sentence begins with."""
+    try:
+        read()
+    except InputError as error:
+        yield error
+    except ValueError as error:
+        found = re.match(re.escape(str(path)) + r"(?::(\d+))?(?::(\d+))?:? (.*)", str(error), re.DOTALL)
+        line, column, what = found.groups() if found else (None, None, str(error))
+        at = int(line or 0)
+        yield InputError(path, what, line=at, column=int(column or 0) or _column(path, at, what))
+
+
+def _column(path: Path, line: int, what: str) -> int:
+    """Where what a sentence quotes is in its line; the begin of the line where it quotes nothing."""
+    quoted = _QUOTED.search(what)
+    if not line or quoted is None:
+        return 1
+    try:
+        lines = regular_file.text(path, encoding="utf-8-sig").splitlines()
+    except (OSError, ValueError):
+        return 1
+    return lines[line - 1].find(quoted[1]) + 1 or 1 if line <= len(lines) else 1
+
+
+_TIME = "time"
+_LEAST = 2
+
+Row = tuple[int, str, list[str]]
+"""A line from 1, its text, and its cells."""
+
+
+def problem_in_table(path: Path) -> InputError | None:
+    """The first problem; None where each reader has to say what is wrong, and for what is no text."""
+    try:
+        rows = list(_rows(regular_file.text(path, encoding="utf-8-sig")))
+    except (OSError, ValueError, csv.Error):
+        return None
+    if not rows:
+        return InputError(path, "the table is empty, expected a header and rows", hint="for example 'time,x,y'")
+    line, text, header = rows[0]
+    if len(header) == 1 and ";" in text:
+        what = "semicolons between the columns, expected commas, and decimals with a point"
+        hint = "save the table anew with ',' between the columns and '.' in numbers"
+        return InputError(path, what, line=line, column=text.index(";") + 1, hint=hint)
+    if all(_is_number(cell) for cell in header):
+        return InputError(path, "the table has no header", line=line, column=1, hint="for example 'time,x,y'")
+    if len(rows) <= _LEAST:
+        what = f"expected at least {_LEAST} rows below the header, found {len(rows) - 1}"
+        return InputError(path, what, line=rows[-1][0], column=1, hint="save the whole table")
+    return _width(path, header, rows[1:]) or _times(path, header, rows[1:])
+
+
+def _rows(text: str) -> Iterator[Row]:
+    for line, written in enumerate(text.splitlines(), 1):
+        if written.strip() and not written.lstrip().startswith("#"):
+            yield line, written, [cell.strip() for cell in next(csv.reader([written], strict=True))]
+
+
+def _width(path: Path, header: Sequence[str], rows: Sequence[Row]) -> InputError | None:
+    for line, text, cells in rows:
+        if len(cells) != len(header):
+            what = f"{len(cells)} values, expected {len(header)}: {', '.join(header)}"
+            more = len(cells) > len(header) and ";" not in text
+            hint = "decimals have a point: 0.25, and not 0,25" if more else "write one value for each column"
+            return InputError(path, what, line=line, column=1, hint=hint)
+    return None
+
+
+def _times(path: Path, header: Sequence[str], rows: Sequence[Row]) -> InputError | None:
+    at = header.index(_TIME) if _TIME in header else -1
+    before: float | None = None
+    for line, text, cells in rows if at >= 0 else ():
+        if not _is_number(cells[at]):
+            return None
+        time = number(cells[at])
+        if before is not None and time <= before:
+            what = f"the time '{cells[at]}' is not after {before:g} s, the time of the row before"
+            column = text.find(cells[at]) + 1 if at == 0 else 1
+            return InputError(path, what, line=line, column=column, hint="times increase from row to row")
+        before = time
+    return None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        number(cell)
+    except ValueError:
+        return False
+    return True

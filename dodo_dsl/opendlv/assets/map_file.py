@@ -1,0 +1,312 @@
+"""An OpenDLV ``map.json``, checked; models and textures are not loaded yet."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, unread
+
+MAX_INSTANCES = 100_000
+MAX_BLOCKS = 500
+_TURN = 6.3
+"""rad"""
+MAX_OVERLAYS = 50
+"""Places of overlays, each of which takes the memory of a picture."""
+
+Vector3 = tuple[float, float, float]
+Paint = Vector3 | Path
+"""A colour as r, g, b from 0 to 1, or the file of a texture."""
+
+
+@dataclass(frozen=True)
+class Instance:
+    """Where a thing stands: its position in m, its OpenDLV angle in rad (0 is half a turn, then clockwise)."""
+
+    position: Vector3
+    angle: float
+
+
+@dataclass(frozen=True)
+class ModelEntry:
+    """An OBJ file, its paint, and where copies of it stand."""
+
+    name: str
+    file: Path
+    paint: Paint
+    instances: tuple[Instance, ...]
+
+
+@dataclass(frozen=True)
+class BlockEntry:
+    """A box, ``dimension`` in m and centred on each instance; ``tile`` is the size of its texture in m."""
+
+    name: str
+    dimension: Vector3
+    paint: Paint
+    tile: tuple[float, float] | None
+    instances: tuple[Instance, ...]
+
+
+@dataclass(frozen=True)
+class OverlayEntry:
+    """A picture laid over the camera's: its size and places (upper left corners) as fractions of that picture."""
+
+    name: str
+    file: Path
+    size: tuple[float, float]
+    places: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class MapFile:
+    """Everything to draw; things without instances are left out."""
+
+    path: Path
+    models: tuple[ModelEntry, ...]
+    blocks: tuple[BlockEntry, ...]
+    overlays: tuple[OverlayEntry, ...] = ()
+
+
+def _triple(node: Node, names: str) -> Vector3:
+    a, b, c = node.numbers(names)
+    return a, b, c
+
+
+def _colour(node: Node) -> Vector3:
+    colour = _triple(node, "r g b")
+    if not all(0.0 <= part <= 1.0 for part in colour):
+        node.fail("the numbers [r, g, b] between 0 and 1")
+    return colour
+
+
+def _paint(node: Node) -> Paint:
+    texture, colour = node.member("textureFile"), node.member("color")
+    if texture is not None:
+        return texture.resource()
+    return _colour(colour) if colour is not None else node.lacks("'color' or 'textureFile'")
+
+
+def _instances(node: Node) -> tuple[Instance, ...]:
+    rows = [item.numbers("x y z angle") for item in node.items("instances")]
+    return tuple(Instance((x, y, z), angle) for x, y, z, angle in rows)
+
+
+def _model(node: Node) -> ModelEntry | None:
+    instances = _instances(node)
+    if not instances:
+        return None
+    file = node.required("file").resource()
+    return ModelEntry(node.required("name").text(), file, _paint(node), instances)
+
+
+def _positive(node: Node, names: str) -> tuple[float, ...]:
+    numbers = node.numbers(names)
+    if min(numbers) <= 0.0:
+        node.fail(f"the numbers [{', '.join(names.split())}], all greater than 0")
+    return numbers
+
+
+def _block(node: Node) -> BlockEntry | None:
+    instances = _instances(node)
+    if not instances:
+        return None
+    width, depth, height = _positive(node.required("dimension"), "x y z")
+    size = node.member("textureSize")
+    tile = None
+    if size is not None:
+        along, up = _positive(size, "width height")
+        tile = (along, up)
+    dimension = (width, depth, height)
+    return BlockEntry(node.required("name").text(), dimension, _paint(node), tile, instances)
+
+
+def _overlay(node: Node) -> OverlayEntry | None:
+    rows = [item.numbers(_names(item, "x y")) for item in node.items("instances")]
+    if not rows:
+        return None
+    wide, high = _positive(node.required("dimension"), "width height")
+    if max(wide, high) > 1.0:
+        node.required("dimension").fail("the numbers [width, height], fractions of the picture up to 1")
+    file = node.required("textureFile").resource()
+    places = tuple((row[0], row[1]) for row in rows)
+    return OverlayEntry(node.required("name").text(), file, (wide, high), places)
+
+
+def _names(item: Node, names: str) -> str:
+    """OpenDLV reads the first two numbers of an overlay's place; maps often write four as elsewhere."""
+    return "x y z angle" if isinstance(item.value, list) and len(item.value) == 4 else names
+
+
+def find_map(path: Path) -> Path:
+    """The ``map.json`` of a map given as its folder or as the file itself."""
+    return path / "map.json" if path.is_dir() else path
+
+
+def read_map(path: Path) -> MapFile:
+    """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
+    file = find_map(path)
+    return _collected(file, Node.load(file), _raised)
+
+
+def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
+    """What can be drawn of a map, None for what is no map, and all that is wrong with it."""
+    file, found = find_map(path), list[MapError]()
+    try:
+        root = Node.load(file)
+        read = _collected(file, root, found.append)
+    except MapError as error:
+        return None, [error]
+    found.extend(unread_keys(root))
+    found.extend(_without_effect(root))
+    found.extend(_degrees(read, root))
+    return read, found
+
+
+def unread_keys(root: Node) -> Iterator[MapError]:
+    """Keys of a map that nothing reads; errors where those of an obstacle are meant."""
+    yield from unread([root], _KEYS, ("obstacles",))
+    for key, known in _KEYS.items():
+        yield from unread(_listed(root, key), known, known if key == "obstacles" else ())
+
+
+def _without_effect(root: Node) -> Iterator[MapError]:
+    """Keys of the format that change nothing in a picture, each once."""
+    models, blocks = list(_listed(root, "model")), list(_listed(root, "block"))
+    if moving := [model for model in models if _has(model, "frames")]:
+        yield of_keys(moving, "frames", "a model at the frame of a vehicle is not drawn yet", _NOT_YET)
+    for entries in (models, blocks):
+        if both := [entry for entry in entries if _has(entry, "color") and _has(entry, "textureFile")]:
+            yield of_keys(both, "color", "'color' is not used beside 'textureFile'", "remove one of them")
+    if sizes := [block for block in blocks if _has(block, "textureSize") and not _has(block, "textureFile")]:
+        yield of_keys(sizes, "textureSize", "'textureSize' is not used without 'textureFile'", "remove it")
+
+
+def _listed(root: Node, key: str) -> Iterator[Node]:
+    """The entries of a list; none where it is no list, which is told elsewhere."""
+    value = root.value.get(key) if isinstance(root.value, dict) else None
+    yield from root.items(key) if isinstance(value, list) else ()
+
+
+def _has(entry: Node, key: str) -> bool:
+    return isinstance(entry.value, dict) and key in entry.value
+
+
+def _degrees(read: MapFile, root: Node) -> Iterator[MapError]:
+    """The first angle of more than a turn, which is hardly in radians."""
+    for key in ("model", "block"):
+        for item in _listed(root, key):
+            rows = item.value.get("instances") if isinstance(item.value, dict) else None
+            for index, row in enumerate(rows if isinstance(rows, list) else ()):
+                angle = row[3] if isinstance(row, list) and len(row) == 4 else 0
+                if isinstance(angle, int | float) and _TURN < abs(angle) <= MAX_NUMBER:
+                    place = f"{item.place}.instances[{index}][3]"
+                    what = f"the angle {angle:g} is more than a turn, expected radians"
+                    hint = f"{angle:g} degrees are {math.radians(angle):.5g} rad"
+                    yield MapError(read.path, what, place, hint=hint, is_slip=True)
+                    return
+
+
+_KEYS = {
+    "model": ("name", "file", "color", "textureFile", "instances", "frames"),
+    "block": ("name", "dimension", "color", "textureFile", "textureSize", "instances"),
+    "overlay": ("name", "dimension", "textureFile", "instances"),
+    "obstacles": ("name", "lines"),
+}
+"""What OpenDLV's maps have in each list."""
+_NOT_YET = "give it 'instances', where it stands still"
+Entry = TypeVar("Entry")
+Report = Callable[[MapError], None]
+
+
+def _raised(error: MapError) -> None:
+    raise error
+
+
+def _collected(file: Path, root: Node, report: Report) -> MapFile:
+    root.member("model")
+    models = _entries(root, "model", _model, report)
+    blocks = _entries(root, "block", _block, report)
+    overlays = _entries(root, "overlay", _overlay, report)
+    for key, count, limit in (
+        ("model", sum(len(m.instances) for m in models), MAX_INSTANCES),
+        ("block", sum(len(b.instances) for b in blocks), MAX_BLOCKS),
+        ("overlay", sum(len(o.places) for o in overlays), MAX_OVERLAYS),
+    ):
+        if count > limit:
+            report(MapError(file, f"{count} instances of {key}s, expected at most {limit}", f"$.{key}"))
+    return MapFile(file, models, blocks, overlays)
+
+
+def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report: Report) -> tuple[Entry, ...]:
+    """The entries of a list that can be read; the others are reported."""
+    found: list[Entry] = []
+    try:
+        for item in root.items(key):
+            try:
+                entry = read(item)
+            except MapError as error:
+                report(error)
+            else:
+                found.extend([] if entry is None else [entry])
+    except MapError as error:
+        report(error)
+    return tuple(found)
+
+
+Line = tuple[tuple[float, float], tuple[float, float]]
+NUMBERS = 4
+FARTHEST = 1e300
+MAX_LINES = 10_000
+"""Of all obstacles of a map, to each of which evaluators measure the distance."""
+
+
+def read(path: Path) -> dict[str, list[Line]]:
+    """The lines of each obstacle of the map in a folder (its `map.json`) or of the map file itself, in metres.
+
+    Obstacles of one name are one. Raises MapError.
+    """
+    file = path if path.suffix == ".json" else path / "map.json"
+    root = Node.load(file)
+    require_few_lines(root)
+    found: dict[str, list[Line]] = {}
+    for entry in root.items("obstacles"):
+        name, lines = _named_lines(entry)
+        found.setdefault(name, []).extend(lines)
+    return found
+
+
+def require_few_lines(root: Node) -> None:
+    """Raises MapError for more lines than a map may have."""
+    lines = [o.value.get("lines") for o in root.items("obstacles") if isinstance(o.value, dict)]
+    if (count := sum(len(each) for each in lines if isinstance(each, list))) > MAX_LINES:
+        what = f"{count} lines of obstacles, expected at most {MAX_LINES}"
+        raise MapError(root.file, what, "$.obstacles", hint="write long lines in the place of many short ones")
+
+
+def _named_lines(entry: Node) -> tuple[str, list[Line]]:
+    value = entry.value
+    if not isinstance(value, dict) or not isinstance(value.get("name"), str) or not value["name"].strip():
+        raise MapError(entry.file, "expected an object with a name", entry.place)
+    if value["name"] != value["name"].strip():
+        what = f"the name '{value['name']}' has blanks around it, with which a test does not find it"
+        raise MapError(entry.file, what, f"{entry.place}.name", hint=f'write "{value["name"].strip()}"')
+    lines, place = value.get("lines"), f"{entry.place}.lines"
+    if not isinstance(lines, list) or not lines:
+        raise MapError(entry.file, "expected a list of lines [x1, y1, x2, y2]", place)
+    if not isinstance(lines[0], list):
+        return value["name"], [_line(Node(entry.file, place, lines))]
+    return value["name"], [_line(Node(entry.file, f"{place}[{index}]", line)) for index, line in enumerate(lines)]
+
+
+def _line(node: Node) -> Line:
+    numbers = node.value if isinstance(node.value, list) else []
+    if len(numbers) != NUMBERS or not all(_is_number(value) for value in numbers):
+        raise MapError(node.file, "expected four numbers [x1, y1, x2, y2] in metres", node.place)
+    x1, y1, x2, y2 = (float(value) for value in numbers)
+    return (x1, y1), (x2, y2)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < FARTHEST

@@ -1,0 +1,178 @@
+"""What a recording holds, as far as a test needs it: looked for without an index, and only until it is found."""
+
+import functools
+import io
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError, body_length
+from dodo_dsl.opendlv.assets.problem import InputError
+from dodo_dsl.opendlv.wire import first_message, first_number, unzigzag
+
+MOST_BYTES = 64 << 20
+"""Of a recording that is looked through."""
+SMALL_BYTES = 16 << 20
+"""Of a recording that is looked through even when what is needed has been found: it may be cut."""
+_BUFFER = 1 << 16
+_TYPE_FIELD, _STAMP_FIELD = 1, 6
+_TIMES = (5, 4, 3)
+"""Fields of when a message was sampled, received and sent."""
+_FIRST, _OWN = 13, 2900
+"""Ids below are of tools, and a hundred from here on are DoDo's: their times are not those of a drive."""
+_DAY = 86_400_000_000
+_HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder write it"
+
+
+@dataclass
+class LookedThrough:
+    """The senders of one message, up to the one that is looked for.
+
+    ``ends_at`` is the byte behind the last whole message that was looked at; ``is_whole`` says that no
+    other follows, as far as was looked.
+    """
+
+    size: int
+    count: int = 0
+    ends_at: int = 0
+    is_whole: bool = False
+    senders: set[int] = field(default_factory=set)
+
+
+def look(path: Path, message: int, sender: int) -> LookedThrough:
+    """Looks for a message of a sender, from the begin to the first bytes that are no message; raises OSError."""
+    with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
+        found = LookedThrough(os.fstat(stream.fileno()).st_size)
+        for body in _bodies(stream, found):
+            if _type(body) == message:
+                found.senders.add(first_number(body, _STAMP_FIELD))
+                if sender in found.senders:
+                    found.is_whole = found.size > SMALL_BYTES or _end(stream.read()) + found.ends_at == found.size
+                    return found
+    return found
+
+
+def _end(data: bytes) -> int:
+    """Where the first bytes are that are no whole frame."""
+    at = 0
+    while data[at : at + 2] == MAGIC and at + HEADER_BYTES <= len(data):
+        behind = at + HEADER_BYTES + body_length(data[at : at + HEADER_BYTES])
+        if behind > len(data):
+            break
+        at = behind
+    return at
+
+
+def problems(path: Path, message: int, sender: int, name: str, is_needed: bool) -> Iterator[InputError]:
+    """What is wrong with a recording, of which a message of a sender is used.
+
+    Without ``is_needed`` there may be none, but then of no other sender either.
+    """
+    try:
+        found = look(path, message, sender)
+        if not found.size:
+            yield InputError(path, "the recording is empty: there is nothing to play", hint=_HINT)
+            return
+        if not found.is_whole:
+            if found.ends_at >= MOST_BYTES or found.size > MOST_BYTES:
+                return
+            yield from _read_by_index(path, message, found)
+    except OSError as error:
+        yield InputError(path, f"cannot be read as a recording: {error.strerror}")
+        return
+    if found.count and found.size <= SMALL_BYTES and (fault := _fault(path, path.stat().st_mtime_ns)):
+        yield InputError(
+            path, f"the recording cannot be played: {fault}", hint="'dodo rec cut' writes a part without it"
+        )
+    others = ", ".join(map(str, sorted(found.senders)))
+    if found.count and sender not in found.senders and (others or is_needed):
+        but = f", but of {others}" if others else ""
+        yield InputError(
+            path, f"the recording has no {name} of sender {sender}{but}", hint="'dodo rec info' shows them"
+        )
+
+
+@functools.lru_cache(maxsize=64)
+def _fault(path: Path, _changed_ns: int) -> str:
+    """What is wrong with the times of messages; the libraries for that are loaded only where something may be."""
+    try:
+        with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
+            if not _is_doubtful(_bodies(stream, LookedThrough(0))):
+                return ""
+        from dodo_dsl.opendlv import recording_times
+        from dodo_dsl.opendlv.recording import Recording, RecordingError
+
+        with Recording(path) as recording:
+            types = recording.index["data_type"]
+            return recording_times.fault(recording, ((types < _OWN) | (types >= _OWN + 100)).nonzero()[0])
+    except (OSError, RecordingError):
+        return ""  # told where it is read
+
+
+def _is_doubtful(bodies: Iterator[bytes]) -> bool:
+    """Whether a message has no time, a body that was there, or a time before another of the same message and sender."""
+    last: dict[tuple[int, int], tuple[int, bytes]] = {}
+    low, high = 1 << 63, 0
+    for body in bodies:
+        id_ = _type(body)
+        if id_ < _FIRST or _OWN <= id_ < _OWN + 100:
+            continue
+        time = next((time for number in _TIMES if (time := _time(body, number))), 0)
+        key = id_, first_number(body, _STAMP_FIELD)
+        before, other = last.get(key, (0, b""))
+        if not time or time < before or body == other:
+            return True
+        last[key] = time, body
+        low, high = min(low, time), max(high, time)
+    return high - low > _DAY
+
+
+def _time(body: bytes, wanted: int) -> int:
+    """A time of an envelope in us."""
+    time = first_message(body, wanted)
+    return first_number(time, 1) * 1_000_000 + first_number(time, 2)
+
+
+def _read_by_index(path: Path, message: int, found: LookedThrough) -> Iterator[InputError]:
+    """What services make of a recording with damage; the libraries for that are loaded here only."""
+    from dodo_dsl.opendlv.recording import Recording, RecordingError
+
+    try:
+        with Recording(path) as recording:
+            rows = recording.rows(messages=[message])
+            found.senders.update(recording.index["sender_stamp"][rows].tolist())
+            found.count, damage = len(recording), recording.damage
+    except RecordingError:
+        found.count = 0
+        yield InputError(path, f"not a recording: its {found.size} bytes hold no message", hint=_HINT)
+    else:
+        if damage:
+            what = f"the recording has damage, which is passed over: {damage.places[0]}"
+            yield InputError(path, what, hint="'dodo rec cut' writes a part without it", is_slip=True)
+
+
+def _bodies(stream: BinaryIO, found: LookedThrough) -> Iterator[bytes]:
+    """The encoded envelopes from the begin to the first that is not whole."""
+    while found.ends_at < MOST_BYTES:
+        header = stream.read(HEADER_BYTES)
+        if not header:
+            found.is_whole = True
+            return
+        try:
+            length = body_length(header)
+        except FrameError:
+            return
+        body = stream.read(length)
+        if len(body) < length:
+            return
+        found.count += 1
+        found.ends_at += HEADER_BYTES + length
+        yield body
+
+
+def _type(body: bytes) -> int:
+    """The id."""
+    return unzigzag(first_number(body, _TYPE_FIELD))

@@ -1,0 +1,233 @@
+"""A trajectory through points: where a vehicle is at a time, its heading and its velocity.
+
+World: metres, z up, heading counter-clockwise from the x axis. Between two way points position and heading change
+evenly, the heading by the shorter way round (at exactly half a turn: to the left).
+"""
+
+import bisect
+import csv
+import difflib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.numbers import number
+
+
+class TrajectoryError(ValueError):
+    """Way points that make no trajectory; one sentence with their place."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A way point as written: ``place`` is where, x, y, z in m, ``yaw`` in rad and ``time`` in s where known."""
+
+    place: str
+    x: float
+    y: float
+    z: float = 0.0
+    yaw: float | None = None
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class TrajectoryPose:
+    """Where the vehicle is: m and rad in the world, and its velocity there in m/s and rad/s."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_rate: float = 0.0
+
+    @property
+    def body_velocity(self) -> tuple[float, float, float]:
+        """The velocity along the vehicle's own axes, forward, left and up (m/s)."""
+        (vx, vy, vz), c, s = self.velocity, math.cos(self.yaw), math.sin(self.yaw)
+        return c * vx + s * vy, c * vy - s * vx, vz
+
+
+@dataclass(frozen=True)
+class _Knot:
+    time: float
+    x: float
+    y: float
+    z: float
+    yaw: float
+
+
+class Trajectory:
+    """Poses over time, from two way points or more.
+
+    Before the first point's time the vehicle stands there. After the last point's it stands there, or drives on as
+    between the last two where the trajectory is ``endless``.
+    """
+
+    def __init__(self, points: Sequence[Point], speed: float, endless: bool = False) -> None:
+        """``speed`` (m/s) makes the times where the points have none; raises TrajectoryError."""
+        if len(points) < 2:
+            place = f"{points[0].place}: " if points else ""
+            raise TrajectoryError(f"{place}expected two way points or more")
+        yaws = [p.yaw for p in points]
+        turned = [y for y in yaws if y is not None] if None not in yaws else headings(points)
+        timed = _timed(points) if points[0].time is not None else _at_speed(points, speed)
+        self._knots = [_Knot(t, p.x, p.y, p.z, yaw) for t, p, yaw in zip(timed, points, turned, strict=True)]
+        self._times = timed
+        self.duration = math.inf if endless else timed[-1]
+
+    def at(self, time: float) -> TrajectoryPose:
+        """The pose ``time`` seconds after the start; the velocity at a way point is the one from there on."""
+        index = min(bisect.bisect_right(self._times, time), len(self._knots) - 1)
+        a, b = self._knots[max(index - 1, 0)], self._knots[max(index, 1)]
+        if time < a.time:
+            return _standing(a)
+        if time >= b.time and time >= self.duration:
+            return _standing(b)
+        return _between(a, b, time)
+
+
+def wrapped(angle: float) -> float:
+    """The same angle above -pi and up to pi."""
+    turned = math.remainder(angle, math.tau)
+    return math.pi if turned == -math.pi else turned
+
+
+def headings(points: Sequence[Point]) -> list[float]:
+    """The heading (rad) at each point of a vehicle that looks where it goes.
+
+    It is half-way between the directions of the parts before and after the point. Raises TrajectoryError when all
+    points are at one place.
+    """
+    parts = [math.atan2(b.y - a.y, b.x - a.x) if (a.x, a.y) != (b.x, b.y) else None for a, b in pairwise(points)]
+    known = next((part for part in parts if part is not None), None)
+    if known is None:
+        raise TrajectoryError(f"{points[-1].place}: all way points are at one place: give a yaw")
+    directions = []
+    for part in parts:  # standing still it looks as before
+        known = known if part is None else part
+        directions.append(known)
+    inner = [a + wrapped(b - a) / 2 for a, b in pairwise(directions)]
+    return [directions[0], *inner, directions[-1]]
+
+
+def _timed(points: Sequence[Point]) -> list[float]:
+    times = [p.time for p in points if p.time is not None]
+    if times[0] < 0:
+        raise TrajectoryError(f"{points[0].place}: time: {times[0]:g} is before the start")
+    for before, now, point in zip(times, times[1:], points[1:], strict=False):
+        if now <= before:
+            raise TrajectoryError(f"{point.place}: time: {now:g} is not after {before:g}, the time of the point before")
+    return times
+
+
+def _at_speed(points: Sequence[Point], speed: float) -> list[float]:
+    times = [0.0]
+    for a, b in pairwise(points):
+        length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
+        if length == 0:
+            raise TrajectoryError(f"{b.place}: the same place as the point before: give times instead of a speed")
+        times.append(times[-1] + length / speed)
+    return times
+
+
+def _between(a: _Knot, b: _Knot, time: float) -> TrajectoryPose:
+    took, turn = b.time - a.time, wrapped(b.yaw - a.yaw)
+    share = (time - a.time) / took
+    x, y, z = (p + share * (q - p) for p, q in ((a.x, b.x), (a.y, b.y), (a.z, b.z)))
+    velocity = ((b.x - a.x) / took, (b.y - a.y) / took, (b.z - a.z) / took)
+    return TrajectoryPose(x, y, z, wrapped(a.yaw + share * turn), velocity, turn / took)
+
+
+def _standing(knot: _Knot) -> TrajectoryPose:
+    return TrajectoryPose(knot.x, knot.y, knot.z, wrapped(knot.yaw))
+
+
+def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Trajectory:
+    """A straight trajectory from a place along ``yaw`` (rad), without end where it has no ``length`` (m)."""
+    begin = Point("the start", x, y, z, yaw)
+    reach = length or 1.0
+    end = replace(begin, x=x + reach * math.cos(yaw), y=y + reach * math.sin(yaw))
+    return Trajectory([begin, end], speed, endless=length is None)
+
+
+NEEDED, POSSIBLE = ("x", "y"), ("x", "y", "z", "yaw", "time")
+
+
+def read_table(path: Path, height: float) -> list[Point]:
+    """The way points of a CSV file with a header; ``height`` (m) counts where there is no column z.
+
+    Columns x, y and z in m, yaw in rad, time in s; other columns are ignored, as are blank lines and those that begin
+    with #. Raises TrajectoryError with file and line.
+    """
+    try:
+        text = regular_file.text(path, encoding="utf-8-sig")
+    except OSError as error:
+        raise TrajectoryError(f"{path} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise TrajectoryError(f"{path} is not UTF-8 text, expected a table with the columns x and y") from None
+    lines = [(f"{path}:{number}", line) for number, line in enumerate(text.splitlines(), 1)]
+    rows = [(place, _cells(place, line)) for place, line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if not rows:
+        raise TrajectoryError(f"{path} is empty, expected a header with the columns x and y, and way points")
+    columns = _columns(*rows[0])
+    return [_point(place, columns, cells, height) for place, cells in rows[1:]]
+
+
+def read_points(texts: Iterable[str], height: float) -> list[Point]:
+    """Way points written as ``x y``, in m, at ``height``; raises TrajectoryError."""
+    return [_written(text, height) for text in texts]
+
+
+def _cells(place: str, line: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], strict=True))]
+    except csv.Error as error:
+        raise TrajectoryError(f"{place}: {error}") from None
+
+
+def _columns(place: str, cells: Sequence[str]) -> list[str]:
+    for name in cells:
+        close = difflib.get_close_matches(name.lower(), POSSIBLE, 1, cutoff=0.75)
+        if close and name not in POSSIBLE:
+            raise TrajectoryError(f"{place}: unknown column '{name}', did you mean '{close[0]}'?")
+        if name in POSSIBLE and cells.count(name) > 1:
+            raise TrajectoryError(f"{place}: the column '{name}' appears twice")
+    missing = [name for name in NEEDED if name not in cells]
+    if missing:
+        raise TrajectoryError(f"{place}: the column '{missing[0]}' is missing")
+    return list(cells)
+
+
+def _point(place: str, columns: Sequence[str], cells: Sequence[str], height: float) -> Point:
+    if len(cells) != len(columns):
+        raise TrajectoryError(f"{place}: {len(cells)} values, expected {len(columns)}: {', '.join(columns)}")
+    values = {
+        name: _number(f"{place}: {name}", text) for name, text in zip(columns, cells, strict=True) if name in POSSIBLE
+    }
+    return _from(place, values, height)
+
+
+def _written(text: str, height: float) -> Point:
+    words = text.split()
+    if len(words) != len(NEEDED):
+        raise TrajectoryError(f"the point '{text}' has {len(words)} numbers, expected x and y in m, such as '2 0.5'")
+    place = f"the point '{text}'"
+    return _from(place, {name: _number(place, word) for name, word in zip(NEEDED, words, strict=True)}, height)
+
+
+def _from(place: str, values: Mapping[str, float], height: float) -> Point:
+    return Point(place, values["x"], values["y"], values.get("z", height), values.get("yaw"), values.get("time"))
+
+
+def _number(what: str, text: str) -> float:
+    try:
+        value = number(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise TrajectoryError(f"{what}: '{text}' is not a finite number")
+    return value

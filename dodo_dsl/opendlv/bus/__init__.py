@@ -1,1 +1,0 @@
-"""The bus: sessions, envelopes, and the kernel's filter for them."""

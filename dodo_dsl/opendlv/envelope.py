@@ -1,0 +1,145 @@
+"""The frame in which libcluon sends and records a message: ``0D A4``, the length in 3 bytes, an Envelope.
+
+All times are microseconds since the epoch; on the wire they are seconds and microseconds, both truncated
+toward zero, so both are negative before 1970.
+"""
+
+from typing import Any, NamedTuple
+
+from google.protobuf.message import DecodeError
+
+from dodo_dsl.opendlv import odvd, wire
+from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError, body_length
+from dodo_dsl.opendlv.protobuf_classes import Layout, build
+
+__all__ = [
+    "HEADER_BYTES",
+    "MAGIC",
+    "Envelope",
+    "FrameError",
+    "body_length",
+    "decode_body",
+    "decode_frame",
+    "decode_parts",
+    "encode_body",
+    "encode_frame",
+]
+
+MAX_BODY_BYTES = 2**24 - 1
+MICROSECONDS = 1_000_000
+
+
+class Envelope(NamedTuple):
+    """A message on its way: ``data_type`` is its id, ``payload`` its encoding.
+
+    ``sent``, ``received`` and ``sample_time`` are microseconds since the epoch; ``sender_stamp`` tells senders of the
+    same message apart.
+    """
+
+    data_type: int
+    payload: bytes
+    sent: int
+    received: int
+    sample_time: int
+    sender_stamp: int
+
+
+def _envelope_layout() -> Layout:
+    definitions = odvd.parse(
+        """
+        message cluon.data.TimeStamp [id = 12] { int32 seconds; int32 microseconds; }
+        message cluon.data.Envelope [id = 1] {
+          int32 dataType; bytes serializedData;
+          cluon.data.TimeStamp sent; cluon.data.TimeStamp received; cluon.data.TimeStamp sampleTimeStamp;
+          uint32 senderStamp;
+        }"""
+    )
+    return build(definitions)["cluon.data.Envelope"]
+
+
+_LAYOUT = _envelope_layout()
+_TYPE: Any = _LAYOUT.type
+
+
+def encode_frame(envelope: Envelope) -> bytes:
+    """The frame of an envelope; raises FrameError where a number or the payload is too large."""
+    body = encode_body(envelope)
+    if len(body) > MAX_BODY_BYTES:
+        raise FrameError(f"an envelope of {len(body)} bytes is larger than a frame, {MAX_BODY_BYTES} bytes")
+    return MAGIC + len(body).to_bytes(3, "little") + body
+
+
+def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
+    """The envelope of a frame, ``received`` at a time of its own or the one given. Raises FrameError.
+
+    Bytes after the frame are ignored, as libcluon does.
+    """
+    end = HEADER_BYTES + body_length(frame)
+    if len(frame) < end:
+        raise FrameError(f"the frame has {len(frame)} bytes of {end}")
+    return decode_body(frame[HEADER_BYTES:end], received)
+
+
+def encode_body(envelope: Envelope) -> bytes:
+    """The envelope without the header; raises FrameError for a number that does not fit."""
+    data_type, payload, sent, received, sample_time, sender_stamp = envelope
+    proto = _TYPE()
+    try:
+        proto.dataType = data_type
+        proto.serializedData = payload
+        _put_time(proto.sent, sent)
+        _put_time(proto.received, received)
+        _put_time(proto.sampleTimeStamp, sample_time)
+        proto.senderStamp = sender_stamp
+    except ValueError as error:
+        raise FrameError(f"the envelope cannot be encoded: {error}") from None
+    body: bytes = proto.SerializeToString()
+    return body
+
+
+def decode_body(body: bytes, received: int | None = None) -> Envelope:
+    """The envelope in the bytes after a header; raises FrameError.
+
+    Fields come in any order, the first of equal ones counts, absent ones are zero.
+    """
+    proto = _parsed(body)
+    sent, sample_time = proto.sent, proto.sampleTimeStamp
+    if received is None:
+        received = proto.received.seconds * MICROSECONDS + proto.received.microseconds
+    return Envelope(
+        proto.dataType,
+        proto.serializedData,
+        sent.seconds * MICROSECONDS + sent.microseconds,
+        received,
+        sample_time.seconds * MICROSECONDS + sample_time.microseconds,
+        proto.senderStamp,
+    )
+
+
+def decode_parts(body: bytes) -> tuple[int, bytes, list[int], int]:
+    """The fields of an encoded envelope: id, payload, six numbers, sender stamp; raises FrameError.
+
+    The numbers are seconds and microseconds of sent, received and sample time.
+    """
+    proto = _parsed(body)
+    times = (proto.sent, proto.received, proto.sampleTimeStamp)
+    numbers = [number for time in times for number in (time.seconds, time.microseconds)]
+    return proto.dataType, proto.serializedData, numbers, proto.senderStamp
+
+
+def _parsed(body: bytes) -> Any:
+    try:
+        proto = _TYPE.FromString(body)
+        if proto.ByteSize() != len(body):
+            proto = _TYPE.FromString(wire.keep_first(body, _LAYOUT.shape))
+    except (DecodeError, wire.WireError) as error:
+        raise FrameError(f"the frame holds no envelope: {error}") from None
+    return proto
+
+
+def _put_time(stamp: Any, time: int) -> None:
+    if time >= 0:
+        stamp.seconds, stamp.microseconds = divmod(time, MICROSECONDS)
+    else:
+        seconds, microseconds = divmod(-time, MICROSECONDS)
+        stamp.seconds, stamp.microseconds = -seconds, -microseconds

@@ -1,0 +1,144 @@
+"""Frames of a recording as a table of numbers: a column of 64 bits for each fact, a row a frame.
+
+Frames as libcluon writes them are read thousands at once; others one by one, with the same result.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dodo_dsl.opendlv import message_columns, wire
+from dodo_dsl.opendlv.envelope import HEADER_BYTES, MAGIC, FrameError, decode_body, decode_parts, encode_body
+from dodo_dsl.opendlv.message_columns import Marks, Numbers
+
+PADDING = bytes(128)  # what a reader of the last frame may look at beyond it
+FEW = 16
+_MAX_BODY = 1 << 25
+_MAX_UINT32 = 1 << 32
+
+
+class Fact(IntEnum):
+    """The columns; positions are in the data at hand, sizes in bytes, times as in the file."""
+
+    START = 0
+    END = 1
+    DATA_TYPE = 2
+    PAYLOAD = 3
+    PAYLOAD_END = 4
+    SENT_S = 5
+    SENT_US = 6
+    RECEIVED_S = 7
+    RECEIVED_US = 8
+    SAMPLED_S = 9
+    SAMPLED_US = 10
+    SENDER_STAMP = 11
+
+
+Table = NDArray[np.int64]  # (len(Fact), frames)
+
+_TIMES = ((0x1A, Fact.SENT_S), (0x22, Fact.RECEIVED_S), (0x2A, Fact.SAMPLED_S))
+
+
+def empty() -> Table:
+    return np.zeros((len(Fact), 0), np.int64)
+
+
+def read_frames(data: bytes, starts: list[int], ends: list[int], known: bool = False) -> Table:
+    """The rows of frames up to the first that holds no envelope; ``data`` ends with PADDING.
+
+    ``known`` frames were read before and are not checked again.
+    """
+    if len(starts) < FEW:
+        rows = _one_by_one(data, starts, ends, known)
+        return np.array(rows, np.int64).T if rows else empty()
+    table, usual = _at_once(data, np.array(starts, np.int64), np.array(ends, np.int64))
+    for row in np.flatnonzero(~usual).tolist():
+        found = _one_by_one(data, starts[row : row + 1], ends[row : row + 1], known)
+        if not found:
+            return table[:, :row]
+        table[:, row] = found[0]
+    return table
+
+
+def _one_by_one(data: bytes, starts: list[int], ends: list[int], known: bool) -> list[tuple[int, ...]]:
+    """Rows up to the first frame that holds no envelope."""
+    rows = []
+    for start, end in zip(starts, ends, strict=True):
+        if not _begins_well(data, start + HEADER_BYTES, end):
+            break
+        try:
+            kind, payload, times, stamp = decode_parts(data[start + HEADER_BYTES : end])
+        except FrameError:
+            break
+        if not known and _is_doubtful(data, start, end):
+            break
+        at = data.find(payload, start + HEADER_BYTES, end)
+        rows.append((start, end, kind, at, at + len(payload), *times, stamp))
+    return rows
+
+
+def _at_once(data: bytes, starts: Numbers, ends: Numbers) -> tuple[Table, Marks]:
+    """All rows, and which of them are as libcluon writes them: every field once and in order."""
+    source, octets = message_columns.fixed_words(data), np.frombuffer(data, np.uint8)
+    table = np.empty((len(Fact), len(starts)), np.int64)
+    table[Fact.START], table[Fact.END] = starts, ends
+    at = starts + HEADER_BYTES
+    usual = octets[at] == 0x08
+    kind, length = message_columns.read_varints(source, at + 1)
+    usual &= (length > 0) & (kind < _MAX_UINT32)
+    table[Fact.DATA_TYPE] = message_columns.signed_varints(kind)
+    at = at + 1 + length
+    usual &= octets[at] == 0x12
+    size, length = message_columns.read_varints(source, at + 1)
+    usual &= (length > 0) & (size < _MAX_BODY)
+    table[Fact.PAYLOAD] = at + 1 + length
+    at = np.minimum(at + 1 + length + np.minimum(size, _MAX_BODY), ends)
+    table[Fact.PAYLOAD_END] = at
+    for tag, fact in _TIMES:
+        inner_end = at + 2 + octets[at + 1]
+        usual &= (octets[at] == tag) & (octets[at + 2] == 0x08)
+        seconds, length = message_columns.read_varints(source, at + 3)
+        at = at + 3 + length
+        usual &= (length > 0) & (seconds < _MAX_UINT32) & (octets[at] == 0x10)
+        micros, length = message_columns.read_varints(source, at + 1)
+        at = at + 1 + length
+        usual &= (length > 0) & (micros < _MAX_UINT32) & (at == inner_end)
+        table[fact], table[fact + 1] = message_columns.signed_varints(seconds), message_columns.signed_varints(micros)
+    usual &= octets[at] == 0x30
+    stamp, length = message_columns.read_varints(source, at + 1)
+    usual &= (length > 0) & (stamp < _MAX_UINT32) & (at + 1 + length == ends)
+    table[Fact.SENDER_STAMP] = stamp
+    return table, usual
+
+
+def _is_doubtful(data: bytes, start: int, end: int) -> bool:
+    """Whether a frame was cut and took bytes of the next ones, which happen to make an envelope with its own.
+
+    Such a one has a header inside, none behind it, and is not as libcluon writes it.
+    """
+    if end + len(PADDING) >= len(data) or data.startswith(MAGIC, end) or data.find(MAGIC, start + 1, end) < 0:
+        return False
+    body = data[start + HEADER_BYTES : end]
+    return encode_body(decode_body(body)) != body
+
+
+def _begins_well(data: bytes, at: int, end: int) -> bool:
+    """Whether the first fields are within bounds: a false header may claim 16 MiB, and those are not copied."""
+    body = memoryview(data)[:end]
+    try:
+        for _ in range(FEW):
+            if at >= end:
+                return at == end
+            key, at = wire.read_varint(body, at)
+            wire_type = key & 7
+            if key < 8 or wire_type in (3, 4, 6, 7):
+                return False
+            if wire_type in (wire.VARINT, wire.DELIMITED):
+                value, at = wire.read_varint(body, at)
+                at += value if wire_type == wire.DELIMITED else 0
+            else:
+                at += 8 if wire_type == wire.EIGHT_BYTES else 4
+    except wire.WireError:
+        return False
+    return at <= end

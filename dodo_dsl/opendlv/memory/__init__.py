@@ -1,1 +1,0 @@
-"""Shared memory in both of libcluon's modes, and the pixel formats of frames in it."""

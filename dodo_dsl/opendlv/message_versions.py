@@ -1,0 +1,61 @@
+"""Which message set a recording was made with: 0.9 and 1.0 give some ids other meanings."""
+
+from functools import cache
+from pathlib import Path
+
+from dodo_dsl.opendlv import message_columns, odvd
+from dodo_dsl.opendlv.frame_table import Fact
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageSet, besides, shipped
+from dodo_dsl.opendlv.odvd import STANDARD_0_9, Definition
+from dodo_dsl.opendlv.recording import Recording
+
+OLD, NEW = "0.9", "1.0"
+
+TELLING = (1001, 1003, 1017, 1021, 1118, 1119, *range(1128, 1137), 1180, 1181)
+"""Ids that mean something else in the other set or nothing at all, as a payload shows."""
+_LOOKS = 500  # messages of each id that are looked at
+
+
+def load(version: str, *own: Path) -> MessageSet:
+    """The messages of set 0.9 or 1.0 and those of the files, which replace them; raises OdvdError.
+
+    Either set also has what only the other has, as far as names and ids are free.
+    """
+    return MessageSet.load(*own, standard=_standard(version)) if own else _set(version)
+
+
+def version_of(recording: Recording) -> str:
+    """The set that more of the telling messages fit in their fields; 1.0 where none tells.
+
+    ImageReading does not count: real applications of set 1.0 leave its last field out.
+    """
+    old, new = load(OLD), MessageSet.standard()
+    fits_old = fits_new = 0
+    for id_ in TELLING:
+        rows = recording.rows(messages=[id_])[:_LOOKS]
+        fits_old += _fitting(recording, old, id_, rows)
+        fits_new += _fitting(recording, new, id_, rows)
+    return OLD if fits_old > fits_new else NEW
+
+
+def _fitting(recording: Recording, messages: MessageSet, id_: int, rows: Numbers) -> int:
+    if id_ not in messages.ids():
+        return 0
+    count = 0
+    for batch in recording.batches(rows):
+        starts, ends = batch.table[Fact.PAYLOAD], batch.table[Fact.PAYLOAD_END]
+        count += int(message_columns.usual_rows(messages.layout(id_), batch.data, starts, ends).sum())
+    return count
+
+
+@cache
+def _set(version: str) -> MessageSet:
+    return MessageSet.load(standard=_standard(version))
+
+
+@cache
+def _standard(version: str) -> tuple[Definition, ...]:
+    old, new = odvd.load(STANDARD_0_9), shipped()
+    first, second = (old, new) if version == OLD else (new, old)
+    return (*first, *besides(first, second))

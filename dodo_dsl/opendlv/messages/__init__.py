@@ -1,1 +1,0 @@
-"""Messages by name and id, and their encodings."""

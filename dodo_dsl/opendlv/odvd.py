@@ -1,0 +1,296 @@
+"""Parser of message specifications (``.odvd``), the language of libcluon's ``cluon-msc``.
+
+    package a.b;                                  // optional
+    message Name [id = 1] {
+      uint8 level [default = 6, id = 1];
+    }
+
+Fields without an id are counted from 1 in their order. An error names file, line and column.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+from dodo_dsl.opendlv import regular_file
+
+
+class OdvdError(ValueError):
+    """A specification that cannot be used; the text begins with ``file:line:column``."""
+
+
+class TextPlace(NamedTuple):
+    """A place in a file; line and column count from 1."""
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+_TOKEN = re.compile(
+    r"""(?P<space>[ \t\r\n]+|//[^\n]*|/\*.*?\*/)
+      | (?P<name>[A-Za-z][A-Za-z0-9_]*(?:\.[A-Za-z][A-Za-z0-9_]*)*)
+      | (?P<number>[+-]?[0-9]+(?:\.[0-9]*)?)
+      | "(?P<string>[^"]*)"
+      | '(?P<char>[^'])'
+      | (?P<sign>[\[\]{};=,])""",
+    re.VERBOSE | re.DOTALL,
+)
+
+
+class Token(NamedTuple):
+    kind: str
+    text: str
+    place: TextPlace
+
+    def __str__(self) -> str:
+        return "the end of the file" if self.kind == "end" else f"'{self.text}'"
+
+
+def tokens(text: str, file: str) -> Iterator[Token]:
+    position, line, line_start = 0, 1, 0
+    while position < len(text):
+        match = _TOKEN.match(text, position)
+        if match is None:
+            place = TextPlace(file, line, position - line_start + 1)
+            raise OdvdError(f"{place}: '{text[position]}' is not allowed here")
+        kind = match.lastgroup or ""
+        if kind != "space":
+            yield Token(kind, match[kind], TextPlace(file, line, position - line_start + 1))
+        if newlines := match[0].count("\n"):
+            line += newlines
+            line_start = match.start() + match[0].rindex("\n") + 1
+        position = match.end()
+    yield Token("end", "", TextPlace(file, line, position - line_start + 1))
+
+
+INTEGER_BITS = {
+    "char": 8,
+    "uint8": 8,
+    "int8": 8,
+    "uint16": 16,
+    "int16": 16,
+    "uint32": 32,
+    "int32": 32,
+    "uint64": 64,
+    "int64": 64,
+}
+SCALARS = frozenset(INTEGER_BITS) | {"bool", "float", "double", "string", "bytes"}
+
+Default = bool | int | float | str | None
+
+
+def integer_range(type_: str) -> range:
+    """The values that an integer type holds; a ``char`` is 0 to 255."""
+    bits = INTEGER_BITS[type_]
+    return range(-(2 ** (bits - 1)), 2 ** (bits - 1)) if type_.startswith("int") else range(2**bits)
+
+
+def default_of(type_: str, token: Token) -> Default:
+    value = _value(type_, token)
+    if value is None:
+        raise OdvdError(f"{token.place}: {token} is not a default for a field of type '{type_}'")
+    return value
+
+
+def _value(type_: str, token: Token) -> Default:
+    if type_ == "bool":
+        return {"true": True, "false": False}.get(token.text) if token.kind == "name" else None
+    if type_ in ("float", "double"):
+        return float(token.text) if token.kind == "number" else None
+    if type_ in ("string", "bytes"):
+        return token.text if token.kind == "string" else None
+    if type_ == "char" and token.kind == "char":
+        return ord(token.text) if ord(token.text) in integer_range(type_) else None
+    if type_ in INTEGER_BITS and token.kind == "number" and re.fullmatch(r"[+-]?[0-9]{1,20}", token.text):
+        return int(token.text) if int(token.text) in integer_range(type_) else None
+    return None
+
+
+__all__ = ["Definition", "Field", "OdvdError", "TextPlace", "load", "parse"]
+
+MAX_FILE_BYTES = 1_000_000
+MAX_FIELD_NUMBER = 2**29 - 1
+RESERVED_NUMBERS = range(19_000, 20_000)  # kept by protobuf for itself
+MAX_MESSAGE_ID = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field: ``type`` is a scalar's name, or the message's as it was written."""
+
+    name: str
+    type: str
+    number: int
+    default: Default
+    place: TextPlace
+
+
+@dataclass(frozen=True)
+class Definition:
+    """One message: full name, identifier, and fields in the order of the file."""
+
+    name: str
+    id: int
+    package: str
+    fields: tuple[Field, ...]
+    place: TextPlace
+
+    def same_layout(self, other: "Definition") -> bool:
+        """Whether both describe the same name, id and fields, wherever they are defined."""
+        return self._layout() == other._layout()
+
+    def _layout(self) -> tuple[object, ...]:
+        return (self.name, self.id, [(f.name, f.type, f.number, f.default) for f in self.fields])
+
+
+def load(path: Path) -> tuple[Definition, ...]:
+    """Read and parse one file; raises OdvdError."""
+    try:
+        text = regular_file.text(path, MAX_FILE_BYTES)
+    except OSError as error:
+        raise OdvdError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise OdvdError(f"{path}: not UTF-8 text") from None
+    return parse(text, str(path))
+
+
+def parse(text: str, file: str = "<odvd>") -> tuple[Definition, ...]:
+    """The messages of a specification in their order; raises OdvdError."""
+    return _Parser(text, file).messages()
+
+
+class _Parser:
+    def __init__(self, text: str, file: str) -> None:
+        self._stream = tokens(text, file)
+        self._token = next(self._stream)
+
+    def messages(self) -> tuple[Definition, ...]:
+        package = ""
+        if self._token.text == "package" and self._token.kind == "name":
+            self._next()
+            package = self._expect("name", "the package's name").text
+            self._sign(";")
+        found: list[Definition] = []
+        used = _Used("message")
+        while self._token.kind != "end":
+            message = self._message(package)
+            used.add(message.place, name=message.name, id=message.id)
+            found.append(message)
+        return tuple(found)
+
+    def _message(self, package: str) -> Definition:
+        if self._token.text != "message" or self._token.kind != "name":
+            self._fail("'message'")
+        self._next()
+        name = self._expect("name", "the message's name")
+        self._sign("[")
+        id_ = self._identifier(MAX_MESSAGE_ID)
+        self._optional(",")
+        self._sign("]")
+        self._sign("{")
+        fields: list[Field] = []
+        used = _Used("field")
+        counted = 0
+        while not self._optional("}"):
+            entry, counted = self._field(counted)
+            used.add(entry.place, name=entry.name, id=entry.number)
+            fields.append(entry)
+        full_name = f"{package}.{name.text}" if package else name.text
+        return Definition(full_name, id_, package, tuple(fields), name.place)
+
+    def _field(self, counted: int) -> tuple[Field, int]:
+        type_ = self._expect("name", "a field's type or '}'")
+        name = self._expect("name", "the field's name")
+        if "." in name.text:
+            raise OdvdError(f"{name.place}: the field name '{name.text}' has a dot, expected a simple name")
+        options = self._options(type_.text)
+        self._sign(";")
+        if options.number is None:
+            counted += 1
+        number = options.number or counted
+        if number in RESERVED_NUMBERS:
+            raise OdvdError(f"{name.place}: field ids 19000 to 19999 are reserved by protobuf")
+        return Field(name.text, type_.text, number, options.default, name.place), counted
+
+    def _options(self, type_: str) -> "_Options":
+        number: int | None = None
+        default: Default = None
+        if not self._optional("["):
+            return _Options(None, None)
+        while not self._optional("]"):
+            if self._token.text == "default" and self._token.kind == "name":
+                self._next()
+                self._sign("=")
+                default = default_of(type_, self._token)
+                self._next()
+            else:
+                number = self._identifier(MAX_FIELD_NUMBER)
+            self._optional(",")
+        return _Options(number, default)
+
+    def _identifier(self, maximum: int) -> int:
+        if self._token.text != "id" or self._token.kind != "name":
+            self._fail("'id'")
+        self._next()
+        self._sign("=")
+        token = self._expect("number", "a number")
+        if not re.fullmatch(r"[1-9][0-9]*", token.text) or int(token.text[:11]) > maximum:
+            raise OdvdError(f"{token.place}: expected an id, a whole number from 1 to {maximum}, found '{token.text}'")
+        return int(token.text)
+
+    def _next(self) -> None:
+        self._token = next(self._stream, self._token)
+
+    def _expect(self, kind: str, what: str) -> Token:
+        token = self._token
+        if token.kind != kind:
+            self._fail(what)
+        self._next()
+        return token
+
+    def _sign(self, sign: str) -> None:
+        if not self._optional(sign):
+            self._fail(f"'{sign}'")
+
+    def _optional(self, sign: str) -> bool:
+        if self._token.kind != "sign" or self._token.text != sign:
+            return False
+        self._next()
+        return True
+
+    def _fail(self, expected: str) -> NoReturn:
+        raise OdvdError(f"{self._token.place}: expected {expected}, found {self._token}")
+
+
+@dataclass(frozen=True)
+class _Options:
+    number: int | None
+    default: Default
+
+
+@dataclass(frozen=True)
+class _Used:
+    """Names and ids seen so far, to refuse the second use."""
+
+    what: str
+    places: dict[tuple[str, str | int], TextPlace] = field(default_factory=dict)
+
+    def add(self, place: TextPlace, **keys: str | int) -> None:
+        for key, value in keys.items():
+            earlier = self.places.setdefault((key, value), place)
+            if earlier is not place:
+                raise OdvdError(
+                    f"{place}: the {key} '{value}' of this {self.what} is already used at line {earlier.line}"
+                )
+
+
+STANDARD = Path(__file__).with_name("messages.odvd")
+"""The messages of OpenDLV's standard set 1.0, of libcluon and of DoDo."""
+STANDARD_0_9 = Path(__file__).with_name("messages-0.9.odvd")
+"""What set 0.9 means by ids that 1.0 uses otherwise."""

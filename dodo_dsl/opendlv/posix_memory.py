@@ -1,0 +1,249 @@
+"""One shared memory in libcluon's POSIX mode: an object of shm_open whose first bytes hold size, mutex, condition.
+
+The time stamp of the content is the object's own time of modification. Nothing lies in /tmp.
+"""
+
+import ctypes
+import errno
+import fcntl
+import math
+import mmap
+import os
+import platform
+import re
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Self
+
+from dodo_dsl.opendlv.sysv_memory import MAX_NAME, Result, SharedMemoryError
+
+CLOCK_MONOTONIC = 1
+_MUTEX_BYTES = 48 if platform.machine() == "aarch64" else 40
+_CONDITION_BYTES = 48
+MUTEX_AT = 8
+CONDITION_AT = MUTEX_AT + _MUTEX_BYTES
+HEADER_BYTES = CONDITION_AT + _CONDITION_BYTES
+_SHARED, _ROBUST = 1, 1
+_PATIENCE = 1.0
+
+_libc = ctypes.CDLL(None)
+_NEW_LAYOUT = tuple(map(int, re.findall(r"\d+", platform.libc_ver()[1])[:2])) >= (2, 41)
+_REFERENCES_AT = 16  # in the condition: two counts of woken waiters
+_WAITERS_AT = 28 if _NEW_LAYOUT else 36
+
+
+class _Time(ctypes.Structure):
+    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+
+
+class Header:
+    """The first bytes of a shared memory: its size, the mutex, the condition; raises OSError where a call fails."""
+
+    def __init__(self, memory: object) -> None:
+        self._bytes = (ctypes.c_ubyte * HEADER_BYTES).from_buffer(memory)  # type: ignore[arg-type]
+        address = ctypes.addressof(self._bytes)
+        self._mutex, self._condition = ctypes.c_void_p(address + MUTEX_AT), ctypes.c_void_p(address + CONDITION_AT)
+        self._size = ctypes.c_uint32.from_buffer(self._bytes)
+        self._numbers = (ctypes.c_uint32 * (_CONDITION_BYTES // 4)).from_buffer(self._bytes, CONDITION_AT)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the data behind the header."""
+        return self._size.value
+
+    def make(self, size: int) -> None:
+        """Set up a new memory."""
+        attributes = ctypes.create_string_buffer(64)
+        _call("pthread_mutexattr_init", attributes)
+        _call("pthread_mutexattr_setpshared", attributes, _SHARED)
+        _call("pthread_mutexattr_setrobust", attributes, _ROBUST)
+        _call("pthread_mutex_init", self._mutex, attributes)
+        _call("pthread_condattr_init", attributes)
+        _call("pthread_condattr_setclock", attributes, CLOCK_MONOTONIC)
+        _call("pthread_condattr_setpshared", attributes, _SHARED)
+        _call("pthread_cond_init", self._condition, attributes)
+        self._size.value = size
+
+    def lock(self, timeout: float) -> bool:
+        """Take the mutex; False when ``timeout`` seconds are over."""
+        code = _libc.pthread_mutex_clocklock(self._mutex, CLOCK_MONOTONIC, ctypes.byref(_deadline(timeout)))
+        return self._taken(code)
+
+    def unlock(self) -> None:
+        """Let go of the mutex."""
+        _call("pthread_mutex_unlock", self._mutex)
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for a notification with the mutex held; False when ``timeout`` seconds are over."""
+        until = ctypes.byref(_deadline(timeout))
+        return self._taken(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
+
+    def notify_all(self) -> None:
+        """Wake all that wait; raises TimeoutError where that would block as a waiter was killed.
+
+        Before 2.41, glibc counts those that were woken before and waits for them to leave; a killed one never does.
+        """
+        patience = time.monotonic() + _PATIENCE
+        while self._leaving():
+            if time.monotonic() > patience:
+                raise TimeoutError(errno.ETIMEDOUT, "a waiter was killed")
+            time.sleep(0.0005)
+        _call("pthread_cond_broadcast", self._condition)
+
+    def waiters(self) -> int:
+        """How many wait at this moment."""
+        return int(self._numbers[_WAITERS_AT // 4]) >> 3  # glibc counts by eights
+
+    def _leaving(self) -> int:
+        """How many that were woken before have not left yet (glibc's __g_refs by the lowest bit of __wseq)."""
+        if _NEW_LAYOUT:
+            return 0
+        first = self._numbers[0] & 1 ^ 1
+        return int(self._numbers[_REFERENCES_AT // 4 + first]) >> 1
+
+    def _taken(self, code: int) -> bool:
+        if code == errno.EOWNERDEAD:
+            _call("pthread_mutex_consistent", self._mutex)
+            return True
+        if code not in (0, errno.ETIMEDOUT):
+            raise OSError(code, os.strerror(code))
+        return code == 0
+
+
+def _call(name: str, *arguments: object) -> None:
+    code = getattr(_libc, name)(*arguments)
+    if code:
+        raise OSError(code, f"{name}: {os.strerror(code)}")
+
+
+def _deadline(seconds: float) -> _Time:
+    at = time.monotonic_ns() + round(max(0.0, seconds) * 1e9)
+    return _Time(*divmod(at, 1_000_000_000))
+
+
+FOLDER = Path("/dev/shm")  # where the C library's shm_open keeps its objects
+_SLICE = 0.1  # seconds
+MODE = 0o666
+"""Whatever the umask: the application, another user, takes its lock."""
+_FLAGS = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+def path_of(name: str) -> Path:
+    """The object's file: ``foo`` and ``/foo`` are the same; raises SharedMemoryError."""
+    short = name.removeprefix("/")
+    if not short or "/" in short or "\0" in short or short in (".", ".."):
+        raise SharedMemoryError(f"'{name}' is not a name of POSIX shared memory")
+    if len(short) >= MAX_NAME:
+        raise SharedMemoryError(f"the name of shared memory '{name[:40]}...' is longer than {MAX_NAME} characters")
+    return FOLDER / short
+
+
+class PosixSegment:
+    """The object at ``path``; ``token`` is its descriptor."""
+
+    def __init__(self, path: Path, token: int, memory: mmap.mmap, header: Header) -> None:
+        self.path, self.token, self.size = path, token, header.size
+        self._memory, self._header = memory, header
+
+    @classmethod
+    def create(cls, path: Path, size: int) -> Self:
+        """Make it anew; what a dead creator left is removed. Raises SharedMemoryError."""
+        try:
+            _remove_orphan(path)
+            token = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, MODE)
+        except SharedMemoryError:
+            raise
+        except OSError as error:
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {path}: {error.strerror}") from None
+        try:
+            os.fchmod(token, MODE)
+            fcntl.flock(token, fcntl.LOCK_SH | fcntl.LOCK_NB)  # tells other creators that we live
+            os.posix_fallocate(token, 0, HEADER_BYTES + size)  # a full memory is an error now, not a SIGBUS later
+            memory = mmap.mmap(token, HEADER_BYTES + size)
+            header = Header(memory)
+            header.make(size)
+        except OSError as error:
+            path.unlink(missing_ok=True)
+            os.close(token)
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {error.strerror}") from None
+        return cls(path, token, memory, header)
+
+    @classmethod
+    def attach(cls, path: Path) -> Self:
+        """Find what another process made; raises SharedMemoryError."""
+        try:
+            token = os.open(path, _FLAGS)
+        except OSError as error:
+            raise SharedMemoryError(f"shared memory '{path.name}' does not exist: {path}: {error.strerror}") from None
+        whole = os.fstat(token).st_size
+        if whole > HEADER_BYTES:
+            memory = mmap.mmap(token, whole)
+            header = Header(memory)
+            if 0 < header.size <= whole - HEADER_BYTES:
+                return cls(path, token, memory, header)
+        os.close(token)
+        raise SharedMemoryError(f"shared memory '{path.name}' has no content (yet): {path} has {whole} bytes")
+
+    def view(self) -> memoryview:
+        """A view of the data, which keeps the memory mapped."""
+        return memoryview(self._memory)[HEADER_BYTES : HEADER_BYTES + self.size]
+
+    def lock(self, timeout: float) -> Result:
+        """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError where it is broken."""
+        return Result.DONE if self._header.lock(timeout) else Result.TIMEOUT
+
+    def unlock(self) -> None:
+        self._header.unlock()
+
+    def wait(self, timeout: float | None) -> Result:
+        """Wait for a notification; raises OSError when the creator has removed the memory.
+
+        Python looks for signals, and whether the memory is still there, ten times a second.
+        """
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        while True:
+            left = min(_SLICE, end - time.monotonic())
+            done = self._header.lock(left) and self._waited(min(_SLICE, end - time.monotonic()))
+            if os.fstat(self.token).st_nlink == 0:
+                raise FileNotFoundError
+            if done or time.monotonic() >= end:
+                return Result.DONE if done else Result.TIMEOUT
+
+    def _waited(self, timeout: float) -> bool:
+        try:
+            return self._header.wait(timeout)
+        finally:
+            self._header.unlock()
+
+    def wake(self) -> None:
+        """Wake all that wait; raises TimeoutError where one of them was killed."""
+        self._header.notify_all()
+
+    def readers_waiting(self) -> int:
+        return self._header.waiters()
+
+    def close(self) -> None:
+        """Forget the object; its memory lives as long as the views of it."""
+        os.close(self.token)
+
+    def remove(self) -> None:
+        """Take the object away where it is still the same one, and wake all that wait."""
+        with suppress(FileNotFoundError):
+            if os.path.samestat(self.path.stat(), os.fstat(self.token)):
+                self.path.unlink()
+        with suppress(TimeoutError):
+            self.wake()
+
+
+def _remove_orphan(path: Path) -> None:
+    """Remove an object that no living creator of ours holds; libcluon's creators cannot be seen, and are replaced."""
+    with suppress(FileNotFoundError):
+        token = os.open(path, _FLAGS)
+        try:
+            fcntl.flock(token, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            path.unlink()
+        except BlockingIOError:
+            raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: a living process uses it") from None
+        finally:
+            os.close(token)

@@ -1,0 +1,120 @@
+"""Times of a recording that cannot be right: they would put messages where none belongs, and judge by that."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dodo_dsl.opendlv.message_columns import Marks, Numbers
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import Recording
+
+DAY = 86_400_000_000
+IMAGE = 1055
+MOST_BACK = 1_000_000
+"""Microseconds that a message may lie before the one before it of the same sender; pictures must be in order."""
+TOOLS = range(1, 13)
+"""Ids of messages of players and recorders, whose times are those of the tool."""
+_SECONDS = ((365.25 * 86_400, "years"), (86_400, "days"), (60, "minutes"), (0, ""))
+
+
+def together(times: Numbers) -> Marks:
+    """Which times in us are of the largest group without a gap of a day; the earliest of such groups."""
+    if not len(times) or times.max() - times.min() <= DAY:
+        return np.ones(len(times), np.bool_)
+    ordered = np.sort(times)
+    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > DAY) + 1)
+    largest = max(groups, key=len)
+    within: Marks = (times >= largest[0]) & (times <= largest[-1])
+    return within
+
+
+def within(recording: Recording, rows: Numbers) -> Numbers:
+    """The times of rows in us; those of tools lie at the begin or end of the others where they are outside."""
+    times: Numbers = recording.index["time"][rows]
+    others = times[~np.isin(recording.index["data_type"][rows], list(TOOLS))]
+    return np.clip(times, others.min(), others.max()) if len(others) else times
+
+
+def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:
+    """What is wrong with the times of rows, in a sentence with the first of them; empty where they may be right.
+
+    ``time`` counts: the sample time, or where that is zero when the message was received, or else sent. With
+    ``in_order`` those of a message and sender must not go back, nor a message repeat.
+    """
+    rows = rows[~np.isin(recording.index["data_type"][rows], list(TOOLS))]
+    times = recording.index["time"][rows]
+    if len(missing := rows[times == 0]):
+        return f"{_some(recording, missing, len(rows))} no time at all"
+    if len(apart := rows[~together(times)]):
+        others = rows[together(times)]
+        return f"{_some(recording, apart, len(rows))} times that lie {_distance(recording, apart, others)} the others'"
+    parts = streams(recording.index, rows) if in_order else ()
+    return next((text for part in parts if (text := _disorder(recording, part))), "")
+
+
+def repeated(recording: Recording, rows: Numbers) -> str:
+    """Which message is in the file twice, byte for byte, with the same times; empty where none is."""
+    index = recording.index[rows]
+    keys = np.stack([index[name].astype(np.int64) for name in ("data_type", "sender_stamp", "time", "size")])
+    order = np.lexsort(keys[::-1])
+    alike = np.all(keys[:, order][:, 1:] == keys[:, order][:, :-1], axis=0)
+    members = np.zeros(len(rows), np.bool_)
+    members[order[1:][alike]] = members[order[:-1][alike]] = True
+    seen: dict[bytes, int] = {}
+    for batch_row, frame in zip(rows[members].tolist(), _frames(recording, rows[members]), strict=True):
+        if (first := seen.setdefault(frame, batch_row)) != batch_row:
+            return f"{place(recording, batch_row)} is there twice, as message {first + 1:,} already"
+    return ""
+
+
+def _frames(recording: Recording, rows: Numbers) -> Iterator[bytes]:
+    for batch in recording.batches(rows):
+        yield from batch.frames()
+
+
+def _disorder(recording: Recording, rows: Numbers) -> str:
+    """A step back in the times of one message and sender; small ones come of the way to the recorder."""
+    times = recording.index["time"][rows]
+    least = 0 if recording.index["data_type"][rows[0]] == IMAGE else MOST_BACK
+    back = np.flatnonzero(np.diff(times) < -least)
+    if not len(back):
+        return repeated(recording, rows)
+    row, steps = int(rows[back[0] + 1]), len(back)
+    size = span(float(times[back[0]] - times[back[0] + 1]) / 1e6)
+    more = f", and so do {steps - 1:,} others" if steps > 1 else ""
+    return f"{place(recording, row)} goes back in time, by {size}{more}"
+
+
+def streams(index: NDArray[np.void], rows: Numbers) -> Iterator[Numbers]:
+    """The rows of each message and sender stamp, in their order."""
+    keys = index["data_type"][rows].astype(np.int64) << 32 | index["sender_stamp"][rows]
+    order = np.argsort(keys, kind="stable")
+    cuts = np.flatnonzero(np.diff(keys[order])) + 1
+    yield from (rows[part] for part in np.split(order, cuts) if len(part))
+
+
+def span(seconds: float) -> str:
+    """A duration in a unit that suits it."""
+    size, unit = next((size, unit) for size, unit in _SECONDS if seconds >= 2 * size)
+    return f"{seconds / size:,.0f} {unit}" if size else f"{seconds:.6g} s"
+
+
+def place(recording: Recording, row: int) -> str:
+    """Where a message is in its file."""
+    entry, known = recording.index[row], MessageSet.standard()
+    id_ = int(entry["data_type"])
+    name = known.name(id_) if id_ in known.ids() else str(id_)
+    return f"message {row + 1:,} ({name}/{entry['sender_stamp']}, at byte {entry['offset']:,})"
+
+
+def _some(recording: Recording, rows: Numbers, of: int) -> str:
+    has = "has" if len(rows) == 1 else "have"
+    first = f"the first is {place(recording, int(rows[0]))}"
+    return f"{len(rows):,} of {of:,} messages, {first}, {has}"
+
+
+def _distance(recording: Recording, rows: Numbers, others: Numbers) -> str:
+    first, near = int(recording.index["time"][rows[0]]), recording.index["time"][others]
+    low, high = int(near.min()), int(near.max())
+    return f"{span((low - first) / 1e6)} before" if first < low else f"{span((first - high) / 1e6)} after"

@@ -1,0 +1,66 @@
+"""Writing recordings so that whatever ends the writer, the file holds all frames written so far."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+
+_MOST_BYTES = 1 << 20
+
+
+class RecordingWriter:
+    """A new ``.rec`` file; a context manager. Nothing is held back in the process.
+
+    Each call appends whole frames with one write of the kernel; what a full disk cut off is taken back. Raises
+    FileExistsError for a file that is there, OSError where none can be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.frames = 0
+        self.size = 0
+        self._file = path.open("xb", buffering=0)
+
+    def write(self, envelope: Envelope) -> None:
+        """Appends an envelope unchanged; raises FrameError where it fits in none, OSError when the disk is full."""
+        self.write_frames((encode_frame(envelope),))
+
+    def write_frames(self, frames: Iterable[bytes]) -> None:
+        """Append encoded frames, up to a mebibyte with one write; raises OSError as ``write`` does."""
+        pending: list[bytes] = []
+        size = 0
+        for frame in frames:
+            pending.append(frame)
+            size += len(frame)
+            if size >= _MOST_BYTES:
+                self._append(pending)
+                pending, size = [], 0
+        if pending:
+            self._append(pending)
+
+    def close(self) -> None:
+        """End the recording."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _append(self, frames: list[bytes]) -> None:
+        data = b"".join(frames)
+        left = memoryview(data)
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError:
+            self._file.truncate(self.size)
+            self._file.seek(self.size)
+            raise
+        self.size += len(data)
+        self.frames += len(frames)

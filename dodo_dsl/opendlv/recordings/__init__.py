@@ -1,1 +1,0 @@
-"""Recordings (``.rec``): read, indexed, written."""

@@ -1,0 +1,370 @@
+"""A session on the bus: UDP multicast as libcluon's OD4Session speaks it, without threads."""
+
+import contextlib
+import ctypes
+import errno
+import itertools
+import select
+import socket
+import struct
+import time
+from collections.abc import Iterable, Iterator
+from types import TracebackType
+from typing import Self
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv import wire
+from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, group
+from dodo_dsl.opendlv.envelope import Envelope, FrameError, decode_frame, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.wire import varint, zigzag
+
+_SO_ATTACH_FILTER = 26  # Linux: asm-generic/socket.h
+_LOAD = {1: 0x30, 2: 0x28, 4: 0x20}  # BPF_LD | BPF_ABS, a byte, two or four
+_SOURCE_PORT, _SOURCE_HOST = 0, 0xFFF0_0000 + 12  # in the UDP header; behind SKF_NET_OFF, in the IP header
+_IF_EQUAL, _RETURN = 0x15, 0x06
+_ALL, _NOTHING = 0xFFFFFFFF, 0
+_UDP_HEADER, _FRAME_HEADER = 8, 5
+_TAG = _UDP_HEADER + _FRAME_HEADER
+_FILTERED_TAG = 0x08  # the envelope's first field
+_INSTRUCTION = struct.Struct("@HBBI")
+_MOST = 4096
+
+Instruction = tuple[int, int, int, int]
+
+
+def attach_filter(
+    receiver: socket.socket, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = ()
+) -> bool:
+    """Passes only messages with these ids, and datagrams that do not begin with an id; False where the kernel cannot.
+
+    Messages with ids ``of_others`` pass unless they come from addresses in ``than``. Dropped datagrams count as lost in
+    the kernel's counter of the socket.
+    """
+    program = [*_program(ids, of_others, than)]
+    if len(program) > _MOST:
+        return False
+    code = ctypes.create_string_buffer(b"".join(_INSTRUCTION.pack(*each) for each in program))
+    try:
+        receiver.setsockopt(
+            socket.SOL_SOCKET, _SO_ATTACH_FILTER, struct.pack("@HP", len(program), ctypes.addressof(code))
+        )
+    except OSError:
+        return False
+    return True
+
+
+def _program(ids: Iterable[int], of_others: Iterable[int], than: Iterable[Address]) -> Iterator[Instruction]:
+    yield _LOAD[1], 0, 0, _TAG
+    yield _IF_EQUAL, 1, 0, _FILTERED_TAG
+    yield _RETURN, 0, 0, _ALL
+    for id_ in sorted(ids):
+        yield from _passing(varint(zigzag(id_)))
+    for host, port in sorted(than):
+        yield _LOAD[2], 0, 0, _SOURCE_PORT
+        yield _IF_EQUAL, 0, 3, port
+        yield _LOAD[4], 0, 0, _SOURCE_HOST
+        yield _IF_EQUAL, 0, 1, int.from_bytes(socket.inet_aton(host), "big")
+        yield _RETURN, 0, 0, _NOTHING
+    for id_ in sorted(of_others):
+        yield from _passing(varint(zigzag(id_)))
+    yield _RETURN, 0, 0, _NOTHING
+
+
+def _passing(encoded: bytes) -> Iterator[Instruction]:
+    """Return here when the bytes behind the tag are these, else go on behind."""
+    pieces = [encoded[start : start + 2] for start in range(0, len(encoded), 2)]
+    for number, piece in enumerate(pieces):
+        yield _LOAD[len(piece)], 0, 0, _TAG + 1 + 2 * number
+        yield _IF_EQUAL, 0, 2 * (len(pieces) - number) - 1, int.from_bytes(piece, "big")
+    yield _RETURN, 0, 0, _ALL
+
+
+MAX_DATAGRAM_BYTES = 65_507
+CIDS = range(1, 255)
+MAX_DROPPED = 1000  # before a flood of garbage can end a wait
+_NO_ROUTE = (errno.ENODEV, errno.ENETUNREACH)
+_ID_PLACE, _ID_TAG = 5, 0x08  # behind the frame's header, the envelope's first field
+_IP_MULTICAST_ALL = 49  # Linux: linux/in.h
+_SO_TIMESTAMPNS = 35  # Linux: asm-generic/socket.h
+_SO_RXQ_OVFL = 40
+_TIMESPEC = struct.Struct("@qq")
+_COUNT = struct.Struct("@I")
+_ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
+
+
+class SessionError(OSError):
+    """The bus cannot be joined or does not take a message."""
+
+
+class Session:
+    """One member of the group 225.0.0.<cid>; a context manager.
+
+    Datagrams of the session itself are dropped, as libcluon does. Bytes of others that are no frame are
+    counted in ``garbage``, and in ``lost`` the datagrams for which the receive buffer had no room. Raises SessionError
+    for a cid outside 1 to 254 and where there is no route for multicast.
+    """
+
+    def __init__(self, cid: int, messages: MessageSet | None = None) -> None:
+        if cid not in CIDS:
+            raise SessionError(f"a session's cid is 1 to 254, not {cid}")
+        self.cid = cid
+        self.messages = messages or MessageSet.standard()
+        self.garbage = 0
+        self.lost = 0
+        self.is_member = True
+        self._only: frozenset[int] | None = None
+        self.address: Address = ("", 0)
+        """Host and port from which this session's datagrams come."""
+        self.source: Address = ("", 0)
+        """Host and port from which the last datagram came."""
+        self.was_direct = False
+        """Whether the last datagram came to this session's own address, and not to the group."""
+        bus = group(cid)
+        try:
+            self._receiver = _receiver(bus)
+            self._sender, self.address = _sender(bus, self._receiver)
+        except OSError as error:
+            hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
+            raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
+        self._bus = bus
+        self.hears_directly = False
+        """Whether it receives what others send to its own address."""
+        self._pending: dict[socket.socket, Envelope] = {}
+        """In the order of arrival across both sockets: what one has while the other may have something older."""
+        self._sources: dict[socket.socket, Address] = {}
+        self._dropped: dict[socket.socket, int] = {}
+        self._buffer = bytearray(MAX_DATAGRAM_BYTES + 1)
+        self._view = memoryview(self._buffer)
+        self._poll = select.poll()
+        self._poll.register(self._receiver, select.POLLIN)
+
+    def send(self, message: Message, sample_time: int | None = None, sender_stamp: int = 0) -> bytes:
+        """Send a message sampled at ``sample_time`` (microseconds since the epoch; by default: now); returns the frame.
+
+        Raises MessageError, FrameError or SessionError.
+        """
+        now = time.time_ns() // 1000
+        sampled = now if sample_time is None else sample_time
+        id_, payload = self.messages.id(message), self.messages.encode(message)
+        return self.send_envelope(Envelope(id_, payload, now, 0, sampled, sender_stamp))
+
+    def send_envelope(self, envelope: Envelope) -> bytes:
+        """Sends an envelope unchanged and returns its frame; raises FrameError, and SessionError above 65,507 bytes."""
+        frame = _datagram(envelope)
+        try:
+            self._sender.sendto(frame, self._bus)
+        except OSError as error:
+            raise SessionError(f"the bus does not take a message: {error.strerror}") from None
+        return frame
+
+    def send_directly(self, envelope: Envelope, to: Iterable[Address]) -> bytes:
+        """As ``send_envelope``, but to the addresses of sessions alone: other members of the group do not hear it.
+
+        One that cannot be reached misses it.
+        """
+        frame = _datagram(envelope)
+        for address in to:
+            with contextlib.suppress(OSError):
+                self._sender.sendto(frame, address)
+        return frame
+
+    def receive(self, timeout: float | None = 0.0) -> Envelope | None:
+        """The next envelope of another member, with ``received`` set; None when ``timeout`` seconds are over.
+
+        ``None`` waits without end. A signal whose handler returns does not end the wait.
+        """
+        deadline = None if timeout is None else time.monotonic() + timeout
+        for dropped in itertools.count():
+            try:
+                envelope = self._next()
+            except BlockingIOError:
+                if not self._wait(deadline):
+                    return None
+            else:
+                if envelope is not None:
+                    return envelope
+            if dropped > MAX_DROPPED and deadline is not None and time.monotonic() > deadline:
+                return None
+        raise AssertionError
+
+    def fileno(self) -> int:
+        """The file descriptor to select on for reading."""
+        return self._receiver.fileno()
+
+    def hear_only(
+        self, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = frozenset()
+    ) -> None:
+        """Receive messages with ``ids`` from now on; where the kernel can, this process is not woken for others.
+
+        Those ``of_others`` come only from other addresses ``than`` these.
+        Losses are not counted any more, as the kernel counts the others with them.
+        """
+        passing, of_others, than = frozenset(ids), frozenset(of_others), frozenset(than)
+        self._only = passing | of_others
+        attach_filter(self._receiver, passing, of_others, than)
+
+    def hear_directly(self, hears: bool = True) -> None:
+        """Receive also what others send to this session's own ``address``, or no longer."""
+        if hears == self.hears_directly:
+            return
+        self.hears_directly = hears
+        if hears:
+            _as_receiver(self._sender)
+            self._poll.register(self._sender, select.POLLIN)
+        else:
+            self._poll.unregister(self._sender)
+            self._pending.pop(self._sender, None)
+
+    def deafen(self) -> None:
+        """Stops receiving, so that messages no longer wake this process; sending goes on."""
+        if self.is_member:
+            membership = _membership(group(self.cid)[0])
+            _set_if_known(self._receiver, socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
+            self._receiver.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)
+            self.is_member = False
+
+    @property
+    def port(self) -> int:
+        """From which this session's datagrams come."""
+        return self.address[1]
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._receiver.close()
+        self._sender.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _next(self) -> Envelope | None:
+        if not self.hears_directly and not self._pending:
+            self.was_direct = False
+            return self._take(self._receiver)
+        sources = (self._receiver, self._sender) if self.hears_directly else (self._receiver,)
+        for source in sources:
+            if source not in self._pending:
+                with contextlib.suppress(BlockingIOError):
+                    envelope = self._take(source)
+                    if envelope is None:
+                        return None  # what comes behind it may be older than what the other socket has
+                    self._pending[source], self._sources[source] = envelope, self.source
+        if not self._pending:
+            raise BlockingIOError
+        first = min(self._pending, key=lambda source: self._pending[source].received)
+        self.source, self.was_direct = self._sources[first], first is self._sender
+        return self._pending.pop(first)
+
+    def _take(self, receiver: socket.socket) -> Envelope | None:
+        size, ancillary, _, address = receiver.recvmsg_into([self._buffer], _ANCILLARY_BYTES, socket.MSG_DONTWAIT)
+        if len(ancillary) > 1 and self._only is None:
+            self._dropped[receiver] = _lost(ancillary)
+            self.lost = sum(self._dropped.values())
+        if address == self.address:
+            return None
+        if self._only is not None and self._buffer[_ID_PLACE] == _ID_TAG and _id(self._buffer) not in self._only:
+            return None
+        self.source = address
+        try:
+            return decode_frame(bytes(self._view[:size]), _received(ancillary))
+        except FrameError:
+            self.garbage += 1
+            return None
+
+    def _wait(self, deadline: float | None) -> bool:
+        if deadline is None:
+            return bool(self._poll.poll())
+        left = deadline - time.monotonic()
+        return left > 0 and bool(self._poll.poll(left * 1000))
+
+
+def _datagram(envelope: Envelope) -> bytes:
+    frame = encode_frame(envelope)
+    if len(frame) > MAX_DATAGRAM_BYTES:
+        raise SessionError(
+            f"message {envelope.data_type} needs {len(frame)} bytes of {MAX_DATAGRAM_BYTES} in a datagram"
+        )
+    return frame
+
+
+def _id(frame: bytearray) -> int:
+    """The id of the message in a frame that begins with it, 0 for damage."""
+    try:
+        return wire.unzigzag(wire.read_varint(frame, _ID_PLACE + 1)[0])
+    except wire.WireError:
+        return 0
+
+
+def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
+    """When the kernel took the datagram, else now; microseconds since the epoch."""
+    for _, kind, data in ancillary:
+        if kind == _SO_TIMESTAMPNS and len(data) == _TIMESPEC.size:
+            seconds, nanoseconds = _TIMESPEC.unpack(data)
+            return int(seconds) * 1_000_000 + int(nanoseconds) // 1000
+    return time.time_ns() // 1000
+
+
+def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
+    """The number of datagrams that the kernel has dropped so far."""
+    return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
+
+
+def _sender(bus: Address, receiver: socket.socket) -> tuple[socket.socket, Address]:
+    """Time to live 1, loop on; with the address that its datagrams carry.
+
+    It has its port at all addresses of this machine: were it connected, another program could have the same port at
+    another address, and put the first one into its datagrams (``IP_PKTINFO``).
+    """
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        sender.bind(("", 0))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect(bus)
+            host = str(probe.getsockname()[0])
+    except OSError:
+        receiver.close()
+        sender.close()
+        raise
+    return sender, (host, int(sender.getsockname()[1]))
+
+
+def _receiver(bus: Address) -> socket.socket:
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        _as_receiver(receiver)
+        receiver.bind(bus)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
+        receiver.setblocking(False)
+    except OSError:
+        receiver.close()
+        raise
+    return receiver
+
+
+def _as_receiver(receiver: socket.socket) -> None:
+    """Room for many datagrams, each with its time, and with a count of those that were lost."""
+    receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+    _set_if_known(receiver, socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+    _set_if_known(receiver, socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+
+
+def _set_if_known(of: socket.socket, level: int, option: int, value: int) -> None:
+    """Sets an option that a session can do without: QEMU's emulation of other processors lacks some."""
+    try:
+        of.setsockopt(level, option, value)
+    except OSError as error:
+        if error.errno != errno.ENOPROTOOPT:
+            raise
+
+
+def _membership(host: str) -> bytes:
+    return socket.inet_aton(host) + socket.inet_aton("0.0.0.0")  # noqa: S104

@@ -1,0 +1,192 @@
+"""Shared memory in both modes of libcluon: how the frames of a camera travel.
+
+SysV is the default: a segment without header holds the data, semaphores are mutex and condition, and the time of the
+content is that of the token file in /tmp. CLUON_SHAREDMEMORY_POSIX=1 selects POSIX: one object holds all of it.
+"""
+
+import errno
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import TracebackType
+from typing import Self
+
+from dodo_dsl.opendlv import posix_memory, sysv_memory
+from dodo_dsl.opendlv.posix_memory import PosixSegment
+from dodo_dsl.opendlv.sysv_memory import MemoryTakenError, Result, Segment, SharedMemoryError
+
+__all__ = ["MemoryTakenError", "SharedMemory", "SharedMemoryError"]
+
+LOCK_PATIENCE = 5.0
+MODE = "CLUON_SHAREDMEMORY_POSIX"
+
+
+class SharedMemory:
+    """A named piece of memory; a context manager. Made by ``create`` (the writer) or ``attach`` (a reader).
+
+    ``size`` is in bytes, ``buffer`` a writable view of them all; take the lock to use it. Views and arrays of it stay
+    valid after ``close``.
+    """
+
+    def __init__(self, segment: Segment | PosixSegment, name: str, owner: bool) -> None:
+        self.name = name
+        self.size: int = segment.size
+        self.buffer = segment.view()
+        self._segment = segment
+        self._owner = owner
+        self._locked = False
+        self._closed = False
+
+    @classmethod
+    def create(cls, name: str, size: int, posix: bool | None = None) -> Self:
+        """Make memory of ``size`` bytes, all zero, and what belongs to it; ``close`` removes it all.
+
+        What a dead creator left under this name is removed first. ``posix`` selects the mode (by default the
+        environment does). Raises SharedMemoryError, also where a living process holds memory of this name.
+        """
+        if not 0 < size < 2**32:
+            raise SharedMemoryError(f"shared memory '{name}' cannot have {size} bytes")
+        if _wants_posix() if posix is None else posix:
+            return cls(PosixSegment.create(posix_memory.path_of(name), size), name, owner=True)
+        return cls(Segment.create(sysv_memory.path_of(name), size), name, owner=True)
+
+    @classmethod
+    def attach(cls, name: str) -> Self:
+        """Use the memory that another process made, in the mode in which it made it.
+
+        A token file in /tmp means SysV; where there is none, an object of this name means POSIX. Raises
+        SharedMemoryError where there is neither.
+        """
+        token = sysv_memory.path_of(name)
+        if not token.exists() and (_wants_posix() or _is_posix(name)):
+            return cls(PosixSegment.attach(posix_memory.path_of(name)), name, owner=False)
+        return cls(Segment.attach(token), name, owner=False)
+
+    @contextmanager
+    def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
+        """Hold the mutex; raises SharedMemoryError when another holds it for ``timeout`` seconds.
+
+        The creator's error is a MemoryTakenError, here and wherever the memory turns out to be broken.
+        """
+        deadline = time.monotonic() + timeout
+        while (result := self._take(deadline - time.monotonic())) is not Result.DONE:
+            if result is Result.TIMEOUT:
+                raise self._error(f"was locked by another for {timeout:g} s")
+        self._locked = True
+        try:
+            yield
+        finally:
+            self._locked = False
+            self._release()
+
+    def stamp(self, time_us: int) -> None:
+        """Sets when the content was sampled (microseconds since the epoch); only while locked."""
+        self._need_lock()
+        accessed = os.fstat(self._segment.token).st_atime_ns
+        os.utime(self._segment.token, ns=(accessed, time_us * 1000))
+
+    def sample_time(self) -> int:
+        """When the content was sampled (microseconds since the epoch); only while locked."""
+        self._need_lock()
+        return os.fstat(self._segment.token).st_mtime_ns // 1000
+
+    def notify_all(self) -> None:
+        """Wake all processes that wait now, each once.
+
+        It happens under the lock: a quick reader would else come back while the condition is still 0 and read the
+        same content again. Raises SharedMemoryError as ``lock`` does.
+        """
+        if self._locked:
+            self._wake()
+            return
+        with self.lock():
+            self._wake()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for a notification without spinning: False when ``timeout`` seconds are over, or (SysV) a signal came.
+
+        Raises SharedMemoryError when the creator has removed the memory.
+        """
+        try:
+            return self._segment.wait(timeout) is Result.DONE
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def readers_waiting(self) -> int:
+        """How many processes wait for a notification at this moment."""
+        try:
+            return self._segment.readers_waiting()
+        except OSError as error:
+            raise self._failed(error) from None
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it still exists: one that cannot be locked may only be held for long by another program."""
+        try:
+            self.readers_waiting()
+        except SharedMemoryError:
+            return False
+        return True
+
+    def close(self) -> None:
+        """Let go; the creator wakes all that wait and removes everything."""
+        if self._closed:
+            return
+        self._closed = True
+        self.buffer = memoryview(b"")
+        if self._owner:
+            self._segment.remove()
+        self._segment.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _wake(self) -> None:
+        try:
+            self._segment.wake()
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def _take(self, timeout: float) -> Result:
+        try:
+            return self._segment.lock(timeout)
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def _release(self) -> None:
+        try:
+            self._segment.unlock()
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def _need_lock(self) -> None:
+        if not self._locked:
+            raise SharedMemoryError(f"shared memory '{self.name}' must be locked for its time stamp")
+
+    def _failed(self, error: OSError) -> SharedMemoryError:
+        reasons = {
+            errno.ETIMEDOUT: "cannot notify any more: a reader was killed while it waited",
+            errno.ENOTRECOVERABLE: "cannot be locked any more: its holder was killed",
+        }
+        remover = "another" if self._owner else "its creator"
+        return self._error(reasons.get(error.errno or 0, f"was removed by {remover}"))
+
+    def _error(self, what: str) -> SharedMemoryError:
+        kind = MemoryTakenError if self._owner else SharedMemoryError
+        return kind(f"shared memory '{self.name}' {what}")
+
+
+def _wants_posix() -> bool:
+    return os.environ.get(MODE, "").startswith("1")
+
+
+def _is_posix(name: str) -> bool:
+    with suppress(SharedMemoryError):
+        return posix_memory.path_of(name).exists()
+    return False

@@ -1,1 +1,0 @@
-"""Video packets in recordings: decoded and encoded."""

@@ -1,0 +1,195 @@
+"""OpenDLV messages in the schemas of Foxglove, where those have a place for them.
+
+Camera frames become CompressedVideo (H.264 and VP9) or CompressedImage (JPEG) with the same bytes, poses
+FrameTransform and log messages Log. Only messages with the fields of message set 1.0 or 0.9 do.
+Reference: docs.foxglove.dev, "Message schemas".
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from google.protobuf.message import Message
+from google.protobuf.timestamp_pb2 import Timestamp
+from mcap.writer import Writer
+from mcap_protobuf.schema import register_schema
+
+from dodo_dsl import __version__
+from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_columns import Numbers
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.protobuf_classes import Layout
+from dodo_dsl.opendlv.recording import Recording
+
+Convert = Callable[[Any, int, int], tuple[str, Message] | None]
+"""Topic and message for a message, its sender stamp and its time in us, or None."""
+
+WORLD = "world"
+_VIDEO = {"h264": "h264", "H264": "h264", "VP90": "vp9"}
+_IMAGE = {"mjpg": "jpeg", "MJPG": "jpeg"}
+_LEVELS = (Log.FATAL, Log.FATAL, Log.FATAL, Log.ERROR, Log.WARNING, Log.INFO, Log.INFO, Log.DEBUG)
+"""By the levels of syslog (RFC 5424, table 2)."""
+
+
+def converter(layout: Layout) -> Convert | None:
+    """What makes a message of Foxglove of those of a layout; None where there is none."""
+    for version, converters in _CONVERTERS.items():
+        convert = converters.get(layout.definition.name)
+        if convert and message_versions.load(version).layout(layout.definition.name).definition.same_layout(
+            layout.definition
+        ):
+            return convert
+    return None
+
+
+def _picture(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
+    format_, _, _, data, *_ = (getattr(message, field.name) for field in message.DESCRIPTOR.fields)
+    common = {"timestamp": _timestamp(time), "frame_id": f"camera-{stamp}", "data": data}
+    if data and format_ in _VIDEO:
+        return f"/camera/{stamp}", CompressedVideo(format=_VIDEO[format_], **common)
+    if data and format_ in _IMAGE:
+        return f"/picture/{stamp}", CompressedImage(format=_IMAGE[format_], **common)
+    return None
+
+
+def _pose(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
+    return _transform(message, (message.qx, message.qy, message.qz, message.qw), stamp, time)
+
+
+def _pose_of_angles(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
+    """Set 0.9 has roll, pitch and yaw in rad, turned about x, y and z in this order."""
+    angles = message.roll / 2, message.pitch / 2, message.yaw / 2
+    if not all(map(math.isfinite, angles)):
+        return None
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, angles), map(math.sin, angles)
+    rotation = (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+    return _transform(message, rotation, stamp, time)
+
+
+def _transform(message: Any, rotation: tuple[float, ...], stamp: int, time: int) -> tuple[str, Message] | None:
+    if not all(map(math.isfinite, (message.x, message.y, message.z, *rotation))):
+        return None
+    found = FrameTransform(timestamp=_timestamp(time), parent_frame_id=WORLD, child_frame_id=f"frame-{stamp}")
+    found.translation.x, found.translation.y, found.translation.z = message.x, message.y, message.z
+    x, y, z, w = rotation if any(rotation) else (0.0, 0.0, 0.0, 1.0)
+    found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w = x, y, z, w
+    return "/tf", found
+
+
+def _log(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
+    level = _LEVELS[message.level] if message.level < len(_LEVELS) else Log.UNKNOWN
+    return "/log", Log(timestamp=_timestamp(time), level=level, message=message.description, name=f"sender {stamp}")
+
+
+def _timestamp(time: int) -> Timestamp:
+    seconds, microseconds = divmod(max(time, 0), 1_000_000)
+    return Timestamp(seconds=seconds, nanos=microseconds * 1000)
+
+
+_CONVERTERS: Mapping[str, Mapping[str, Convert]] = {
+    message_versions.NEW: {
+        "opendlv.proxy.ImageReading": _picture,
+        "opendlv.sim.Frame": _pose,
+        "opendlv.system.LogMessage": _log,
+    },
+    message_versions.OLD: {"opendlv.proxy.ImageReading": _picture, "opendlv.sim.Frame": _pose_of_angles},
+}
+
+
+_NANOSECONDS = 1000
+_PROTOBUF = "protobuf"
+
+
+@dataclass
+class McapCounts:
+    """OpenDLV messages, those in schemas of Foxglove beside them, and payloads that are none by id."""
+
+    messages: int = 0
+    converted: int = 0
+    undecodable: Counter[int] = field(default_factory=Counter)
+
+
+def write(
+    recording: Recording, messages: MessageSet, rows: Numbers, place: Path, progress: Callable[[int], None]
+) -> McapCounts:
+    """Write the known messages among ``rows`` in the order of their times; ``progress`` gets the number of rows done.
+
+    The log time is the sample time, or where that is zero when the message was received, or else sent; the publish
+    time is when it was sent. Times before 1970 become 1970. Memory is bounded by what ``Recording.batches`` holds and
+    the file's index. Raises OSError and RecordingError.
+    """
+    result = McapCounts()
+    ordered = rows[np.argsort(recording.index["time"][rows], kind="stable")]
+    with place.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(library=f"DoDo {__version__}")
+        channels = _Channels(writer, messages)
+        for done, envelope in enumerate(recording.envelopes(ordered), 1):
+            _write_one(channels, envelope, result)
+            progress(done)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return result
+
+
+def topic(message: str, sender_stamp: int) -> str:
+    """``/opendlv/proxy/DistanceReading/0``: with slashes, as a dot begins a field in the paths of Foxglove."""
+    return f"/{message.replace('.', '/')}/{sender_stamp}"
+
+
+def _write_one(channels: "_Channels", envelope: Envelope, result: McapCounts) -> None:
+    id_, stamp = envelope.data_type, envelope.sender_stamp
+    time = envelope.sample_time or envelope.received or envelope.sent
+    try:
+        message = channels.messages.decode(id_, envelope.payload)
+        payload = channels.messages.encode(message)
+    except MessageError:
+        result.undecodable[id_] += 1
+        return
+    channels.add(topic(channels.messages.name(id_), stamp), message, payload, time, envelope.sent)
+    result.messages += 1
+    convert = channels.converter(id_)
+    found = convert(message, stamp, time) if convert else None
+    if found is not None:
+        channels.add(*found, found[1].SerializeToString(), time, envelope.sent)
+        result.converted += 1
+
+
+class _Channels:
+    """The topics and schemas of a file, each registered when it is first needed."""
+
+    def __init__(self, writer: Writer, messages: MessageSet) -> None:
+        self.messages = messages
+        self._writer = writer
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[Any, int] = {}
+        self._converters: dict[int, Convert | None] = {}
+
+    def converter(self, id_: int) -> Convert | None:
+        """What makes a message of Foxglove of one with this id."""
+        if id_ not in self._converters:
+            self._converters[id_] = converter(self.messages.layout(id_))
+        return self._converters[id_]
+
+    def add(self, topic: str, message: Message, payload: bytes, time: int, sent: int) -> None:
+        """A message on a topic; times in us since the epoch."""
+        if topic not in self._channels:
+            type_ = type(message)
+            if type_ not in self._schemas:
+                self._schemas[type_] = register_schema(self._writer, type_)
+            self._channels[topic] = self._writer.register_channel(topic, _PROTOBUF, self._schemas[type_])
+        log_time, publish_time = (max(each, 0) * _NANOSECONDS for each in (time, sent))
+        self._writer.add_message(self._channels[topic], log_time, payload, publish_time)

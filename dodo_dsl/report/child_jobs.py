@@ -1,0 +1,141 @@
+"""The reports that jobs of GitLab's child pipelines keep as artifacts, fetched through its API.
+
+Source: https://docs.gitlab.com/api/jobs/ and https://docs.gitlab.com/api/job_artifacts/
+"""
+
+import json
+import shutil
+import stat
+import urllib.error
+import urllib.request
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import IO, Any
+
+from dodo_dsl.report.join import MOST_BYTES
+
+VARIABLE = "DODO_API_TOKEN"
+"""The variable with a token of scope ``read_api``; without it the job's own is used."""
+FOLDER = "dodo-report"
+"""Of a job's report among its artifacts."""
+_NEEDED = ("CI_API_V4_URL", "CI_PROJECT_ID", "CI_PIPELINE_ID")
+_PATIENCE_S = 60.0
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError)
+"""Raised by zipfile for damage, and the last for what is encrypted or compressed in a way that it does not know."""
+_MOST_JSON = 16 << 20
+_MOST_PAGES = 100
+
+
+class NoChildJobs(ValueError):
+    """Why there are no reports of child pipelines; one sentence."""
+
+
+@dataclass(frozen=True)
+class ParentPipeline:
+    """A pipeline of a project: ``url`` of the project in the API, and the header that authorises."""
+
+    url: str
+    number: str
+    header: tuple[str, str]
+
+    def json(self, path: str) -> Iterator[dict[str, Any]]:
+        """The elements of a list, page by page; raises NoChildJobs."""
+        page = "1"
+        for _ in range(_MOST_PAGES):
+            with self.opened(f"{path}?per_page=100&page={page}") as response:
+                yield from json.loads(response.read(_MOST_JSON))
+                page = response.headers.get("x-next-page") or ""
+            if not page:
+                return
+
+    def opened(self, path: str) -> Any:
+        """A response; the token goes to no other host. Raises NoChildJobs."""
+        request = urllib.request.Request(f"{self.url}/{path}")  # noqa: S310  (of_job looks at its scheme)
+        request.add_unredirected_header(*self.header)
+        try:
+            return urllib.request.urlopen(request, timeout=_PATIENCE_S)  # noqa: S310  (as above)
+        except urllib.error.HTTPError as error:
+            error.close()
+            advice = f"; set {VARIABLE} to a token of scope read_api" if error.code in (401, 403, 404) else ""
+            raise NoChildJobs(f"GitLab answers '{error.code} {error.reason}' to {path}{advice}") from None
+        except OSError as error:
+            raise NoChildJobs(f"GitLab cannot be reached at {self.url}: {error}") from None
+
+
+def of_job(environment: Mapping[str, str]) -> ParentPipeline:
+    """The pipeline of the job that this runs in; raises NoChildJobs."""
+    for name in (*_NEEDED, "CI_JOB_TOKEN"):
+        if not environment.get(name) and not (name == "CI_JOB_TOKEN" and environment.get(VARIABLE)):
+            raise NoChildJobs(f"{name} is not set; --gitlab is for jobs of GitLab")
+    api, project, number = (environment[name] for name in _NEEDED)
+    if not api.startswith(("http://", "https://")):
+        raise NoChildJobs(f"CI_API_V4_URL is '{api[:60]}', expected a URL")
+    own = environment.get(VARIABLE, "")
+    header = ("PRIVATE-TOKEN", own) if own else ("JOB-TOKEN", environment["CI_JOB_TOKEN"])
+    return ParentPipeline(f"{api}/projects/{project}", number, header)
+
+
+def fetch(pipeline: ParentPipeline, folder: Path) -> Iterator[tuple[str, Path | None]]:
+    """The jobs of all child pipelines by name, each with its report in ``folder``, or None; raises NoChildJobs."""
+    try:
+        children = [each.get("downstream_pipeline") for each in pipeline.json(f"pipelines/{pipeline.number}/bridges")]
+        jobs = [job for child in children if child for job in pipeline.json(f"pipelines/{int(child['id'])}/jobs")]
+        for job in sorted(jobs, key=lambda each: int(each["id"])):
+            name, number = str(job["name"]), int(job["id"])
+            if job.get("artifacts_file"):
+                yield name, _fetched(pipeline, number, folder / str(number))
+            elif job.get("status") != "success":
+                yield name, None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise error if isinstance(error, NoChildJobs) else NoChildJobs("GitLab's answer is no list of jobs") from error
+
+
+def _fetched(pipeline: ParentPipeline, number: int, folder: Path) -> Path | None:
+    folder.mkdir()
+    archive = folder / "artifacts.zip"
+    with pipeline.opened(f"jobs/{number}/artifacts") as response, archive.open("xb") as file:
+        _copy(response, file, MOST_BYTES)
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            _extract(opened, folder)
+    except _UNREADABLE as error:
+        raise NoChildJobs(f"the artifacts of job {number} cannot be read: {error}") from None
+    archive.unlink()
+    return folder / FOLDER if (folder / FOLDER).is_dir() else None
+
+
+def _extract(archive: zipfile.ZipFile, folder: Path) -> None:
+    """The regular files of the report, by names that stay inside."""
+    left = MOST_BYTES
+    for entry in archive.infolist():
+        path = PurePosixPath(entry.filename)
+        mode = entry.external_attr >> 16
+        is_file = not entry.is_dir() and (stat.S_ISREG(mode) or not stat.S_IFMT(mode))
+        if not is_file or path.parts[:1] != (FOLDER,) or ".." in path.parts:
+            continue
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with archive.open(entry) as content, target.open("xb") as file:
+            left -= _copy(content, file, left)
+
+
+def _copy(source: IO[bytes], target: IO[bytes], most: int) -> int:
+    shutil.copyfileobj(_Limited(source, most), target)
+    return target.tell()
+
+
+class _Limited:
+    """A stream of at most ``left`` bytes; raises NoChildJobs beyond them."""
+
+    def __init__(self, stream: IO[bytes], left: int) -> None:
+        self._stream, self._left = stream, left
+
+    def read(self, size: int = -1) -> bytes:
+        data = self._stream.read(size)
+        self._left -= len(data)
+        if self._left < 0:
+            raise NoChildJobs("the artifacts are larger than a report may be")
+        return data

@@ -1,0 +1,149 @@
+"""``junit.xml`` as GitLab reads it: failed is a failure, error an error, the class name is the level."""
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.outcome import NotRun, Outcome, worst_margin
+from dodo_dsl.report import comparison
+from dodo_dsl.report.results import RunRecord
+from dodo_dsl.report.viewer import moment
+from dodo_dsl.terminal import printable
+
+# what XML 1.0 cannot hold (section 2.2), whatever a service printed
+_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_ATTACHMENT = "[[ATTACHMENT|"
+"""What GitLab takes a file by, wherever it stands in a test's output: text of others has another."""
+
+
+def write(
+    path: Path,
+    outcomes: Sequence[Outcome],
+    attachments: Mapping[str, str],
+    links: Mapping[str, str],
+    not_run: Sequence[NotRun] = (),
+    runs: Sequence[RunRecord] = (),
+) -> None:
+    """Writes the file; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
+
+    Tests that were ``not_run`` are skipped ones; date and host are those of the run, if it is one of ``runs`` alone.
+    """
+    from junitparser import JUnitXml, TestSuite
+
+    suite = TestSuite("dodo")
+    if len(runs) == 1:
+        suite.timestamp = runs[0].date.partition("+")[0]
+        suite.hostname = xml_text(runs[0].host)
+    for outcome in outcomes:
+        suite.add_testcase(_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)))
+    for test in not_run:
+        suite.add_testcase(_skipped(test))
+    document = JUnitXml("dodo")
+    document.add_testsuite(suite)
+    document.update_statistics()  # type: ignore[no-untyped-call]
+    document.write(str(path), pretty=True)
+
+
+def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
+    from junitparser import Error, Failure, TestCase
+
+    case = TestCase(xml_text(outcome.name), classname=outcome.level, time=round(outcome.execution_s or 0.0, 3))
+    case._elem.set("file", xml_text(outcome.spec))
+    if outcome.outcome != "passed":
+        kind = Failure if outcome.outcome == "failed" else Error
+        result = kind(_plain(outcome.reason), outcome.outcome)
+        replay = [f"replay: {link}"] if link else []
+        result.text = _plain("\n".join([outcome.reason, *replay, *outcome.last_lines]))
+        case.result = [result]
+    # GitLab shows the text of a failure in place of this, and takes the attachment from here
+    said = [comparison.line(check, outcome.checks) for check in outcome.checks] + [
+        f"note: {note}" for note in outcome.notes
+    ]
+    lines = [_plain(line) for line in said]
+    if attachment:
+        lines.append(f"{_ATTACHMENT}{attachment}]]")
+    if lines:
+        case.system_out = xml_text("\n".join(lines))
+    return case
+
+
+def _skipped(test: NotRun) -> Any:
+    from junitparser import Skipped, TestCase
+
+    case = TestCase(xml_text(test.name), classname=test.level)
+    case._elem.set("file", xml_text(test.spec))
+    case.result = [Skipped(xml_text(f"not run: {test.reason}"))]
+    return case
+
+
+def _plain(text: str) -> str:
+    """Text of others without what GitLab would take for an attachment."""
+    return xml_text(text).replace(_ATTACHMENT, "[ [ATTACHMENT|")
+
+
+def xml_text(text: str) -> str:
+    """The text without what XML cannot hold."""
+    return _NOT_XML.sub("\ufffd", text)
+
+
+def to_text(outcomes: Sequence[Outcome]) -> str:
+    """Duration of set-up and execution, outcome, margins, every check's value, and what the application used.
+
+    All are labelled with the test.
+    """
+    from prometheus_client import CollectorRegistry, Gauge
+    from prometheus_client.openmetrics.exposition import generate_latest
+
+    registry = CollectorRegistry()
+    setup = Gauge("dodo_setup_seconds", "Time until all services were ready", ["test"], registry=registry)
+    execution = Gauge("dodo_execution_seconds", "Time from ready to the end", ["test"], registry=registry)
+    passed = Gauge("dodo_passed", "1 when the test passed", ["test"], registry=registry)
+    value = Gauge("dodo_check_value", "Value of an evaluator's check", ["test", "check", "unit"], registry=registry)
+    margin = Gauge(
+        "dodo_check_margin", "Distance of the value to its limit", ["test", "check", "unit"], registry=registry
+    )
+    worst = Gauge("dodo_worst_margin", "Least margin of the checks, -1 to 1", ["test"], registry=registry)
+    processor = Gauge("dodo_processor_seconds", "Processor time", ["test", "service"], registry=registry)
+    memory = Gauge("dodo_peak_memory_bytes", "Most memory at any time", ["test", "service"], registry=registry)
+    for outcome in outcomes:
+        slug = printable(outcome.slug)
+        passed.labels(slug).set(outcome.outcome == "passed")
+        if outcome.setup_s is not None:
+            setup.labels(slug).set(round(outcome.setup_s, 3))
+        if outcome.execution_s is not None:
+            execution.labels(slug).set(round(outcome.execution_s, 3))
+        if (share := worst_margin(outcome)) is not None:
+            worst.labels(slug).set(share)
+        for use in outcome.resources:
+            processor.labels(slug, printable(use.service)).set(round(use.processor_s, 3))
+            memory.labels(slug, printable(use.service)).set(use.peak_memory_bytes)
+        for check in outcome.checks:
+            if check["value"] is not None:
+                value.labels(slug, *_labels(check)).set(check["value"])
+            if check.get("margin") is not None:
+                margin.labels(slug, *_labels(check)).set(check["margin"])
+    text: str = generate_latest(registry).decode()  # type: ignore[no-untyped-call]
+    return text
+
+
+def _labels(check: Mapping[str, Any]) -> tuple[str, str]:
+    """A check's name and unit, which an evaluator has written, or somebody else a file of results."""
+    return printable(check["name"]), printable(check.get("unit") or "")
+
+
+def to_moments(outcomes: Sequence[Outcome], pages: Mapping[str, str], folder: str) -> dict[str, str]:
+    """The page of each test at the moment that decided, where the verdict tells it.
+
+    ``pages`` are paths in the report by slug, ``folder`` the report as seen from the working folder. In a job of GitLab
+    that is the job's folder, and links lead to the job's artifacts.
+    """
+    job = os.environ.get("CI_JOB_URL", "")
+    place = f"{job}/artifacts/file/{folder}" if job.startswith(("http://", "https://")) else folder
+    return {o.slug: f"{place}/{pages[o.slug]}{_fragment(o)}" for o in outcomes if o.slug in pages}
+
+
+def _fragment(outcome: Outcome) -> str:
+    decisive = moment.decisive(outcome, 0.0)
+    return "" if decisive.what == moment.END else f"#t={decisive.time:.2f}"

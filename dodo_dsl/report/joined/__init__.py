@@ -1,1 +1,0 @@
-"""Several reports as one: their files, copied below one folder."""

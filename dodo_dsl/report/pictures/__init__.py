@@ -1,1 +1,0 @@
-"""Pictures and plots of a report."""

@@ -1,0 +1,288 @@
+"""All findings about this machine, and the removal of what killed runs left."""
+
+import contextlib
+import errno
+import os
+import shutil
+import socket
+import struct
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from dodo_dsl import advice, package_data
+from dodo_dsl.opendlv.address import RECEIVE_BUFFER, group
+from dodo_dsl.run import history, leases
+from dodo_dsl.run.docker import cleanup
+from dodo_dsl.run.docker.client import NoEngine, connect
+from dodo_dsl.run.docker.shared_files import problem, provide_image, unseen
+from dodo_dsl.run.process import host_isolation, leftovers
+from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.rigs.leases import all_quarantined
+from dodo_dsl.run.rigs.problems import RigProblem
+from dodo_dsl.state_folder import NoStateFolder, state_path
+
+State = Literal["ok", "warning", "problem"]
+
+
+@dataclass(frozen=True)
+class Capability:
+    """One thing that was examined; ``advice`` is what to do when it is not ok."""
+
+    name: str
+    state: State
+    text: str
+    advice: str = ""
+
+
+_RECEIVE_S = 1.0
+_BUSES = "225.0.0.0/24"
+"""The groups of all sessions."""
+_NO_ROUTE = (errno.ENETUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL)
+_SYS = Path("/proc/sys")
+_FREE_BYTES = 2 << 30
+_SEGMENTS = 64
+_SEGMENT_BYTES = 64 << 20
+
+
+def namespaces() -> Iterator[Capability]:
+    """Whether tests can have namespaces of their own."""
+    if refusal := host_isolation.isolation_refusal():
+        remedy = f"{refusal.remedy}; " if refusal.remedy else ""
+        way = f"{remedy}for applications you trust, --isolation host"
+        yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal}", way)
+    else:
+        yield Capability(
+            "namespaces", "ok", "each test gets a network, IPC and /tmp of its own, its application a sandbox"
+        )
+
+
+def multicast() -> Iterator[Capability]:
+    """Whether a datagram to a multicast group is received."""
+    bus, mark = group(254), os.urandom(16)
+    membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+            receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            receiver.bind(bus)
+            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+            receiver.settimeout(_RECEIVE_S)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+                sender.sendto(mark, bus)
+            deadline = time.monotonic() + _RECEIVE_S
+            while receiver.recv(65_535) != mark:
+                if time.monotonic() > deadline:
+                    raise TimeoutError("only other datagrams were received")
+    except OSError as error:
+        no_route = isinstance(error, TimeoutError) or error.errno in _NO_ROUTE
+        way = advice.as_root("ip link set lo up multicast on", f"ip route replace {_BUSES} dev lo") if no_route else ""
+        yield Capability(
+            "multicast", "problem", f"does not work on the host ({error}); 'isolation: host' needs it", way
+        )
+    else:
+        yield Capability("multicast", "ok", "works on the host")
+
+
+def receive_buffer() -> Iterator[Capability]:
+    """Whether sockets may buffer as much as OpenDLV requests."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        limit = receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # the kernel tells what it reserves
+    if limit < RECEIVE_BUFFER:
+        text = f"sockets may hold {limit:,} bytes, OpenDLV requests {RECEIVE_BUFFER:,}: bursts of messages may be lost"
+        yield Capability("receive buffer", "warning", text, _sysctl(f"net.core.rmem_max={RECEIVE_BUFFER}"))
+    else:
+        yield Capability("receive buffer", "ok", f"sockets may hold {limit:,} bytes")
+
+
+def shared_memory() -> Iterator[Capability]:
+    """Whether the limits of System V shared memory suffice."""
+    segments, size = _number("/proc/sys/kernel/shmmni"), _number("/proc/sys/kernel/shmmax")
+    if segments < _SEGMENTS or size < _SEGMENT_BYTES:
+        way = _sysctl(f"kernel.shmmni={max(segments, 4096)}", f"kernel.shmmax={max(size, _SEGMENT_BYTES * 16)}")
+        yield Capability("shared memory", "problem", f"only {segments} segments of {size:,} bytes are allowed", way)
+    else:
+        yield Capability("shared memory", "ok", f"{segments:,} segments are allowed")
+
+
+def _sysctl(*settings: str) -> str:
+    """Sets limits of the kernel; in a container, whose /proc/sys is read-only, they are its host's."""
+    path = _SYS / settings[0].partition("=")[0].replace(".", "/")
+    is_host = path.exists() and (os.geteuid() != 0 or os.access(path, os.W_OK))
+    return (
+        advice.as_root(f"sysctl -w {' '.join(settings)}") if is_host else f"on the host: sysctl -w {' '.join(settings)}"
+    )
+
+
+def _number(path: str) -> int:
+    try:
+        return int(Path(path).read_text().split()[0])
+    except (OSError, ValueError, IndexError):
+        return 0
+
+
+def disk() -> Iterator[Capability]:
+    """Whether there is room for recordings and images."""
+    for folder in dict.fromkeys((Path(tempfile.gettempdir()), Path.cwd())):
+        free = shutil.disk_usage(folder).free
+        state: State = "ok" if free >= _FREE_BYTES else "warning"
+        way = "" if state == "ok" else "free some space: recordings and images need it"
+        yield Capability("disk", state, f"{free / (1 << 30):.1f} GiB free in {folder}", way)
+
+
+FIRMWARE = "DODO_FIRMWARE"
+EMULATOR_PLACES = (package_data.root() / "build" / "firmware", Path("/opt/dodo/firmware"))
+_COMPOSE = (2, 20)
+
+
+def docker_engine() -> Iterator[Capability]:
+    """Whether a Docker engine answers."""
+    try:
+        client = connect()
+    except NoEngine as error:
+        text = f"none answers ({error.reason}); --backend docker and mixed need one"
+        yield Capability("docker engine", "warning", text, error.way)
+        return
+    with contextlib.closing(client):
+        version = client.version()
+        where = f" at {host}" if (host := os.environ.get("DOCKER_HOST")) else ""
+        tls = " with TLS" if client.api.base_url.startswith("https:") else ""
+        text = f"version {version.get('Version')}, API {version.get('ApiVersion')}{where}{tls}"
+        yield Capability("docker engine", "ok", text)
+        yield from _files_of(client)
+
+
+def _files_of(client: Any) -> Iterator[Capability]:
+    """Whether the engine sees the folders in which tests are, and in which they are compiled."""
+    try:
+        provide_image(client)
+    except BackendError as error:
+        yield Capability("files of tests", "warning", f"{error}; --backend docker needs it", "repair the engine")
+        return
+    with tempfile.NamedTemporaryFile(prefix="dodo-doctor-") as mark:
+        for place, path in (("this folder", Path.cwd()), ("TMPDIR", Path(mark.name).resolve())):
+            if missing := unseen(client, [path]):
+                text, way = problem(missing)
+                yield Capability("files of tests", "warning", f"{text}; in {place}, --backend docker needs it", way)
+                return
+    yield Capability("files of tests", "ok", "the docker engine sees this folder and TMPDIR")
+
+
+def compose_plugin() -> Iterator[Capability]:
+    """Whether there is Compose of a version that DoDo supports."""
+    text = _output("docker", "compose", "version", "--short")
+    numbers = tuple(int(n) for n in text.lstrip("v").split("-")[0].split(".")[:2] if n.isdecimal())
+    if numbers >= _COMPOSE:
+        yield Capability("compose", "ok", f"version {text}")
+        return
+    found = f"version {text} is older than 2.20" if numbers else "'docker compose' does not run"
+    way = advice.docker_plugin("compose") if shutil.which("docker") else advice.docker()
+    yield Capability("compose", "warning", f"{found}; --backend docker and mixed need it", way)
+
+
+def _output(*command: str) -> str:
+    try:
+        result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return result.stdout.strip() if result.returncode == 0 else ""
+
+
+def emulator_folder() -> Path | None:
+    """Where the emulated rig is built; None where it is not."""
+    return next((p for p in _places() if all((p / name).is_file() for name in ("rig-emulator", "gantry.elf"))), None)
+
+
+def _places() -> tuple[Path, ...]:
+    named = os.environ.get(FIRMWARE)
+    return (Path(named),) if named else EMULATOR_PLACES
+
+
+def emulated_rig() -> Iterator[Capability]:
+    """Whether the programs are built that a gantry with ``--serial=emulated`` starts."""
+    places = _places()
+    if found := emulator_folder():
+        yield Capability("emulated rig", "ok", f"is built, in {found}")
+    else:
+        text = f"is not built: it is not in {' or '.join(map(str, places))}; hil tests need it"
+        yield Capability("emulated rig", "warning", text, advice.firmware(FIRMWARE))
+
+
+def examine() -> list[Capability]:
+    """All findings, in the order in which a run would need things."""
+    return [finding for check in CHECKS for finding in _findings(check)]
+
+
+def _findings(check: Callable[[], Iterator[Capability]]) -> Iterator[Capability]:
+    """The findings of a check; a check that raises is a finding, too."""
+    try:
+        yield from check()
+    except Exception as error:  # noqa: BLE001  (a machine that lacks something is what this command is for)
+        yield Capability(check.__name__.replace("_", " "), "problem", f"cannot be examined: {error}")
+
+
+def left_behind() -> Iterator[Capability]:
+    """What killed runs left."""
+    left = [f"test {about.get('test', '?')}" for prefix in ("cid-", leases.PROJECT) for about in _orphans(prefix)]
+    if left:
+        yield Capability("left behind", "warning", f"by killed runs: {', '.join(left)}", "dodo doctor --clean")
+    else:
+        yield Capability("left behind", "ok", "nothing of killed runs")
+
+
+def _orphans(prefix: str) -> Iterator[dict[str, Any]]:
+    for lease, about in leases.orphans(prefix):
+        yield about
+        lease.leave()
+
+
+def state_folder() -> Iterator[Capability]:
+    """Whether this user's state can be kept."""
+    try:
+        state_path(history.PATH_VARIABLE, "history.jsonl")
+    except NoStateFolder as problem:
+        yield Capability(
+            "state folder", "warning", str(problem), "without it there is no forecast of how long tests take"
+        )
+
+
+def rigs() -> Iterator[Capability]:
+    """The rigs in quarantine."""
+    try:
+        for rig, reason in all_quarantined().items():
+            yield Capability(
+                f"rig {rig}", "problem", f"in quarantine: {reason}", f"repair it, then dodo rig clear {rig}"
+            )
+    except RigProblem as problem:
+        yield Capability("rigs", "warning", str(problem), "tests on real rigs end in error without it")
+
+
+CHECKS: tuple[Callable[[], Iterator[Capability]], ...] = (
+    namespaces,
+    multicast,
+    receive_buffer,
+    shared_memory,
+    disk,
+    docker_engine,
+    compose_plugin,
+    left_behind,
+    state_folder,
+    rigs,
+    emulated_rig,
+)
+
+
+def clean() -> cleanup.Reaped:
+    """Removes what killed runs left, as the next run would; returns what was removed, and what could not be."""
+    on_host = leftovers.reap()
+    try:
+        client = connect()
+    except BackendError:
+        return cleanup.Reaped(on_host)
+    with contextlib.closing(client):
+        reaped = cleanup.reap_projects(client)
+    return cleanup.Reaped([*on_host, *reaped.removed], reaped.left)

@@ -1,0 +1,122 @@
+"""The evaluators of a test, as processes, on the recording of a test."""
+
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from dodo_dsl.log_times import JUDGED_SUFFIX
+from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.run import service_protocol
+from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended
+from dodo_dsl.run.process.commands import Command, Commands
+from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.protocol import Malformed, Noted, Recorded, VerdictEvent
+from dodo_dsl.run.test_recording import TestRecording
+
+NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG", "DODO_WORLD", "DODO_TOLD", "DODO_TRUTH")
+LOGS = "logs"
+_TAIL_LINES, _TAIL_WIDTH = 8, 300
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The finding that decides, the verdict of each evaluator, notes, and the last lines of the one that decided."""
+
+    finding: Finding
+    verdicts: tuple[VerdictEvent, ...]
+    notes: tuple[str, ...] = ()
+    last_lines: tuple[str, ...] = ()
+    logs: Path | None = None
+    """The folder of the evaluators' logs, and of what they recorded."""
+
+
+@dataclass
+class _Running:
+    service: PlannedService
+    process: "subprocess.Popen[bytes]"
+    output: BinaryIO
+    log: BinaryIO
+
+
+def judge(plan: Plan, folder: Path, recording: TestRecording, cid: int, work: Path) -> Judgement:
+    """Let the evaluators of a Plan judge; ``folder`` is the compiled test's, ``work`` an empty one for their files.
+
+    ``cid`` is the one that verdicts name. What they recorded is in LOGS below ``work``. Raises OSError where a program
+    cannot be started.
+    """
+    (work / LOGS).mkdir()
+    commands = Commands(plan, folder, work, Slot(cid))
+    facts = Facts(tuple(service.name for service in plan.services if service.judge))
+    notes: list[str] = []
+    tails: dict[str, tuple[str, ...]] = {}
+    with ExitStack() as stack:
+        services = [service for service in plan.services if service.judge]
+        running = [stack.enter_context(_started(s, commands.of(s), recording, work)) for s in services]
+        for one in running:
+            code = one.process.wait()
+            tails[one.service.name] = _collect(one, facts, notes, work / LOGS)
+            _take_end(one.service.name, code, facts, recording)
+    finding = decide(facts)
+    verdicts = tuple(verdict for name in facts.evaluators for verdict in facts.verdicts.get(name, []))
+    last_lines = tails.get(finding.service, ()) if finding.result != "passed" else ()
+    return Judgement(finding, verdicts, tuple(notes), last_lines, work / LOGS)
+
+
+@contextmanager
+def _started(service: PlannedService, command: Command, recording: TestRecording, work: Path) -> Iterator[_Running]:
+    """An evaluator that is killed at the end, if it still runs."""
+    kept = {name: value for name, value in command.environment.items() if name not in NOT_OF_A_RECORDING}
+    environment = {
+        **kept,
+        "DODO_CLOCK": "recording",
+        "DODO_RECORDING": str(recording.path.resolve()),
+        "DODO_READY_FILE": str(work / f"{service.name}.ready"),
+    }
+    with (work / f"{service.name}.out").open("w+b") as output, (work / f"{service.name}.log").open("w+b") as log:
+        process = subprocess.Popen(
+            command.argv, env=environment, cwd=command.folder, stdin=subprocess.DEVNULL, stdout=output, stderr=log
+        )
+        try:
+            yield _Running(service, process, output, log)
+        finally:
+            process.kill()
+            process.wait()
+
+
+def _collect(one: _Running, facts: Facts, notes: list[str], logs: Path) -> tuple[str, ...]:
+    """Take what an evaluator printed; returns the last lines of its log."""
+    name = one.service.name
+    recorded = []
+    one.output.seek(0)
+    for line in one.output:
+        match service_protocol.read_line(name, True, line):
+            case VerdictEvent() as verdict:
+                facts.verdicts.setdefault(name, []).append(verdict)
+            case Malformed(_, problem):
+                text = f"the verdict of evaluator '{name}' is malformed: {problem}"
+                facts.findings.append(Finding("error", text, name))
+            case Noted(text):
+                notes.append(text)
+            case Recorded():
+                recorded.append(line)
+    one.log.seek(0)
+    said = one.log.read()
+    log = logs / f"{one.service.layer}.{name}.log"
+    log.write_bytes(said)
+    log.with_suffix(JUDGED_SUFFIX).write_bytes(b"".join(recorded))
+    return _tail(said.splitlines())
+
+
+def _tail(lines: Sequence[bytes]) -> tuple[str, ...]:
+    return tuple(line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in lines[-_TAIL_LINES:] if line.strip())
+
+
+def _take_end(name: str, code: int, facts: Facts, recording: TestRecording) -> None:
+    if code != 0:
+        facts.findings.append(Finding("error", f"evaluator '{name}' {how_it_ended(code)}", name))
+    elif not facts.verdicts.get(name) and not any(finding.service == name for finding in facts.findings):
+        text = f"the recording ends after {recording.duration_s:.1f} s, before evaluator '{name}' gave a verdict"
+        facts.findings.append(Finding("error", text, name))

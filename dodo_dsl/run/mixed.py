@@ -1,0 +1,297 @@
+"""Where tests of the mixed backend run: prepares once for a run, and makes one backend for each test."""
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import AsyncIterator, Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.application import compose_paths
+from dodo_dsl.application.model import FILES, SANDBOX
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.backends import Job, Say
+from dodo_dsl.run.docker.backend import DockerBackend
+from dodo_dsl.run.docker.client import engine_error
+from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.docker.container_use import ELSEWHERE, is_of
+from dodo_dsl.run.docker.containers import Containers
+from dodo_dsl.run.docker.shared_files import IMAGE
+from dodo_dsl.run.machine_load.service_use import Used
+from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.process import host_isolation, leftovers, namespaces
+from dodo_dsl.run.process.backend import ProcessBackend
+from dodo_dsl.run.process.commands import needed_paths, own_modules
+from dodo_dsl.run.process.fork_server_client import ForkServer, serving
+from dodo_dsl.run.process.slot import Entered, Slot
+from dodo_dsl.run.protocol import Backend, BackendError, Event
+from dodo_dsl.run.rigs.session import attended
+
+_PROGRAM = "sleep"
+_SEEN = ("/bin", "/lib", "/lib64", "/usr")
+"""Folders of this machine that hold the program and its libraries."""
+
+
+def holder(slug: str) -> dict[str, Any]:
+    """The container in compose's words; it can do nothing but sleep."""
+    return {
+        "image": IMAGE,
+        "entrypoint": [shutil.which(_PROGRAM, path=os.defpath) or f"/bin/{_PROGRAM}", "infinity"],
+        "user": "65534:65534",
+        "init": True,
+        "ipc": "shareable",
+        "shm_size": "256m",
+        "read_only": True,
+        "cap_drop": ["ALL"],
+        "security_opt": ["no-new-privileges:true"],
+        "labels": {"dodo.test": slug, "dodo.layer": "sandbox"},
+        "volumes": ["tmp:/tmp", *_folders()],
+    }
+
+
+def copier(compiled: dict[str, Any]) -> dict[str, Any]:
+    """The container that copies the repository's files, as it is ``compiled``, with this machine's programs."""
+    kept = {key: value for key, value in compiled.items() if key not in ("image", "entrypoint", "depends_on")}
+    shell, *words = compiled["entrypoint"]
+    folders = [*compiled["volumes"], *_folders()]
+    return {**kept, "image": IMAGE, "entrypoint": [shutil.which(shell) or shell, *words], "volumes": folders}
+
+
+def _folders() -> list[dict[str, Any]]:
+    """The mounts of this machine's programs."""
+    seen = [folder for folder in _SEEN if Path(folder).is_dir()]
+    return [{"type": "bind", "source": folder, "target": folder, "read_only": True} for folder in seen]
+
+
+_APPLICATION_FILE = "application.compose.yml"
+_TMP = "tmp"
+
+
+class ApplicationCompose(Compose):
+    """The compiled test without DoDo's services; under network isolation with a container that holds its network."""
+
+    _replacing = ""
+
+    def _take(self, config: dict[str, Any]) -> None:
+        names = {service.name for service in self.plan.application.services}
+        self.services = {name: service for name, service in config["services"].items() if name in names}
+        self._volumes = config.get("volumes") or {}
+        own: dict[str, Any] = {}
+        if self.plan.isolation == "network":
+            own["services"] = {SANDBOX: holder(self.plan.slug)}
+            network = config["networks"]["default"]
+            planned = network["ipam"]["config"][0]["subnet"]
+            subnet = {"config": [{"subnet": f"${{DODO_SUBNET:-{planned}}}"}]}
+            options = compose_paths.escaped_values(network.get("driver_opts") or {})
+            own["networks"] = {"default": {"driver_opts": options, "ipam": subnet}}
+            options = compose_paths.escaped_values(self._volumes[_TMP].get("driver_opts") or {})
+            own["volumes"] = {_TMP: {"driver_opts": options}}
+            self.services[SANDBOX] = own["services"][SANDBOX]
+        if FILES in config["services"]:
+            self.services[FILES] = copier(config["services"][FILES])
+            own.setdefault("services", {})[FILES] = compose_paths.escaped_values(self.services[FILES])
+        self._replacing = replacing(self.services, names, own)
+
+    def _masks(self) -> tuple[dict[str, Any], list[str]]:
+        """With mounts over the folders in ``/tmp`` where DoDo's processes have theirs: so no container removes them."""
+        masked, problems = super()._masks()
+        if self.plan.isolation == "network":
+            shown = Entered.with_own(0, *needed_paths(self.plan, self.folder, self.report)).shown
+            application = {one.name: self.services[one.name] for one in self.plan.application.services
+                           if one.name in self.services}  # fmt: skip
+            for name, mounts in covers(application, shown).items():
+                given = masked.setdefault(name, {"volumes": []})["volumes"]
+                given += [mount for mount in mounts if mount["target"] not in {one["target"] for one in given}]
+        return masked, problems
+
+    def _files(self, folder: Path) -> list[str]:
+        path = folder / "mixed.compose.yml"
+        path.write_text(self._replacing, encoding="utf-8")
+        return [_APPLICATION_FILE, str(path)]
+
+
+def covers(services: dict[str, Any], shown: Iterable[Path]) -> dict[str, list[dict[str, Any]]]:
+    """Empty folders over the ``shown`` ones in ``/tmp`` and shared memory, by service, wherever it has the test's.
+
+    The kernel removes and renames no folder that is a mount to the process that tries it.
+    """
+    own = {name: {v["target"]: v for v in service.get("volumes") or ()} for name, service in services.items()}
+    places = {name: [t for t, v in mounts.items() if (v.get("type"), v.get("source")) == ("volume", _TMP)]
+              for name, mounts in own.items()}  # fmt: skip
+    every = [target for targets in places.values() for target in targets]
+    found = {}
+    for name, service in services.items():
+        at = {namespaces.SHARED[0]: every if service.get("volumes_from") else places[name]}
+        targets = [str(Path(target, p.name)) for p in shown for target in at.get(p.parent, [str(p.parent)])]
+        found[name] = [{"type": "tmpfs", "target": t, "read_only": True} for t in targets if t not in own[name]]
+    return found
+
+
+def replacing(services: dict[str, Any], application: set[str], own: dict[str, Any]) -> str:
+    """A compose file over the application's in which nothing waits for services of DoDo; ``own`` is added."""
+    lines = ["services:"]
+    for name in sorted(application & services.keys()):
+        after = services[name].get("depends_on") or {}
+        left = {other: how for other, how in after.items() if other in application or other in (SANDBOX, FILES)}
+        lines.append(f"  {json.dumps(name)}: {{depends_on: !override {json.dumps(left)}}}")
+    lines += [f"  {json.dumps(name)}: {json.dumps(service)}" for name, service in own.get("services", {}).items()]
+    lines += [f"{key}: {json.dumps(value)}" for key, value in own.items() if key != "services"]
+    return "\n".join([*lines, ""])
+
+
+class ApplicationContainers(DockerBackend):
+    """The docker backend without DoDo's services; ``process`` is that of the holder, 0 on the host's network."""
+
+    compose_kind = ApplicationCompose
+    process = 0
+
+    @property
+    def events(self) -> asyncio.Queue[Event]:
+        """What has happened, for a backend beside this one to add to."""
+        return self._events
+
+    async def open(self) -> None:
+        await super().open()
+        if SANDBOX in self._containers:
+            self.process = await asyncio.to_thread(self._find_process, self._containers[SANDBOX])
+
+    @staticmethod
+    def _find_process(container: Any) -> int:
+        from docker.errors import DockerException
+
+        try:
+            container.reload()
+        except (DockerException, OSError) as error:
+            raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
+        state = container.attrs["State"]
+        process = int(state.get("Pid") or 0)
+        if not process:
+            why = state.get("Error") or f"exit code {state.get('ExitCode')}"
+            raise BackendError(f"the container that holds the test's network ended at once: {why}")
+        if not is_of(process, container.id):
+            raise BackendError(f"{ELSEWHERE}, whose network DoDo's processes cannot enter; use --backend docker")
+        return process
+
+
+_APPLICATION = "application"
+
+
+class MixedBackend:
+    """One test: two backends, each with its part of the services; they report to one queue."""
+
+    name = "mixed"
+    has_engine = True
+
+    def __init__(self, containers: ApplicationContainers, processes: ProcessBackend) -> None:
+        self.cid = processes.cid
+        self._containers, self._processes = containers, processes
+        self._application = {service.name for service in processes.plan.application.services}
+
+    @property
+    def is_on_host(self) -> bool:
+        return self._containers.is_on_host
+
+    async def open(self) -> None:
+        await self._containers.open()
+        await self._processes.open(self._containers.process)
+
+    async def start(self, layer: str) -> dict[str, bool]:
+        return await (self._containers if layer == _APPLICATION else self._processes).start(layer)
+
+    async def next_event(self) -> Event:
+        return await self._containers.next_event()
+
+    async def listeners(self) -> Collection[str] | None:
+        return await self._containers.listeners()
+
+    async def begin(self) -> None:
+        await self._containers.require_own_host()
+        await self._processes.begin()
+
+    async def load(self) -> Snapshot | None:
+        """What both have used; None where one of them cannot tell."""
+        own, application = await asyncio.gather(self._processes.load(), self._containers.load())
+        if own is None or application is None:
+            return None
+        return replace(own, services={**own.services, **application.services})
+
+    async def use(self) -> Mapping[str, Used] | None:
+        return await self._containers.use()
+
+    async def application(self) -> Collection[int] | None:
+        return await self._containers.application()
+
+    async def close(self, keep: bool) -> list[str]:
+        kept = await asyncio.gather(self._processes.close(keep), self._containers.close(keep))
+        return [line for lines in kept for line in lines]
+
+    def tail(self, service: str) -> list[str]:
+        return (self._containers if service in self._application else self._processes).tail(service)
+
+
+NOT_ROOT = (
+    "only root can enter the network of a test's containers: run as root, with --isolation host, or on another backend"
+)
+
+
+def may_enter() -> bool:
+    """Whether DoDo's processes can enter namespaces of containers."""
+    return os.geteuid() == 0
+
+
+class Mixed:
+    """The application in containers, DoDo's services as local processes of the installed version."""
+
+    name = "mixed"
+
+    def __init__(
+        self,
+        containers: Containers,
+        descriptors: tuple[int, ...],
+        roots: Sequence[Path] = (),
+        loaded: Callable[[], ForkServer | None] = lambda: None,
+    ) -> None:
+        """``roots`` and ``loaded`` are as for Processes."""
+        self._containers = containers
+        self._descriptors = descriptors
+        self._roots = roots
+        self._loaded = loaded
+        self._fork_server: ForkServer | None = None
+
+    async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
+        await self._containers.prepare(plans, note)
+        for left in leftovers.reap():
+            note(f"removed what a killed run left: {left}")
+        forked = [plan for plan in plans if plan.isolation == "network"]
+        modules = own_modules(forked) if forked and may_enter() else None
+        self._fork_server = serving(self._loaded(), modules, self._descriptors)
+
+    def close(self) -> None:
+        if self._fork_server is not None:
+            self._fork_server.close()
+
+    @contextlib.asynccontextmanager
+    async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
+        plan = job.plan
+        if plan.isolation == "network" and not may_enter():
+            raise BackendError(NOT_ROOT)
+        with self._containers.project(ApplicationContainers, job, say, b"") as containers:
+            if plan.isolation == "network":
+                yield self._backend(job, containers, Slot(plan.cid, descriptors=self._descriptors))
+                return
+            async with (
+                host_isolation.host_slot(plan, (plan.cid,), say, keep, alone=True) as leased,
+                attended(plan, leased, say, self._roots) as descriptors,
+            ):
+                slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
+                yield self._backend(job, containers, slot)
+
+    def _backend(self, job: Job, containers: ApplicationContainers, slot: Slot) -> MixedBackend:
+        plan = job.plan
+        own = ProcessBackend(
+            plan, job.folder, job.report, plan.isolation, slot, self._fork_server, events=containers.events
+        )
+        return MixedBackend(containers, own)

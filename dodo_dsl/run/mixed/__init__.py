@@ -1,1 +1,0 @@
-"""The mixed backend: the application in containers, DoDo's services beside it as local processes."""

@@ -1,1 +1,0 @@
-"""Judging the recording of a test again, without driving."""

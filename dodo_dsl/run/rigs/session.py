@@ -1,0 +1,180 @@
+"""What the runner does about a real rig during a test: leases, health check and heartbeat."""
+
+import contextlib
+from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.run import leases
+from dodo_dsl.run.announce import heartbeat
+from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.rigs.access import query
+from dodo_dsl.run.rigs.leases import devices_in, leased, quarantine, quarantined
+from dodo_dsl.run.rigs.permission import refuse_test, refuse_unattended
+from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
+from dodo_dsl.spec.rig import EMULATED_RIGS
+
+PATIENCE_S, TRIES = 90.0, 2
+"""s: from the far corner the rig searches its home position for 20 s, and for most of a minute if it repeats that."""
+RANGES = ("range-x", "range-y", "range-yaw")
+CONSTANTS = tuple(f"{what}-{axis}" for axis in ("x", "y", "yaw") for what in ("steps", "offset"))
+
+
+@dataclass(frozen=True)
+class HealthCheck:
+    """The Python module that checks a service's hardware, its action, and the flags of the service that it takes."""
+
+    module: str
+    action: tuple[str, ...]
+    flags: tuple[str, ...]
+
+
+CHECKS = {
+    "gantry": HealthCheck("services.gantry.manual", ("check",), ("serial", "kind", "limits", *RANGES, *CONSTANTS)),
+    "camera": HealthCheck("services.camera.health_check", (), ("source", "width", "height", "freq", "exposure")),
+}
+"""By the name of the service."""
+
+
+def refuse_quarantined(plan: Plan) -> None:
+    """Raises BackendError where the rig of a test is in quarantine, or that cannot be known."""
+    try:
+        reason = quarantined(plan.rig, _devices(plan))
+    except RigProblem as problem:
+        raise BackendError(f"the quarantine of rig '{plan.rig}' cannot be read: {problem}") from problem
+    if reason:
+        raise BackendError(_in_quarantine(plan, reason))
+
+
+def _devices(plan: Plan) -> list[str]:
+    return devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
+
+
+def _in_quarantine(plan: Plan, reason: str) -> str:
+    return f"rig '{plan.rig}' is in quarantine: {reason} ('dodo rig clear {plan.rig}' ends it)"
+
+
+async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...]) -> None:
+    """Checks the real rig of a test; a rig that fails goes into quarantine.
+
+    Raises BackendError when the rig is in quarantine, fails, or cannot be checked. ``descriptors`` are those of the
+    rig's leases, which the check goes on to hold if this process is killed.
+    """
+    try:
+        devices = _devices(plan)
+        reason = quarantined(plan.rig, devices)
+        if not reason:
+            say(f"checking rig '{plan.rig}'")
+            reason = await _failure(plan, descriptors)
+            if reason:
+                quarantine(plan.rig, reason, devices)
+    except RigProblem as problem:
+        raise BackendError(f"rig '{plan.rig}' cannot be checked: {problem}") from problem
+    if reason:
+        raise BackendError(_in_quarantine(plan, reason))
+
+
+async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:
+    """Why the rig's gantry or camera is unfit; empty when both are fit. Raises RigProblem."""
+    for service in plan.services:
+        check = CHECKS.get(service.uses)
+        if check is None or _reads_a_file(service):
+            continue
+        words = [f"--{flag.name}={flag.value}" for flag in service.flags if flag.name in check.flags]
+        try:
+            answer = await _query(("python", "-m", check.module), [*words, *check.action], descriptors)
+        except ProgramTimeout as timeout:
+            return f"its health check hung {TRIES} times: {timeout}"
+        if not answer.get("ok"):
+            return str(answer.get("reason") or "its health check failed")
+    return ""
+
+
+def _reads_a_file(service: PlannedService) -> bool:
+    return any(flag.kind == "path" and flag.name == "file" for flag in service.flags)
+
+
+async def _query(program: Sequence[str], words: Sequence[str], descriptors: tuple[int, ...]) -> dict[str, Any]:
+    """The answer of a health check; one that hangs is repeated, and raises ProgramTimeout at last."""
+    for _ in range(TRIES - 1):
+        with contextlib.suppress(ProgramTimeout):
+            return await query(program, words, PATIENCE_S, descriptors)
+    return await query(program, words, PATIENCE_S, descriptors)
+
+
+GANTRY, CALIBRATE = "gantry", "calibrate"
+
+
+@dataclass
+class RigSession:
+    """What holds from test to test of one command: ``fit`` rigs passed their check, and their last test was judged.
+
+    Who knows the outcome of a test adds its rig; it is taken out as soon as the next one begins. A fit rig is not
+    checked again, and has found its home.
+    """
+
+    fit: set[str] = field(default_factory=set)
+
+    def at_home(self, plan: Plan) -> Plan:
+        """The Plan without a calibration that is not needed."""
+        if plan.rig not in self.fit:
+            return plan
+        services = (
+            replace(service, flags=tuple(flag for flag in service.flags if flag.name != CALIBRATE))
+            if service.uses == GANTRY
+            else service
+            for service in plan.services
+        )
+        return replace(plan, services=tuple(services))
+
+
+def is_real(plan: Plan) -> bool:
+    """Whether a test runs on hardware, which has a CID of its own."""
+    return bool(plan.rig) and plan.rig not in EMULATED_RIGS
+
+
+def refuse_hardware(plan: Plan) -> None:
+    """Raises BackendError for a test without a rig that would move hardware, which nothing leases or checks."""
+    try:
+        refuse_unattended(plan)
+    except RigProblem as problem:
+        raise BackendError(str(problem)) from problem
+
+
+@contextlib.asynccontextmanager
+async def attended(
+    plan: Plan,
+    slot: Slot,
+    say: Callable[[str], None],
+    roots: Sequence[Path] = (),
+    session: RigSession | None = None,
+) -> AsyncIterator[tuple[int, ...]]:
+    """Leases and checks a real rig's devices, and sends a heartbeat within the block; does nothing for other tests.
+
+    Gives all descriptors by which a program holds the rig, with those of the ``slot``. ``roots`` are the folders of the
+    test's repository, whose tests the machine's operator may not let use it. A rig that is fit in the ``session`` is
+    not checked. Raises BackendError then, and when the rig is in use, in quarantine, or fails its health check.
+    """
+    if not is_real(plan):
+        yield slot.descriptors
+        return
+    devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
+    async with contextlib.AsyncExitStack() as stack:
+        try:
+            refuse_test(plan, roots)
+        except RigProblem as problem:
+            raise BackendError(str(problem)) from problem
+        try:
+            more = await stack.enter_async_context(leased(None, plan.slug, say, devices=devices))
+        except leases.LeaseTimeout as error:
+            raise BackendError(str(error)) from error
+        if session and plan.rig in session.fit:
+            session.fit.discard(plan.rig)
+            refuse_quarantined(plan)
+        else:
+            await examine(plan, say, (*slot.descriptors, *more))
+        await stack.enter_async_context(heartbeat(slot.cid, slot.key))
+        yield (*slot.descriptors, *more)

@@ -1,1 +1,0 @@
-"""What the runner and services of DoDo say to each other."""

@@ -1,1 +1,0 @@
-"""Instances of a spec: values of ``matrix`` and ``vary`` for their placeholders."""

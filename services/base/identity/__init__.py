@@ -1,1 +1,0 @@
-"""Who is a service of the test: its key, and who may send which message."""

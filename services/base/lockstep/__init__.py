@@ -1,1 +1,0 @@
-"""A service's part in lockstep."""

@@ -1,0 +1,351 @@
+"""The clock of a service in lockstep: the clock service alone advances the time of the test.
+
+What a service consumes comes inside the step message and nowhere else, and what it produces goes back inside the
+answer, so that no lost or late datagram can change a result (``docs/explanation/lockstep.md``).
+"""
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from itertools import groupby
+from typing import Protocol
+
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.posix_memory import PosixSegment
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import LOCK_PATIENCE, SharedMemory
+from dodo_dsl.opendlv.sysv_memory import Segment
+from services.base.clock import Inbox
+from services.base.clock_link import STEP_DONE, ClockClient, Reply, Step, split
+
+_POLL_S = 0.0002
+_LONGEST_POLL_S = 0.002
+
+
+class AnnouncedMemory(SharedMemory):
+    """Shared memory that holds back the next picture until it is announced, so that nobody reads it too early.
+
+    ``sampled`` is when that picture was sampled, in microseconds since the epoch.
+    """
+
+    def __init__(self, segment: Segment | PosixSegment, name: str, owner: bool) -> None:
+        super().__init__(segment, name, owner)
+        self._shown = self.buffer
+        self.buffer = memoryview(bytearray(self.size))
+        self.is_new = False
+        self.sampled = 0
+
+    @contextmanager
+    def lock(self, timeout: float = LOCK_PATIENCE) -> Iterator[None]:
+        """No lock is needed: nobody else sees the next picture."""
+        yield
+
+    def stamp(self, time_us: int) -> None:
+        self.sampled = time_us
+
+    def notify_all(self) -> None:
+        """There is a new picture; ``announce`` will notify its readers."""
+        self.is_new = True
+
+    def announce(self) -> None:
+        """Show the picture and notify the readers."""
+        self.is_new = False
+        with super().lock():
+            self._shown[:] = self.buffer
+            super().stamp(self.sampled)
+            super().notify_all()
+
+    def close(self) -> None:
+        self._shown = memoryview(b"")
+        super().close()
+
+
+class Announcer:
+    """All the memories of a service; ``readers`` are expected to wait for pictures of all of them together."""
+
+    def __init__(self, readers: int) -> None:
+        self._readers = readers
+        self.memories: list[AnnouncedMemory] = []
+
+    @property
+    def new(self) -> list[AnnouncedMemory]:
+        """Those that hold a picture that is not announced yet."""
+        return [memory for memory in self.memories if memory.is_new]
+
+    @property
+    def sampled(self) -> int:
+        """When the newest picture was sampled."""
+        return max((memory.sampled for memory in self.memories), default=0)
+
+    def await_readers(self, stopped: Callable[[], bool]) -> bool:
+        """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``.
+
+        The kernel gives no notice when a process begins to wait, so this polls, less and less often.
+        """
+        pause = _POLL_S
+        while sum(memory.readers_waiting() for memory in self.memories) < self._readers:
+            if stopped():
+                return False
+            time.sleep(pause)
+            pause = min(pause * 1.2, _LONGEST_POLL_S)
+        return True
+
+    def announce(self) -> None:
+        """Announce all new pictures."""
+        for memory in self.new:
+            memory.announce()
+
+
+EPOCH = 1_700_000_000_000_000
+"""The time at which every test in lockstep begins, in microseconds since the epoch."""
+
+LONGEST = 2 * 86_400_000_000
+"""Longest test, in microseconds."""
+
+_REMEMBERED = 50
+_Key = tuple[int, bytes, int, int, int]
+
+
+class Observer:
+    """Merges the messages of the test's services, which the clock passes on completely, with the rest of the bus.
+
+    Messages of services may be on the bus, too, early or late: those from the clock count. Messages of the application
+    count as they are on the bus, not as the clock passes them on. ``marked`` adds to a step (its time in us, and all
+    messages that the clock passes on) what tells a recording how it went.
+    """
+
+    def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:
+        self._marked = marked
+        self._collected: list[Envelope] = []
+        self._first: set[_Key] = set()
+        self._relayed: deque[set[_Key]] = deque()
+        self._counts: Counter[_Key] = Counter()
+        """In how many of the sets each key is."""
+
+    def collect(self, envelope: Envelope) -> None:
+        """An envelope that was on the bus."""
+        self._collected.append(envelope)
+
+    def deliver(self, inbox: Inbox, until: int, relayed: Sequence[Envelope]) -> None:
+        """Deliver all of a step (its end ``until`` in us), after the application's answer to the one before.
+
+        The answer to this one, and what belongs to later ones, waits: whether it is there already is chance.
+        """
+        own = [envelope for envelope in relayed if not envelope.received]
+        keys = {_key(envelope) for envelope in own}
+        if len(self._first) < len(keys) and until <= EPOCH:
+            self._first = keys  # the clock repeats these for applications that start late
+        self._remember(keys)
+        collected, self._collected = self._collected, []
+        for envelope in collected:
+            if until <= envelope.sample_time <= EPOCH + LONGEST:
+                self._collected.append(envelope)
+            elif not self._is_known(_key(envelope)):
+                inbox.observe(envelope)
+        for envelope in self._marked(until, relayed) if self._marked else own:
+            inbox.observe(envelope)
+
+    def flush(self, inbox: Inbox) -> None:
+        """The test is over: deliver what waits for a step that will not come."""
+        for envelope in self._collected:
+            if not self._is_known(_key(envelope)):
+                inbox.observe(envelope)
+        self._collected = []
+
+    def _remember(self, keys: set[_Key]) -> None:
+        self._relayed.append(keys)
+        self._counts.update(keys)
+        if len(self._relayed) > _REMEMBERED:
+            for key in self._relayed.popleft():
+                self._counts[key] -= 1
+                if not self._counts[key]:
+                    del self._counts[key]
+
+    def _is_known(self, key: _Key) -> bool:
+        return key in self._first or key in self._counts
+
+
+def _key(envelope: Envelope) -> _Key:
+    """The same for every copy of a message."""
+    return envelope.data_type, envelope.payload, envelope.sent, envelope.sample_time, envelope.sender_stamp
+
+
+RECORDED_STEP, RECORDING_END = "dodo.RecordedStep", "dodo.RecordingEnd"
+
+
+class StepMarks:
+    """Makes the envelopes that mark steps in a recording; their sample time is that of the step before."""
+
+    def __init__(self, messages: MessageSet) -> None:
+        self._messages, self._type, self._id = messages, messages.type(RECORDED_STEP), messages.id(RECORDED_STEP)
+        self._number = 0
+        self._last = EPOCH
+
+    def of(self, time: int, relayed: Sequence[Envelope]) -> Iterator[Envelope]:
+        """What a recording holds of a step at ``time`` (us) that brought ``relayed``; one mark at least."""
+        self._number += 1
+        if not relayed or not relayed[0].received:
+            yield self._mark(time, ())
+        for is_own, group in groupby(relayed, key=lambda envelope: not envelope.received):
+            messages = list(group)
+            yield from messages if is_own else (self._mark(time, messages),)
+        self._last = max(time, EPOCH)
+
+    def _mark(self, time: int, others: Iterable[Envelope]) -> Envelope:
+        message = self._type(number=self._number, time=time, frames=b"".join(map(encode_frame, others)))
+        return Envelope(self._id, self._messages.encode(message), self._last, 0, self._last, 0)
+
+
+__all__ = ["EPOCH", "LockstepClock"]
+
+_GOODBYES = 10
+_LINGER_S = 0.05
+
+
+class StepSource(Protocol):
+    """Where steps come from and their answers go, as ClockClient implements it; ``is_over`` when no more will come."""
+
+    is_over: bool
+
+    def next_step(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None: ...
+    def answer(self, reply: Reply, on_the_bus: bool = False) -> None: ...
+    def repeat(self) -> None: ...
+    def is_acknowledged(self) -> bool: ...
+    def close(self) -> None: ...
+
+
+class LockstepClock:
+    """Test time in the clock service's steps; ``name`` is the service's name in the test.
+
+    Steps come from ``source``, by default from the clock service, which has the ``key`` of the test.
+    """
+
+    relays = True
+
+    def __init__(
+        self, session: Session, name: str, readers: int, source: StepSource | None = None, key: bytes = b""
+    ) -> None:
+        self._session, self._name = session, name
+        self._step_done = session.messages.type(STEP_DONE)
+        self._client: StepSource = source or ClockClient(session, name, key)
+        self._now = EPOCH - 1
+        self._number = -1
+        self._open = False
+        self._sent: list[bytes] = []
+        self._announcer = Announcer(readers)
+        self._observer = Observer(StepMarks(session.messages).of)
+        self._next = 0
+        self._consumed = ""
+
+    def now(self) -> int:
+        return self._now
+
+    @property
+    def has_new_picture(self) -> bool:
+        return bool(self._announcer.new)
+
+    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+        """As ``Clock.steps``; messages are delivered in the order of their sample times."""
+        self._consumed = "" if inbox.observes else ",".join(map(str, sorted(inbox.consumes)))
+        yield from self._steps(period, inbox, stopped)
+        if inbox.observes:
+            self._observer.flush(inbox)
+
+    def _steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+        number, due = 0, EPOCH
+        while (step := self._next_step(inbox, stopped)) is not None:
+            if inbox.observes:
+                self._observer.deliver(inbox, step.time, step.messages)
+            messages = in_order(step.messages)
+            while due <= step.time:
+                while messages and messages[0][0] <= due:
+                    inbox.handle(messages.popleft()[1])
+                if stopped():
+                    return
+                self._now = due
+                yield due
+                number += 1
+                due = EPOCH + round(number * period)
+            self._now = step.time
+            for _, envelope in messages:
+                inbox.handle(envelope)
+            if stopped() or (step.show and not self._announcer.await_readers(stopped)):
+                return
+            self._answer(step.show)
+
+    def sent(self, frame: bytes) -> None:
+        """The service has sent this frame."""
+        self._sent.append(frame)
+
+    def expect(self, time: int) -> None:
+        """The test may go on to this time in one step."""
+        self._next = time
+
+    def memory(self, name: str, size: int) -> SharedMemory:
+        """New shared memory whose pictures are announced once, when their readers wait."""
+        memory = AnnouncedMemory.create(name, size)
+        self._announcer.memories.append(memory)
+        return memory
+
+    def close(self, stopped: Callable[[], bool]) -> None:
+        """The service ends: answer the open step, and wait until the clock has the answer.
+
+        Its memories stay until the test is over, as removing them would show the last picture once more.
+        """
+        if self._open:
+            self._open = False
+            self._client.answer(self._reply(ended=True))
+            for _ in range(_GOODBYES):
+                if self._client.is_acknowledged():
+                    break
+                self._client.repeat()
+        self._client.close()
+        while self._announcer.memories and not stopped():
+            time.sleep(_LINGER_S)
+
+    def _next_step(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | None:
+        """The next step that is for this service; None when it is to stop."""
+        while not (stopped() or self._client.is_over):
+            step = self._client.next_step(inbox.observes, self._observer.collect)
+            if step is not None:
+                self._number, self._open = step.number, True
+                return step
+        return None
+
+    def _answer(self, show: bool) -> None:
+        """A picture is announced after the answer, so that its readers' messages come after that, too."""
+        self._open = False
+        self._client.answer(self._reply(ended=False), on_the_bus=show)
+        if show:
+            self._announcer.announce()
+
+    def _reply(self, ended: bool) -> Reply:
+        parts = split(self._sent)
+        self._sent = []
+        facts = {
+            "number": self._number,
+            "service": self._name,
+            "parts": len(parts),
+            "memories": len(self._announcer.memories),
+            "pictures": len(self._announcer.new),
+            "sampled": self._announcer.sampled,
+            "ended": ended,
+            "next": self._next,
+            "port": self._session.port,
+            "hears": self._consumed,
+        }
+        self._consumed = ""
+        return [self._step_done(part=part, frames=data, **facts) for part, data in enumerate(parts)]
+
+
+def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:
+    """Messages by when they are due: at their sample time, or after those before if that is not of the test."""
+    due, timed = EPOCH, []
+    for envelope in messages:
+        if EPOCH <= envelope.sample_time <= EPOCH + LONGEST:
+            due = envelope.sample_time
+        timed.append((due, envelope))
+    return deque(sorted(timed, key=lambda each: each[0]))

@@ -1,0 +1,191 @@
+"""The clock for a recording: its steps where it has them, else its messages by when they were received."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from google.protobuf.message import Message
+
+from dodo_dsl.opendlv.address import Address
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
+from services.base.clock import Clock, Inbox
+from services.base.clock_link import Step, decode
+from services.base.evaluator import UnjudgeableError
+from services.base.lockstep_clock import RECORDED_STEP, RECORDING_END, LockstepClock
+
+
+class RecordedStep(NamedTuple):
+    """All messages that a step brought to the services of a test, in order, and its time in us."""
+
+    time: int
+    messages: list[Envelope]
+
+
+class RecordedSteps:
+    """Gives a LockstepClock one recorded step after the other; what the service sends goes nowhere.
+
+    The service does not hear what it sent itself in the test, so messages that it sends again are left out.
+    """
+
+    def __init__(self, path: Path, messages: MessageSet) -> None:
+        self._steps: Iterator[RecordedStep] = read_steps(path, messages)
+        self._number = 0
+        self._sent: Counter[Envelope] = Counter()
+        self.is_over = False
+
+    def next_step(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None:
+        """The next step; None at the end of the recording."""
+        step = next(self._steps, None)
+        if step is None:
+            self.is_over = True
+            return None
+        self._number += 1
+        return Step(self._number, step.time, False, [each for each in step.messages if not self._is_own(each)])
+
+    def answer(self, reply: list[Message], on_the_bus: bool = False) -> None:
+        """The service has finished a step."""
+        parts: list[Any] = list(reply)
+        self._sent.update(_key(each.envelope) for each in decode(b"".join(part.frames for part in parts)))
+
+    def repeat(self) -> None:
+        """Nobody asks again."""
+
+    def is_acknowledged(self) -> bool:
+        """Nobody has to acknowledge."""
+        return True
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def _is_own(self, envelope: Envelope) -> bool:
+        key = _key(envelope)
+        if not self._sent[key]:
+            return False
+        self._sent[key] -= 1
+        return True
+
+
+def read_steps(path: Path, messages: MessageSet) -> Iterator[RecordedStep]:
+    """The steps of a recording; raises UnjudgeableError where some are missing, and OSError."""
+    step_id, end_id = messages.id(RECORDED_STEP), messages.id(RECORDING_END)
+    step, number = RecordedStep(0, []), 0
+    for envelope in read_envelopes(path):
+        if envelope.received:
+            continue  # as it was on the bus, where anyone can send marks
+        if envelope.data_type == step_id:
+            mark: Any = messages.decode(step_id, envelope.payload)
+            if mark.number != number:
+                if number:
+                    yield step
+                if mark.number != number + 1:
+                    lacks = f"lacks the steps {number + 1} to {mark.number - 1}"
+                    raise UnjudgeableError(
+                        f"the recording {lacks}: it was paused, reached its largest size, or is damaged"
+                    )
+                step, number = RecordedStep(mark.time, []), mark.number
+            step.messages.extend(each.envelope for each in decode(mark.frames))
+        elif number and envelope.data_type != end_id:
+            step.messages.append(envelope)
+    if number:
+        yield step
+
+
+def _key(envelope: Envelope) -> Envelope:
+    """The same for a message of the test and the same one of now."""
+    return envelope._replace(sent=0, received=0)
+
+
+class RecordingClock:
+    """Test time goes from message to message of a recording; nothing waits. Raises OSError.
+
+    Instants begin with the first message, not with the start of the service, which no recording tells. They end where
+    recording ended.
+    """
+
+    relays = False
+    has_new_picture = False
+
+    def __init__(self, path: Path, messages: MessageSet) -> None:
+        self._path, self._end_id = path, messages.id(RECORDING_END)
+        self._now = 0
+
+    def now(self) -> int:
+        return self._now
+
+    def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
+        number, due, start = 0, 0, 0
+        for envelope in self._arrivals():
+            start = start or envelope.received
+            while (due := start + round(number * period)) < envelope.received:
+                if stopped():
+                    return
+                self._now = due
+                yield due
+                number += 1
+            self._now = max(self._now, envelope.received)
+            if envelope.data_type != self._end_id:
+                inbox.handle(envelope)
+            if stopped():
+                return
+
+    def sent(self, frame: bytes) -> None:
+        """It goes nowhere."""
+
+    def expect(self, time: int) -> None:
+        """There are no pictures."""
+
+    def memory(self, name: str, size: int) -> SharedMemory:
+        raise SharedMemoryError(f"a recording has no shared memory '{name}'")
+
+    def close(self, stopped: Callable[[], bool]) -> None:
+        """There is nothing to wait for."""
+
+    def _arrivals(self) -> Iterator[Envelope]:
+        """All messages, the end of the recording as one that was received then."""
+        for envelope in read_envelopes(self._path):
+            if envelope.received:
+                yield envelope
+            elif envelope.data_type == self._end_id:
+                yield envelope._replace(received=envelope.sample_time)
+                return
+
+
+def clock_of(recording: Path, session: Session, role: str) -> Clock:
+    """For the service ``role``; raises OSError for a file that cannot be read."""
+    if next(read_steps(recording, session.messages), None) is None:
+        return RecordingClock(recording, session.messages)
+    return LockstepClock(session, role, 1, RecordedSteps(recording, session.messages))
+
+
+class SilentSession(Session):
+    """Nobody hears what is sent, and nothing is received. It opens no socket."""
+
+    def __init__(self, cid: int, messages: MessageSet) -> None:
+        self.cid, self.messages = cid, messages
+        self.garbage = self.lost = 0
+        self.is_member = self.hears_directly = self.was_direct = False
+        self.address = self.source = ("", 0)
+
+    def send_envelope(self, envelope: Envelope) -> bytes:
+        return encode_frame(envelope)
+
+    def send_directly(self, envelope: Envelope, to: Iterable[Address]) -> bytes:
+        return encode_frame(envelope)
+
+    def hear_directly(self, hears: bool = True) -> None:
+        """There is nothing to hear."""
+
+    def receive(self, timeout: float | None = 0.0) -> Envelope | None:
+        return None
+
+    def deafen(self) -> None:
+        """There is nothing to hear."""
+
+    def close(self) -> None:
+        """Nothing is open."""
