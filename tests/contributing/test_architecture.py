@@ -1,5 +1,6 @@
 """The page of the architecture names what is there: its files, every folder, the layers of the import contract."""
 
+import ast
 import re
 import tomllib
 from pathlib import Path
@@ -46,6 +47,36 @@ def test_its_layers_are_those_of_the_contract() -> None:
     for layer in beside:
         assert set(named[: len(layer)]) == layer
         del named[: len(layer)]
+
+
+PICTURE = PAGE.partition("```\n")[2].partition("```")[0]
+STAGES = ("source", "application", "check", "plan", "emit", "run", "outcome", "report")
+"""What the picture shows from top to bottom."""
+
+
+def imported(stage: str) -> set[str]:
+    """The parts of ``dodo_dsl`` that a stage's modules import."""
+    package = ROOT / "dodo_dsl" / stage
+    found = set()
+    for path in package.rglob("*.py") if package.is_dir() else [package.with_suffix(".py")]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("dodo_dsl"):
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
+                found |= {name.split(".")[1] for name in names}
+    return found - {stage}
+
+
+def test_its_picture_shows_what_imports_what() -> None:
+    """Data flows down: each stage imports one that is above it, and none that is below."""
+    places = [re.search(rf"\b{stage}\b", PICTURE) for stage in STAGES]
+    shown = [place.start() for place in places if place]
+    assert len(shown) == len(STAGES)
+    assert shown == sorted(shown)
+    for number, stage in enumerate(STAGES):
+        others = imported(stage)
+        made = {"outcome"} if stage == "run" else set()
+        assert others.isdisjoint({*STAGES[number + 1 :]} - made), f"{stage} imports what gets its results"
+        assert number == 0 or stage == "outcome" or others & {*STAGES[:number]}, f"{stage} gets nothing from above"
 
 
 def test_the_glossary_is_short_and_in_order() -> None:

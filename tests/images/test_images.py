@@ -171,7 +171,7 @@ def test_service_gets_healthy_and_ends_when_told_to(built: dict[str, str], volum
 
 
 def test_recorder_can_encode_pictures(built: dict[str, str]) -> None:
-    look = "from dodo_dsl.opendlv.memory import pixels as p; from dodo_dsl.opendlv.video import encoder as v; "
+    look = "from dodo_dsl.opendlv import pixels as p; from dodo_dsl.opendlv import video as v; "
     look += "import numpy; "
     look += "picture = p.view(numpy.zeros(p.size('i420', 64, 48), numpy.uint8), 'i420', 64, 48); "
     look += "print(len(v.VideoEncoder('i420', 64, 48, 4).encode(picture)) > 0)"

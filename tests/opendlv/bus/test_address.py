@@ -13,5 +13,5 @@ def test_the_group_and_port_of_libcluon() -> None:
 def test_sandboxes_load_it_without_anything_else() -> None:
     loaded = subprocess.run([sys.executable, "-S", "-c", LOADED], capture_output=True, text=True, check=True).stdout
     assert set(loaded.split()) == {
-        "dodo_dsl", "dodo_dsl.opendlv", "dodo_dsl.opendlv.bus", "dodo_dsl.opendlv.address",
+        "dodo_dsl", "dodo_dsl.opendlv", "dodo_dsl.opendlv.address",
     }  # fmt: skip
