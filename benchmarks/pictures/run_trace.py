@@ -21,7 +21,7 @@ from dodo_dsl.cli.main import main as dodo
 from dodo_dsl.outcome import Outcome
 
 COMMAND, OWN = "dodo run", "processor of dodo run, s"
-BEGINS = {"prepare": "compile", "run": "run", "write": "report"}
+BEGINS = {"prepare": "compile", "run": "run", "save_report": "report"}
 """Functions of the command, and the phases that begin with them."""
 
 
