@@ -1,6 +1,7 @@
-"""What the engine mounts of the host for an application: one within another, missing, or too large to be copied.
+"""What the engine mounts of the host for an application: nested, missing, too large to be copied, or of tests.
 
 In a folder to which a service may write, it could put a link in the place of another mount, which the engine follows.
+No application sees the repository's tests, their output and ``.git``.
 """
 
 import functools

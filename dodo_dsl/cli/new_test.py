@@ -1,4 +1,7 @@
-"""What ``dodo new`` writes for a new test."""
+"""What ``dodo new`` writes for a new test: from a template, as a copy of a shipped test, or extending another one.
+
+The level and the kind say which. A copy of a shipped test is in the user's registry, where it can be changed.
+"""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Where a run comes from: its command, and the folders of its application and tests."""
+"""Where a run comes from: its command, without secrets, and the commits of its application and tests."""
 
 import argparse
 import contextlib

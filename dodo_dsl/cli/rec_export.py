@@ -1,4 +1,7 @@
-"""The exports of ``dodo rec export``, by the option that asks for one."""
+"""The exports of ``dodo rec export``, by the option that asks for one, and data sets of one recording or of many.
+
+A data set is pictures with labels, with a part for validation.
+"""
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence

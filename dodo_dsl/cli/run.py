@@ -1,4 +1,7 @@
-"""dodo run: run tests and judge the application."""
+"""dodo run: run tests and judge the application.
+
+It holds the report's folder, and says so when another run does. It chooses the backend of a run that names none.
+"""
 
 import argparse
 import asyncio

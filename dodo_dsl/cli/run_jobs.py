@@ -1,4 +1,9 @@
-"""From a command line of ``dodo run`` to jobs: compiled tests and the folders of their reports."""
+"""From a command line of ``dodo run`` to jobs: compiled tests, also at samples, and the folders of their reports.
+
+``--samples`` takes tests at samples of their ranges. Shipped tests on the emulated rig, where that is not built,
+are left out: nobody asked for them. The fork server loads while tests are compiled: on another core, it costs no time
+then.
+"""
 
 import argparse
 import contextlib

@@ -1,4 +1,4 @@
-"""What ``dodo search`` and ``dodo tune`` share: how they begin, what their drives need, and live progress."""
+"""A session of ``dodo search`` or ``dodo tune`` with live progress, and the jobs of ``dodo compile --search``."""
 
 import argparse
 import time

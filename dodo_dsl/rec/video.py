@@ -1,4 +1,7 @@
-"""The frames of a camera as an MP4: packets of H.264 as they were recorded, others encoded again."""
+"""The frames of a camera as an MP4, each shown at its time, or as pictures, a file each.
+
+In the MP4 packets of H.264 are as they were recorded, others encoded again.
+"""
 
 import io
 from collections import Counter

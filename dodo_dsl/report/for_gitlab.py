@@ -1,4 +1,8 @@
-"""``junit.xml`` as GitLab reads it: failed is a failure, error an error, the class name is the level."""
+"""Files of a report for GitLab: ``junit.xml`` and ``metrics.txt``, with links to the pages of tests.
+
+In JUnit failed is a failure, error an error, the class name is the level. The metrics are OpenMetrics, which GitLab
+compares between branches.
+"""
 
 import os
 import re

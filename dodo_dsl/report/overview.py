@@ -1,6 +1,8 @@
 """``index.html``: the run at a glance, in one file, with a link to the drive of each test.
 
-It shows everything without its script, which searches, filters and sorts.
+It shows everything without its script, which searches, filters and sorts. Instances of one matrix are a grid:
+parameters by outcome and the value that decided. What checks measured in the latest runs is kept beside the report and
+drawn as small curves.
 """
 
 import base64

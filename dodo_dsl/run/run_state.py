@@ -1,4 +1,4 @@
-"""The state of one test while it runs, and what it decides."""
+"""The state of one test while it runs: how far it is, and what decides it."""
 
 import signal
 from collections.abc import Callable, Iterable, Mapping

@@ -1,4 +1,8 @@
-"""What a recording says of the test that it was made in."""
+"""What a recording says of its test: clock and duration, the longest pause of a program, and which one stayed silent.
+
+A pause is between two answers of the application in real time. A silent program got messages of another one and sent
+nothing.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,8 @@
-"""A service as a process: flags, log, signals, readiness, and its exit code."""
+"""A service as a process: flags, log, signals, readiness, and its exit code.
+
+Its log is also sent on the bus, as LogMessages. An error that ends it says what is wrong, where in the service's own
+code, and the way there. Signals also end a service that is being built, which may wait for hardware.
+"""
 
 import contextlib
 import json

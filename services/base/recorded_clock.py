@@ -1,4 +1,7 @@
-"""The clock for a recording: its steps where it has them, else its messages by when they were received."""
+"""The clock for a recording: its steps where it has them, else its messages by when they were received.
+
+Recorded steps take the place of the link to the clock. The session of services that judge a recording is without a bus.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator

@@ -1,4 +1,8 @@
-"""Pictures from an image, a video or a recording, repeated."""
+"""Sources of pictures: a camera, read in a thread so that the service never waits, and files, repeated.
+
+A V4L2 device is read through OpenCV, the camera of a Raspberry Pi as raw I420 from the pipe of ``rpicam-vid``. Files
+are an image, a video or a recording.
+"""
 
 import contextlib
 import importlib

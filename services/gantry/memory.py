@@ -1,4 +1,7 @@
-"""The limits in the rig's memory: those of its file, read and where needed written before anything moves."""
+"""A rig's limits by the gantry's flags: true ones for what moves it, and its firmware's in the rig's memory.
+
+Those in the memory are read, and where needed written, before anything moves.
+"""
 
 import logging
 import math

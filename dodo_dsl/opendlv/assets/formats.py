@@ -1,6 +1,7 @@
 """The formats of files that parameters name: each a function that yields what is wrong with a file.
 
-Readers are imported where they are needed, as few tests need all of them.
+Of a CSV table it is what all services mind: its columns and rows, and its times. Readers are imported where they are
+needed, as few tests need all of them.
 """
 
 import csv

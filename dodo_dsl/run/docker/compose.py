@@ -1,4 +1,8 @@
-"""``docker compose`` for one compiled test: its configuration, images, network, volumes and containers."""
+"""``docker compose`` for one compiled test: its configuration, images, network, volumes and containers.
+
+Empty folders lie over what an application's mounts would show of the tests: their files, results and history. An error
+message about a generated file leads back to the line of the spec.
+"""
 
 import asyncio
 import contextlib

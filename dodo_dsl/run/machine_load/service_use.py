@@ -1,4 +1,7 @@
-"""What services use so far, with all their processes, by ``/proc``."""
+"""What services use so far, with all their processes: by ``/proc``, or of a container by its control group.
+
+The kernel counts for control groups of versions 1 and 2.
+"""
 
 import contextlib
 import os

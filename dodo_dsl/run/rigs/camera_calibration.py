@@ -1,4 +1,7 @@
-"""The ChArUco board that a camera looks at: what OpenCV knows of it, and its drawing in true size."""
+"""Calibration of a camera: the ChArUco board in true size, and intrinsics from pictures of the board.
+
+Intrinsics are focal length, centre and distortion, with how well they fit.
+"""
 
 import itertools
 import math

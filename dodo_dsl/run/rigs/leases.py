@@ -1,4 +1,9 @@
-"""The leases of a rig: of its CID, and of its devices."""
+"""Leases and quarantine of rigs, by CID, name and devices.
+
+A device is the same under all its names: it is known by its serial number, or else by the path that a name resolves to.
+A quarantine of a rig that failed its health check lasts until somebody clears it. It belongs to the rig's devices, so
+that another name in a ``dodo.yml`` does not end it, and to its name, as a device may be unplugged.
+"""
 
 import contextlib
 import hashlib
