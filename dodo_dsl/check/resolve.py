@@ -39,7 +39,7 @@ class Replayed:
 
 
 def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]) -> Replayed:
-    """For the services of one test; ``own`` are the files with the deployment's messages."""
+    """What services of one test that play recordings send; ``own`` are the files with the deployment's messages."""
     players = [each for each in services if ANYTHING in each.manifest.messages.outputs and _recording(each)]
     if not players:
         return Replayed(wiring, {})

@@ -75,7 +75,7 @@ class Verbosity(IntEnum):
 
 
 def add(parser: argparse.ArgumentParser, quiet: str, verbose: str) -> None:
-    """The two flags, with their help."""
+    """Adds ``-q`` and ``-v``, with their help."""
     group = parser.add_mutually_exclusive_group()
     parser.set_defaults(verbosity=Verbosity.NORMAL)
     for flags, value, text in (

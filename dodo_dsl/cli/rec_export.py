@@ -165,7 +165,7 @@ def is_data_set(options: argparse.Namespace) -> bool:
 
 
 def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
-    """Writes all parts, or nothing; raises what the exports of one recording raise, and SplitError."""
+    """Writes all parts of a data set, or nothing; raises what the exports of one recording raise, and SplitError."""
     files: Sequence[Path] = options.files
     if len(files) > 1 and options.output is None:
         raise NothingSelected("name the folder of the data set with -o")

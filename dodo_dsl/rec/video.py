@@ -53,7 +53,7 @@ class VideoTimes:
 def timed(
     found: Iterator[tuple[int, bytes]], taken: Numbers, times: VideoTimes
 ) -> Iterator[tuple[int, bytes, int, int]]:
-    """Number, packet, when it is shown and for how long, in us; the last as long as the one before."""
+    """A packet's number, the packet, when it is shown and for how long, in us; the last as long as the one before."""
     waiting, lasting = None, DEFAULT_LASTING
     for number, data in found:
         shown = times.shown(int(taken[number]))

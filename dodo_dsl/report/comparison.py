@@ -334,7 +334,7 @@ def to_markdown(comparison: Comparison) -> str:
 
 
 def write(folder: Path, comparison: Comparison | None) -> None:
-    """Writes the file into a report, or without a comparison removes that of an earlier one; raises OSError."""
+    """Writes the Markdown into a report, or without a comparison removes that of an earlier one; raises OSError."""
     path = folder / FILE_NAME
     is_there = path.is_symlink() or path.exists()
     if is_there and not _is_ours(path):

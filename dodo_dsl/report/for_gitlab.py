@@ -30,7 +30,7 @@ def write(
     not_run: Sequence[NotRun] = (),
     runs: Sequence[RunRecord] = (),
 ) -> None:
-    """Writes the file; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
+    """Writes ``junit.xml``; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
 
     Tests that were ``not_run`` are skipped ones; date and host are those of the run, if it is one of ``runs`` alone.
     """
@@ -93,7 +93,7 @@ def xml_text(text: str) -> str:
 
 
 def to_text(outcomes: Sequence[Outcome]) -> str:
-    """Duration of set-up and execution, outcome, margins, every check's value, and what the application used.
+    """``metrics.txt``: duration of set-up and execution, outcome, margins, checks' values, the application's use.
 
     All are labelled with the test.
     """

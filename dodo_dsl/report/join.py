@@ -243,7 +243,7 @@ FIELDS = ("x", "y", "qx", "qy", "qz", "qw")
 
 
 def write(folder: Path, comparison: Comparison | None, other: GivenReport | None) -> None:
-    """Puts the ways into ``folder``, a report, and takes away those of an earlier comparison; raises OSError."""
+    """Puts the other report's ways into ``folder``, a report, in place of an earlier comparison's; raises OSError."""
     for path in sorted(folder.glob(f"*/{BEFORE}")):
         path.unlink()
         page.write_html(path.parent)

@@ -237,7 +237,7 @@ Came = set[tuple[int, int]]
 
 
 def silent_consumer(plan: Plan, folder: Path, recording: Path) -> str:
-    """The first such program in half a sentence, empty where there is none; ``folder`` is the compiled test's.
+    """The first program that got messages and sent none, in half a sentence, or empty; ``folder`` is the test's.
 
     Raises OSError, also for what is no recording, and OdvdError.
     """

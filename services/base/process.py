@@ -54,7 +54,7 @@ def sentence(error: Exception, folder: Path) -> str:
 
 
 def short_traceback(error: Exception, folder: Path) -> str:
-    """These frames as Python prints them; empty where there are none."""
+    """The frames but those of libraries, as Python prints them; empty where there are none."""
     lines = [f'  File "{file}", line {f.lineno}, in {f.name}\n    {f.line}' for file, f in _frames(error, folder)]
     return "\n".join(["Traceback without libraries (most recent call last):", *lines]) if lines else ""
 

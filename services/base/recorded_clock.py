@@ -160,7 +160,7 @@ class RecordingClock:
 
 
 def clock_of(recording: Path, session: Session, role: str) -> Clock:
-    """For the service ``role``; raises OSError for a file that cannot be read."""
+    """The clock for the service ``role``; raises OSError for a file that cannot be read."""
     if next(read_steps(recording, session.messages), None) is None:
         return RecordingClock(recording, session.messages)
     return LockstepClock(session, role, 1, RecordedSteps(recording, session.messages))

@@ -349,7 +349,7 @@ class RpiCamera:
 
 
 def argv(width: int, height: int, freq: float, exposure: float) -> list[str]:
-    """The command: no preview, no end, raw pictures on standard output, each exposed for ``exposure`` s."""
+    """``rpicam-vid``: no preview, no end, raw pictures on standard output, each exposed for ``exposure`` s."""
     size = ["--width", str(width), "--height", str(height)]
     rate = ["--framerate", f"{freq:g}", "--shutter", str(round(exposure * 1e6))]
     return [PROGRAM, "--nopreview", "--timeout", "0", "--codec", "yuv420", "--flush", *size, *rate, "--output", "-"]

@@ -106,7 +106,7 @@ def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = Fa
 
 
 def read(link: Link) -> Limits | None:
-    """The limits that hold; None for a firmware that does not know them, and says so twice. Raises RigError."""
+    """The memory's limits; None for a firmware that does not know them, and says so twice. Raises RigError."""
     unknown = 0
     for _ in range(start.TRIES):
         found = link.exchange(command(Word.LIMITS) + command(Word.STATUS), start.ANSWER)

@@ -125,7 +125,7 @@ def own(cid: int) -> int | None:
 
 
 def lease(preferred: int) -> int:
-    """An id that no process on the machine has, held by a child of this process until that is killed.
+    """A user id that no process on the machine has, held by a child of this process until that is killed.
 
     The ``preferred`` one if it is free, else another. Raises OSError where none is, and where the kernel refuses.
     """

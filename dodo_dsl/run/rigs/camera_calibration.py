@@ -24,7 +24,7 @@ _PIXELS = 2
 
 
 def board() -> cv2.aruco.CharucoBoard:
-    """OpenCV's model of it, in m."""
+    """OpenCV's model of the board, in m."""
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
     return cv2.aruco.CharucoBoard((COLUMNS, ROWS), SQUARE / 1000, MARKER / 1000, dictionary)
 

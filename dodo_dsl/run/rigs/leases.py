@@ -147,7 +147,7 @@ _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
 def folder(is_hardware: bool = False) -> Path:
-    """The operator's folder, else ``DODO_RIGS``, else one in this user's state folder; raises RigProblem.
+    """Where quarantines are: the operator's folder, else ``DODO_RIGS``, else in this user's state; raises RigProblem.
 
     Variables do not count for hardware, as a job could set them.
     """
