@@ -7,6 +7,8 @@ points to stays. A new file has the permissions that the umask leaves it, one th
 
 A rename does not wait for the disk. ``durable`` does, before and after it: for what must outlive a loss of power,
 as a recording cut from another or a rig's quarantine. What can be made again is not worth the wait.
+
+Results of a command replace existing files only with ``--force``, and nothing else ever.
 """
 
 import contextlib

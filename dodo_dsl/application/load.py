@@ -1,4 +1,7 @@
-"""All files of an application merged into one document, with what they extend and include."""
+"""All files of an application merged into one document, with what they extend and include.
+
+``docker compose`` also reads files that it finds beside those that DoDo was given: a warning names them.
+"""
 
 import os
 import re

@@ -1,4 +1,7 @@
-"""The application as it is written, and the messages that its services declare to produce and to consume."""
+"""The application as it is written: its services, their variables, and the messages that they produce and consume.
+
+Variables are the one for a service's image, those that files set, and those that carry the CID.
+"""
 
 import functools
 import re

@@ -1,6 +1,7 @@
-"""What the engine mounts of the host for an application: one within another, missing, or too large to be copied.
+"""What the engine mounts of the host for an application: nested, missing, too large to be copied, or of tests.
 
 In a folder to which a service may write, it could put a link in the place of another mount, which the engine follows.
+No application sees the repository's tests, their output and ``.git``.
 """
 
 import functools
@@ -188,7 +189,7 @@ _OUTPUT = ("generated", "dodo-report")
 
 
 def folders(application: ApplicationSource, deployment: Deployment) -> list[Path]:
-    """The folders with tests and own services, ``.git``, and where compiled tests and reports are by default.
+    """What no application sees: folders with tests and own services, ``.git``, compiled tests and reports by default.
 
     A registry that is the application's own folder, or above it, is none of them.
     """
@@ -215,7 +216,7 @@ def read_by_tests(application: ApplicationSource, deployment: Deployment, files:
 
 
 def unseen_problems(application: ApplicationSource, deployment: Deployment) -> Iterator[Diagnostic]:
-    """Mounts, configs, secrets, files of variables and builds' contexts that lie in such a folder."""
+    """Mounts, configs, secrets, files of variables and builds' contexts in a folder that no application sees."""
     hidden = folders(application, deployment)
     for source, span in _asked_for(application):
         if application.paths.is_open(source) or application.paths.is_writable(source):

@@ -1,4 +1,8 @@
-"""Variables that a test sets for its application: ``application: {env: {SPEED: 0.5}}``."""
+"""Variables of an application: those that a test sets, and those that ``dodo tune`` varies.
+
+A test sets ``application: {env: {SPEED: 0.5}}``. The application has parameters to tune by
+``x-dodo: {tune: {KP: {from: 0.2, to: 3, default: 1}}}``.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""What is wrong, by what it is of: the deployment, a service, a test; and what of it a selection of tests has."""
+"""What is wrong with a deployment, its services and each test, and what of it a selection of tests has.
+
+``unknown-message`` in manifests of own services: each message that a service reads or sends is known.
+"""
 
 import itertools
 import re

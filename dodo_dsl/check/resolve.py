@@ -1,4 +1,9 @@
-"""An instance resolved: arguments converted and wiring computed once, for rules, planner and ``dodo explain`` alike."""
+"""Instances resolved once for rules, planner and ``dodo explain``: arguments, wiring, and what recordings send.
+
+Services that play recordings send messages by their parameters, by what the recordings hold, and by whose it is. A
+recording of a drive holds what the application of that drive sent. What the application of a test sends itself, and
+is judged by, is left out of what is played: it would be taken for the application's.
+"""
 
 import functools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -34,7 +39,7 @@ class Replayed:
 
 
 def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]) -> Replayed:
-    """For the services of one test; ``own`` are the files with the deployment's messages."""
+    """What services of one test that play recordings send; ``own`` are the files with the deployment's messages."""
     players = [each for each in services if ANYTHING in each.manifest.messages.outputs and _recording(each)]
     if not players:
         return Replayed(wiring, {})

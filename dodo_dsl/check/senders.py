@@ -1,4 +1,4 @@
-"""Who alone may send a message of a test, derived from its wiring."""
+"""Who alone may send a message of a test, and what its application must not hear, derived from its wiring."""
 
 from collections.abc import Iterable, Iterator
 

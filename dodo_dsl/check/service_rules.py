@@ -1,6 +1,15 @@
-"""``unknown-service``: ``uses`` names a service with a manifest; ``service-taken``: names in a test are unique.
+"""Rules on the services of a test: their names and layers, parameters, messages and cameras.
 
+``unknown-service``: ``uses`` names a service with a manifest; ``service-taken``: names in a test are unique.
 ``service-reserved``: DoDo adds services of its own to every test.
+``wrong-layer``: a service is in a layer that its manifest lists.
+Parameters fit the manifest: known, complete, of the right type and unit, within bounds, files in place:
+``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
+``missing-file``, ``path-escape``.
+``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
+``camera-source``: what a rig's computer can take pictures from, in which sizes, and how often.
+``camera-size``: a camera's optics, as they were measured, are those of pictures of one size. ``out-of-range``: sizes
+are even.
 """
 
 import math

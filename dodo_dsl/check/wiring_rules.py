@@ -1,8 +1,14 @@
-"""Each message or memory that a service consumes has a producer in the test, or is required of the application.
+"""Rules on what services and application give one another: messages, shared memories, and the test's variables.
 
+Each message or memory that a service consumes has a producer in the test, or is required of the application:
 ``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
 message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces),
 ``true-pose`` (it consumes what only a simulation knows, and the test hides that).
+``application-memory``: the shared memories that the application asks for are made by services of the test.
+``application-variable``: a test sets only variables that are not DoDo's, to values that fit.
+``application-required``: no variable that the compose file requires (``${NAME:?why}``) is certain to be without a
+value, as compose would then refuse the test.
+``application-secret``: no value that a test sets looks like a secret.
 """
 
 from collections.abc import Collection, Iterator, Mapping

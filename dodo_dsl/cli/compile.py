@@ -1,4 +1,8 @@
-"""dodo compile: check tests and write their compose files and child pipeline."""
+"""dodo compile: check tests and write their compose files and child pipeline.
+
+With ``--check --fix`` it writes what has exactly one fix into the files, and shows it as a diff. Diagnostics are text,
+SARIF 2.1.0, JUnit or GitLab's code quality.
+"""
 
 import argparse
 import difflib

@@ -1,4 +1,7 @@
-"""dodo completion: print what lets a shell complete commands, options, tests, services and rigs."""
+"""dodo completion: print what lets a shell complete commands, options, tests, services and rigs.
+
+A shell asks how a command line may go on as argcomplete's scripts ask: with ``_ARGCOMPLETE``.
+"""
 
 import argparse
 import os

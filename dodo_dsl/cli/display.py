@@ -1,6 +1,7 @@
-"""Colours of verdicts and diagnostics: on a terminal, or where FORCE_COLOR asks for them, and never with NO_COLOR.
+"""How commands show things: colours of verdicts and diagnostics, ``-q`` and ``-v``, and a progress bar.
 
-The codes are those of ECMA-48, section 8.3.117 (SGR), in the terminal's own palette.
+Colours are shown on a terminal, or where FORCE_COLOR asks for them, and never with NO_COLOR. The codes are those of
+ECMA-48, section 8.3.117 (SGR), in the terminal's own palette. A progress bar is shown on a terminal alone.
 """
 
 import argparse
@@ -74,7 +75,7 @@ class Verbosity(IntEnum):
 
 
 def add(parser: argparse.ArgumentParser, quiet: str, verbose: str) -> None:
-    """The two flags, with their help."""
+    """Adds ``-q`` and ``-v``, with their help."""
     group = parser.add_mutually_exclusive_group()
     parser.set_defaults(verbosity=Verbosity.NORMAL)
     for flags, value, text in (

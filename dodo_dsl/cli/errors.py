@@ -1,4 +1,7 @@
-"""The end of a command that cannot go on: one sentence and an exit code, whichever part of DoDo raised the error."""
+"""The end of a command: its exit code, and one sentence on an error, whichever part of DoDo raised it.
+
+Exit codes are the same for every command (design section 4); a higher one outranks a lower one.
+"""
 
 import os
 import re

@@ -1,4 +1,7 @@
-"""``dodo compile --forecast``: how long the pipeline will take, in words."""
+"""Forecasts in words: how long a pipeline (``dodo compile --forecast``) or a run on this machine will take.
+
+A run's is from the history of this machine: how many tests run at a time, and how long.
+"""
 
 import functools
 from collections.abc import Callable, Sequence

@@ -1,4 +1,7 @@
-"""Files that a repository with tests needs: dodo.yml, schemas for editors, and those of ``dodo new --deployment``."""
+"""Files that ``dodo new`` writes into a repository with tests, or finds and keeps: dodo.yml, schemas, the pipeline.
+
+Of a file that is kept it says what it lacks, and what in it meets DoDo's pipeline.
+"""
 
 import functools
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""What ``dodo new`` writes for a new test."""
+"""What ``dodo new`` writes for a new test: from a template, as a copy of a shipped test, or extending another one.
+
+The level and the kind say which. A copy of a shipped test is in the user's registry, where it can be changed.
+"""
 
 import os
 import re
@@ -106,7 +109,7 @@ class Start:
 
 
 def start(level: str, kind: str, name: str = "NAME") -> Start:
-    """Raises UsageError where no test, of a ``name``, can have the level and the kind."""
+    """What the test ``name`` begins with; raises UsageError where none can have the level and the kind."""
     if (level, kind) == ("dil", "closed-loop"):
         reason = "a dil test cannot be closed-loop: what was recorded does not react to the application"
         raise UsageError(f"{reason}; try: dodo new {name} --level dil --kind open-loop")

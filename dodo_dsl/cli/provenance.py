@@ -1,4 +1,4 @@
-"""Where a run comes from: its command, and the folders of its application and tests."""
+"""Where a run comes from: its command, without secrets, and the commits of its application and tests."""
 
 import argparse
 import contextlib
@@ -20,7 +20,7 @@ _VALUES = ("level", "backend", "jobs", "clock", "wall_timeout", "isolation", "se
 
 
 def command_line(options: argparse.Namespace) -> str:
-    """Of the options of ``dodo run``; how it is shown, watched and reported is left out."""
+    """The command that repeats a run of these options; how it is shown, watched and reported is left out."""
     return shlex.join(["dodo", "run", *options.test, *_flags(options)])
 
 
@@ -124,7 +124,7 @@ class Origin:
 
 
 def origin(options: argparse.Namespace, deployment: Deployment) -> Origin:
-    """Of the options of ``dodo run``."""
+    """Where a run of these options of ``dodo run`` comes from."""
     files = [] if options.compiled else [*(options.application or deployment.application)]
     application = {"application": files[0].resolve().parent} if files else {}
     return Origin(command_line(options), {**application, "tests": (options.compiled or [deployment.root])[0].resolve()})

@@ -1,4 +1,8 @@
-"""dodo rank: rank applications by the goals of their tests."""
+"""dodo rank: rank applications by the goals of their tests.
+
+Scores of teams have intervals from repeated or sampled runs. A ranking is text, Markdown, JSON, or a page: one file,
+without scripts, with a bar for each score and its interval.
+"""
 
 import argparse
 import math

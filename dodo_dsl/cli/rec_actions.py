@@ -1,4 +1,7 @@
-"""The actions of ``dodo rec``."""
+"""The actions of ``dodo rec``, the recording that they open, and the messages that they know.
+
+Known are a set by version, messages of files, and those of the repository around the recording.
+"""
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence

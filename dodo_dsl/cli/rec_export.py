@@ -1,4 +1,7 @@
-"""The exports of ``dodo rec export``, by the option that asks for one."""
+"""The exports of ``dodo rec export``, by the option that asks for one, and data sets of one recording or of many.
+
+A data set is pictures with labels, with a part for validation.
+"""
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -162,7 +165,7 @@ def is_data_set(options: argparse.Namespace) -> bool:
 
 
 def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
-    """Writes all parts, or nothing; raises what the exports of one recording raise, and SplitError."""
+    """Writes all parts of a data set, or nothing; raises what the exports of one recording raise, and SplitError."""
     files: Sequence[Path] = options.files
     if len(files) > 1 and options.output is None:
         raise NothingSelected("name the folder of the data set with -o")

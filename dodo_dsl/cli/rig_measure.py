@@ -1,4 +1,7 @@
-"""dodo rig measure: the constants of a rig's axes, or of its camera, measured and written into dodo.yml."""
+"""dodo rig measure: the constants of a rig's axes, or of its camera, measured and written into dodo.yml.
+
+Axes: the rig moves to places, and the person at the rig reads where it truly is.
+"""
 
 import argparse
 import sys

@@ -1,4 +1,7 @@
-"""dodo run: run tests and judge the application."""
+"""dodo run: run tests and judge the application.
+
+It holds the report's folder, and says so when another run does. It chooses the backend of a run that names none.
+"""
 
 import argparse
 import asyncio
@@ -39,7 +42,7 @@ from dodo_dsl.terminal import printable
 
 @contextlib.contextmanager
 def reserved(folder: Path, stdout: TextIO) -> Iterator[None]:
-    """Holds the folder, as long as this process lives at most; says so when another run holds it already.
+    """Holds a report's folder, as long as this process lives at most; says so when another run holds it already.
 
     Both go on: their tests have folders of their own there, and the pages and results are those of the later end.
     """
@@ -65,7 +68,7 @@ def _locked(descriptor: int) -> bool:
 
 
 def choose(plans: Sequence[Plan]) -> BackendName:
-    """Processes where the application allows it; else mixed on rigs and without DoDo's images; else docker."""
+    """Process where the application allows that backend; mixed on rigs and without DoDo's images; else docker."""
     by_application = default_backend(plans)
     if by_application == "process":
         return by_application

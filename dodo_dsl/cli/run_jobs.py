@@ -1,4 +1,9 @@
-"""From a command line of ``dodo run`` to jobs: compiled tests and the folders of their reports."""
+"""From a command line of ``dodo run`` to jobs: compiled tests, also at samples, and the folders of their reports.
+
+``--samples`` takes tests at samples of their ranges. Shipped tests on the emulated rig, where that is not built,
+are left out: nobody asked for them. The fork server loads while tests are compiled: on another core, it costs no time
+then.
+"""
 
 import argparse
 import contextlib
@@ -34,7 +39,7 @@ from dodo_dsl.terminal import printable
 
 
 def without_unbuilt(checked: Checked, backend: str | None) -> tuple[Checked, str]:
-    """The same without such tests, and a line about them; with containers, the rig is in an image."""
+    """The same without shipped tests on a rig that is not built, and a line on them; containers have it in an image."""
     if not _runs_processes(checked, backend):
         return checked, ""
     left_out = {test.spec.path for test in checked.tests if test.spec.path in checked.unasked and _is_emulated(test)}
@@ -216,7 +221,7 @@ _ahead: list[ForkServer] = []
 
 
 def begin(words: Sequence[str]) -> None:
-    """Starts one for ``dodo run`` with these words, before its modules are loaded and the words are understood."""
+    """Starts a fork server for ``dodo run`` with these words, before its modules are loaded and they are understood."""
     if not _WITHOUT & set(words):
         server = ForkServer()
         server.load(f"services.{name}" for name in _USUAL)
@@ -237,7 +242,7 @@ class Loading:
 
 @contextlib.contextmanager
 def loading(options: argparse.Namespace, descriptor: int) -> Iterator[Loading]:
-    """The one that has begun, or one that starts now, unless the options of ``dodo run`` say that none is needed.
+    """The fork server that ``begin`` started, or one that starts now, unless ``dodo run``'s options need none.
 
     One that nobody took ends.
     """

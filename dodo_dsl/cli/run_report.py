@@ -1,4 +1,4 @@
-"""The summary at the end of a run."""
+"""The end of a run: its summary, its report on disk, and the history of its tests."""
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence

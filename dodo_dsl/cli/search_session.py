@@ -1,4 +1,4 @@
-"""What ``dodo search`` and ``dodo tune`` share: how they begin, what their drives need, and live progress."""
+"""A session of ``dodo search`` or ``dodo tune`` with live progress, and the jobs of ``dodo compile --search``."""
 
 import argparse
 import time
@@ -36,7 +36,7 @@ INTERRUPTED = "interrupted: the same command goes on from here\n"
 
 @dataclass(frozen=True)
 class Session:
-    """One command; ``work`` takes what it compiles, and ``stdout`` may lose its reader."""
+    """One ``dodo search`` or ``dodo tune``; ``work`` takes what it compiles, and ``stdout`` may lose its reader."""
 
     options: argparse.Namespace
     stdout: TextIO
@@ -195,7 +195,7 @@ MOST_WORKERS = 200
 
 
 def search_jobs(words: Sequence[str], workers: int, application: Sequence[Path]) -> tuple[SearchJobs, ...]:
-    """Jobs for each test once; raises UsageError for a word that is none that can be searched."""
+    """The jobs that search, for each test once; raises UsageError for a word that names no test to search."""
     if workers > MOST_WORKERS:
         raise UsageError(f"--workers {workers} is more than the {MOST_WORKERS} jobs that GitLab runs in parallel")
     files = tuple(path.as_posix() for path in application)

@@ -1,4 +1,7 @@
-"""dodo stats: show how many services the tests share."""
+"""dodo stats: show how many services the tests share.
+
+T tests need M = a T^b services together (thesis, section 5.1); the intervals are by Student's t distribution.
+"""
 
 import argparse
 import math

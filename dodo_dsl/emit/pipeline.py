@@ -1,4 +1,7 @@
-"""The child pipeline: one job per instance or per batch, and GitLab's limits for it."""
+"""The child pipeline: one job per instance or per batch, GitLab's limits for it, and how long it will take.
+
+The forecast is for so many runners, from how long the tests took before.
+"""
 
 import heapq
 import math

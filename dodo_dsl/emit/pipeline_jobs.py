@@ -1,4 +1,7 @@
-"""A job of the child pipeline."""
+"""Jobs of the child pipeline: one a test, or fewer for many tests, and what the parent pipeline wants of all of them.
+
+Tests share jobs in suites whose jobs cost more to begin than to run.
+"""
 
 import heapq
 import shlex

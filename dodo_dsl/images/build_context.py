@@ -1,4 +1,7 @@
-"""The build context: what ``services/Dockerfile`` copies, from a checkout or from an installed wheel."""
+"""The build context: what ``services/Dockerfile`` copies, and wheels for a build without a package index.
+
+Sources come from a checkout or from an installed wheel. pip downloads wheels here, for the base image's Python.
+"""
 
 import contextlib
 import hashlib

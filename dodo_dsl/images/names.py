@@ -1,4 +1,7 @@
-"""The images and their names in a deployment."""
+"""The images by name: DoDo's, and those of a user's own services.
+
+The latter are built each from the ``Dockerfile`` beside its manifest, on a shared stage.
+"""
 
 import re
 from collections.abc import Collection, Iterable, Sequence

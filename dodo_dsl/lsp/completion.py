@@ -1,4 +1,7 @@
-"""Completion: the keys, services, parameters, values and units that may stand at the cursor."""
+"""Completion: the keys, services, parameters, values and units that may stand at the cursor.
+
+A text that is being written is most often no YAML: the cursor's place is found in what stands before it.
+"""
 
 import re
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,7 @@
-"""The open documents of an editor, and files by their paths."""
+"""The open documents of an editor, places in their texts, and the keys that lead to a place.
+
+YAML counts lines and columns, an editor lines and code units.
+"""
 
 import bisect
 import re

@@ -1,7 +1,8 @@
-"""What editors complete and explain: the services and their parameters, added to the schema of specs.
+"""What editors complete and explain: the schema of specs with services and parameters, and keys of schemas.
 
 Only `$defs.use.allOf` and the `$defs` named `with-...` are generated. DoDo validates without the former, because its
-rules give better messages. ``scripts/make-schema`` writes the file.
+rules give better messages. ``scripts/make-schema`` writes the file. What schemas say of keys is that of tests and of
+``dodo.yml``.
 """
 
 import functools

@@ -1,4 +1,7 @@
-"""Quick fixes: what ``dodo compile --check --fix`` would write, each by itself."""
+"""Edits in the editor: quick fixes, each by itself, as ``dodo compile --check --fix`` would write them, and renaming.
+
+Renamed is a service of a test, or a name of its matrix or ranges, wherever the file has it.
+"""
 
 import re
 from collections.abc import Iterable, Iterator

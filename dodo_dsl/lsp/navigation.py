@@ -1,4 +1,8 @@
-"""Go to definition: tests that are extended, maps and other files, services, parameters, rigs."""
+"""Navigation in the editor: go to definition, and the outline of a document.
+
+Definitions are those of tests that are extended, maps and other files, services, parameters and rigs. The outline has a
+document's keys, with layers, services and their parameters below.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""The tests around the open files: which belong together, and what is wrong with them."""
+"""The tests around the open files: which belong together, what is wrong with them, and each document among them.
+
+What the editor shows counts in place of what the files hold. What a change cannot affect is not checked again.
+"""
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence

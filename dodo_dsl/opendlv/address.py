@@ -1,6 +1,7 @@
-"""Where messages go: the UDP multicast group and port of each session, as for libcluon, and which of them go past it.
+"""Where messages go, and the header of their frames.
 
-Imports the standard library alone, as sandboxes load it and start often.
+Each session has a UDP multicast group and port, as for libcluon; some messages go past it. A header is ``0D A4`` and
+the length of the envelope behind it. Imports the standard library alone, as sandboxes load it and start often.
 """
 
 Address = tuple[str, int]

@@ -1,6 +1,7 @@
 """Payloads of one message decoded thousands at once: an array for each field.
 
 Payloads as libcluon writes them, every field once and in order, are read together; others through the codec.
+Reference: Protocol Buffers, "Encoding", base 128 varints. Numbers of more than 8 bytes are left to the codec, too.
 """
 
 from collections.abc import Iterator

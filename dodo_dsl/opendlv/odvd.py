@@ -1,4 +1,4 @@
-"""Parser of message specifications (``.odvd``), the language of libcluon's ``cluon-msc``.
+"""Message specifications (``.odvd``), the language of libcluon's ``cluon-msc``: their parser and field types.
 
     package a.b;                                  // optional
     message Name [id = 1] {

@@ -1,6 +1,9 @@
 """One shared memory in libcluon's POSIX mode: an object of shm_open whose first bytes hold size, mutex, condition.
 
-The time stamp of the content is the object's own time of modification. Nothing lies in /tmp.
+The time stamp of the content is the object's own time of modification. Nothing lies in /tmp. Mutex and condition are
+those of the C library: the mutex is robust (the death of its holder releases it) and, as the condition, shared between
+processes; the condition counts on the monotonic clock. Reference: POSIX.1-2008, pthread_mutex_lock and
+pthread_cond_wait; the layouts are those of glibc.
 """
 
 import ctypes

@@ -1,7 +1,8 @@
 """Recordings (``.rec``): frames one after the other, without header or footer, read as a stream or by an index.
 
 A recording may be cut, hold garbage, be unsorted or have sample times of zero: what is not a frame is skipped
-and noted in a :class:``Damage``.
+and noted in a ``Damage``. Memory of a stream is bounded by one chunk and the largest frame, 16 MiB, however large the
+file is.
 """
 
 import os

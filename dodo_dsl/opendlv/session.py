@@ -1,4 +1,8 @@
-"""A session on the bus: UDP multicast as libcluon's OD4Session speaks it, without threads."""
+"""A session on the bus: UDP multicast as libcluon's OD4Session speaks it, without threads.
+
+A filter lets the kernel drop datagrams with other messages, so that they wake no process. Linux:
+Documentation/networking/filter.rst, "classic" BPF. A program sees a datagram from its UDP header on.
+"""
 
 import contextlib
 import ctypes

@@ -1,4 +1,9 @@
-"""The SysV objects of one shared memory, found by the keys of its token file: segment, mutex and condition."""
+"""One shared memory in libcluon's SysV mode: a token file in /tmp, and segment, mutex and condition by its keys.
+
+A key has 16 bits of the file's inode, 8 of the device and 8 of a project number (ftok of the C library), so two files
+can give the same keys. A creator therefore moves its token to another inode when another file there has its keys.
+Operations on semaphores end, though the wheels of sysv_ipc are built without time limits.
+"""
 
 import ctypes
 import errno

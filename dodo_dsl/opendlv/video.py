@@ -1,4 +1,7 @@
-"""Compressed camera frames of recordings (``opendlv.proxy.ImageReading``) back to pictures, through PyAV."""
+"""Compressed camera frames to pictures, and pictures to packets of h264, through PyAV.
+
+Frames are those of recordings (``opendlv.proxy.ImageReading``), pictures those of a shared memory.
+"""
 
 import shlex
 import sys

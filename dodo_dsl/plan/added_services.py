@@ -1,4 +1,8 @@
-"""The clock service of a test in lockstep: the order of its services, and the messages that answer a frame."""
+"""Services that the compiler adds to a test or changes: the clock, the recorder, and cameras of an emulated rig.
+
+The clock of a test in lockstep knows the order of its services, and the messages that answer a frame. The recorder,
+which every test has, takes all messages, and the pictures of the test's cameras.
+"""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

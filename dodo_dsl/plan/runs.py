@@ -1,4 +1,7 @@
-"""The Plans of a run: each test as many times as it is repeated."""
+"""The Plans of a run: each test as many times as it is repeated, and for any rig of its pool.
+
+Plans of a test on a pool, one for each rig, are taken together.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

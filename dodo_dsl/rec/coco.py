@@ -1,7 +1,8 @@
 """Frames with detections as a labelled data set in the COCO format (pictures, and one ``annotations.json``).
 
 A detection is a DetectionBoundingBox; its class is the DetectionProperty (without ``color:``) or else the DetectionType
-of the same sender, sample time and detection. It belongs to the frame of the same sample time.
+of the same sender, sample time and detection. It belongs to the frame of the same sample time. Where nothing moves, the
+labels of all frames may be those of a truth file.
 Reference: cocodataset.org, "Data format", object detection.
 """
 

@@ -1,4 +1,4 @@
-"""What a recording holds: messages with their rates and gaps, frames, times, and what was skipped."""
+"""What a recording holds: messages with their rates and gaps, frames, times, and what was skipped; also as text."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass

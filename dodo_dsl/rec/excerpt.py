@@ -1,4 +1,4 @@
-"""The part of a recording that a command works on: some messages, and a time range."""
+"""The part of a recording that a command works on, some messages and a time range, and its copy byte for byte."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

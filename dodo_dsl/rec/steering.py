@@ -1,7 +1,8 @@
 """Frames with the requests that answered them, for programs that learn to steer from pictures (pictures, one table).
 
 A frame is answered by the first GroundSteeringRequest of its sample time or later, at most ``PATIENCE`` later: an
-application of DoDo's tests copies the frame's sample time, a person at the wheel reacts after it.
+application of DoDo's tests copies the frame's sample time, a person at the wheel reacts after it. Recordings of a data
+set are for training or for validation.
 """
 
 import csv

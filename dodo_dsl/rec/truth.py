@@ -1,6 +1,7 @@
 """True boxes of one picture: marked manually or read from COCO JSON, checked, drawn, and written as COCO JSON.
 
 Reference: cocodataset.org, "Data format", object detection; boxes are in pixels from the picture's upper left corner.
+On disk a truth is the COCO file, its picture, and the same picture with the boxes drawn.
 """
 
 import json

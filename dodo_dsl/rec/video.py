@@ -1,4 +1,7 @@
-"""The frames of a camera as an MP4: packets of H.264 as they were recorded, others encoded again."""
+"""The frames of a camera as an MP4, each shown at its time, or as pictures, a file each.
+
+In the MP4 packets of H.264 are as they were recorded, others encoded again.
+"""
 
 import io
 from collections import Counter
@@ -50,7 +53,7 @@ class VideoTimes:
 def timed(
     found: Iterator[tuple[int, bytes]], taken: Numbers, times: VideoTimes
 ) -> Iterator[tuple[int, bytes, int, int]]:
-    """Number, packet, when it is shown and for how long, in us; the last as long as the one before."""
+    """A packet's number, the packet, when it is shown and for how long, in us; the last as long as the one before."""
     waiting, lasting = None, DEFAULT_LASTING
     for number, data in found:
         shown = times.shown(int(taken[number]))

@@ -1,4 +1,10 @@
-"""Two reports compared: which tests changed sides, came or went, and how the checks of those in both changed."""
+"""Two reports compared: which tests changed sides, came or went, and how the checks of those in both changed.
+
+A change is for the better or not by the side of its limit and the margin to it. Terminal, Markdown and the page have
+the words for changes in common. The Markdown is for the note of a merge request: short, and no text of others in it is
+markup. A test has one slug where several reports hold the same: retries, repetitions, or jobs that ran the same test.
+What checks say elsewhere is here, too: what failed, and what only shows where a drive ended.
+"""
 
 import errno
 from collections import Counter
@@ -328,7 +334,7 @@ def to_markdown(comparison: Comparison) -> str:
 
 
 def write(folder: Path, comparison: Comparison | None) -> None:
-    """Writes the file into a report, or without a comparison removes that of an earlier one; raises OSError."""
+    """Writes the Markdown into a report, or without a comparison removes that of an earlier one; raises OSError."""
     path = folder / FILE_NAME
     is_there = path.is_symlink() or path.exists()
     if is_there and not _is_ours(path):

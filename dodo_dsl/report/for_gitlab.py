@@ -1,4 +1,8 @@
-"""``junit.xml`` as GitLab reads it: failed is a failure, error an error, the class name is the level."""
+"""Files of a report for GitLab: ``junit.xml`` and ``metrics.txt``, with links to the pages of tests.
+
+In JUnit failed is a failure, error an error, the class name is the level. The metrics are OpenMetrics, which GitLab
+compares between branches.
+"""
 
 import os
 import re
@@ -26,7 +30,7 @@ def write(
     not_run: Sequence[NotRun] = (),
     runs: Sequence[RunRecord] = (),
 ) -> None:
-    """Writes the file; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
+    """Writes ``junit.xml``; ``attachments`` and ``links`` are pictures and pages by slug, from the working folder.
 
     Tests that were ``not_run`` are skipped ones; date and host are those of the run, if it is one of ``runs`` alone.
     """
@@ -89,7 +93,7 @@ def xml_text(text: str) -> str:
 
 
 def to_text(outcomes: Sequence[Outcome]) -> str:
-    """Duration of set-up and execution, outcome, margins, every check's value, and what the application used.
+    """``metrics.txt``: duration of set-up and execution, outcome, margins, checks' values, the application's use.
 
     All are labelled with the test.
     """

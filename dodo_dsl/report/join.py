@@ -1,4 +1,9 @@
-"""Any number of reports in one new folder, in which every link works offline."""
+"""Any number of reports in one new folder, in which every link works offline.
+
+Copies are of files that reports hold: no symlinks, no more than fits. A report's ``drive.js`` is a script, and may come
+from a stranger: only the value that it assigns is kept, checked to be data, with this DoDo's page and scripts. For a
+comparison, the ways of another report's tests lie beside the pages of this one's, to be drawn over one another.
+"""
 
 import contextlib
 import errno
@@ -238,7 +243,7 @@ FIELDS = ("x", "y", "qx", "qy", "qz", "qw")
 
 
 def write(folder: Path, comparison: Comparison | None, other: GivenReport | None) -> None:
-    """Puts the ways into ``folder``, a report, and takes away those of an earlier comparison; raises OSError."""
+    """Puts the other report's ways into ``folder``, a report, in place of an earlier comparison's; raises OSError."""
     for path in sorted(folder.glob(f"*/{BEFORE}")):
         path.unlink()
         page.write_html(path.parent)

@@ -1,7 +1,8 @@
-"""A report that takes the place of the one before when it is whole.
+"""A report that is drawn beside the run, and takes the place of the one before when it is whole.
 
 It is written in a hidden folder inside the report's, as only there a rename is sure to work. A run that is killed
-leaves the report before as it was, and its own files for the next run to remove.
+leaves the report before as it was, and its own files for the next run to remove. What it has of a test is drawn as soon
+as the test has ended, beside the tests that still run.
 """
 
 import contextlib

@@ -1,6 +1,8 @@
 """``index.html``: the run at a glance, in one file, with a link to the drive of each test.
 
-It shows everything without its script, which searches, filters and sorts.
+It shows everything without its script, which searches, filters and sorts. Instances of one matrix are a grid:
+parameters by outcome and the value that decided. What checks measured in the latest runs is kept beside the report and
+drawn as small curves.
 """
 
 import base64
@@ -134,12 +136,12 @@ _WIDTH, _HEIGHT, _EDGE = 64, 20, 3
 
 
 def write(folder: Path, past: Past) -> None:
-    """The runs of a report's tests; raises OSError."""
+    """Writes what the checks of a report's tests measured in the latest runs; raises OSError."""
     atomic.write_text(folder / FILE_NAME, json.dumps(past, separators=(",", ":"), allow_nan=False) + "\n")
 
 
 def read(folder: Path) -> Past:
-    """The same; empty where there are none."""
+    """What ``write`` wrote into a report's folder; empty where there is nothing."""
     try:
         past = json.loads(regular_file.text(folder / FILE_NAME))
     except (OSError, ValueError, RecursionError):

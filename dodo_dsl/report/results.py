@@ -1,4 +1,8 @@
-"""``results.json``: the outcomes of a run, as ``schemas/results.schema.json`` describes them."""
+"""``results.json``: the outcomes of a run, when, where and of what it was, and how to repeat it.
+
+``schemas/results.schema.json`` describes it. A report that a command line names, by its folder or its
+``results.json``, may come from a stranger.
+"""
 
 import dataclasses
 import json

@@ -1,4 +1,7 @@
-"""A picture with axes, drawn by OpenCV: a plotting library takes a second to load and to draw one."""
+"""A drive from above as a PNG, with axes.
+
+OpenCV draws it: a plotting library takes a second to load and to draw one.
+"""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,8 @@
-"""Files beside a compiled test: those that the application reads, its secrets, and what it never sees."""
+"""Files beside a compiled test: those that the application reads, its secrets, and what it never sees.
+
+Files of tests among an application's own are known by what they are, as their users choose the names: specs and what
+they name, maps, recordings, compiled tests and reports.
+"""
 
 import contextlib
 import functools

@@ -1,4 +1,7 @@
-"""All findings about this machine, and the removal of what killed runs left."""
+"""What this machine offers to tests, by its kernel, disks and programs, and the removal of what killed runs left.
+
+Programs are those that some tests need: a Docker engine, Compose, and the emulator of the rig's firmware.
+"""
 
 import contextlib
 import errno

@@ -1,7 +1,12 @@
-"""Leases: lock files that die with their holder, for CIDs, shared-memory prefixes and running alone.
+"""Leases: lock files that die with their holder, and the queue for them.
 
-A lease is a ``flock`` on an open file, held by every process that inherited the descriptor. Beside it lies a record of
-what it covers, so that the next run can remove what a killed holder left.
+They are for CIDs, shared-memory prefixes and running alone. A lease is a ``flock`` on an open file, held by every
+process that inherited the descriptor. Beside it lies a record of what it covers, so that the next run can remove what a
+killed holder left.
+
+The queue is first come, first served, between all processes that share a lease folder. Each waiter has a ticket: a file
+that it locks, whose name begins with the time of its arrival. Nobody takes a lease for which an earlier ticket waits.
+The lock of a waiter that dies goes with it, so that the others skip its ticket.
 """
 
 import asyncio

@@ -1,4 +1,8 @@
-"""Where tests of the mixed backend run: prepares once for a run, and makes one backend for each test."""
+"""The mixed backend: the application in containers, DoDo's services as processes that share network and memory.
+
+It prepares once for a run, and makes one backend for each test. A container holds a test's network, IPC namespace and
+``/tmp``: it runs a program of this machine, and no image.
+"""
 
 import asyncio
 import contextlib

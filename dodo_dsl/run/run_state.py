@@ -1,4 +1,4 @@
-"""The state of one test while it runs, and what it decides."""
+"""The state of one test while it runs: how far it is, and what decides it."""
 
 import signal
 from collections.abc import Callable, Iterable, Mapping
@@ -335,7 +335,7 @@ class Standing:
 
 
 def standing(state: RunState) -> Standing:
-    """Of what is known now."""
+    """How far a test is, by what is known now."""
     judged = (check for verdicts in state.facts.verdicts.values() for verdict in verdicts for check in verdict.checks)
     seconds = state.time.seconds if state.time else 0.0
     return Standing(seconds, state.plan.lockstep is not None, _nearest(judged))

@@ -1,4 +1,8 @@
-"""What a recording says of the test that it was made in."""
+"""What a recording says of its test: clock and duration, the longest pause of a program, and which one stayed silent.
+
+A pause is between two answers of the application in real time. A silent program got messages of another one and sent
+nothing.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -233,7 +237,7 @@ Came = set[tuple[int, int]]
 
 
 def silent_consumer(plan: Plan, folder: Path, recording: Path) -> str:
-    """The first such program in half a sentence, empty where there is none; ``folder`` is the compiled test's.
+    """The first program that got messages and sent none, in half a sentence, or empty; ``folder`` is the test's.
 
     Raises OSError, also for what is no recording, and OdvdError.
     """

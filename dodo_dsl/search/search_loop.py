@@ -1,4 +1,9 @@
-"""The loop of a search: generation after generation driven, until all are done, time is over or a failure ends it."""
+"""The loop of a search, and its order: generations are driven until all are done, time is over or a failure ends it.
+
+The order is a sweep, and by turns with it what the optimiser proposes. It is the same for every number of drives, so
+that a search with more of them goes on with one that had fewer, and it depends on nothing but the seed and what earlier
+drives said, so that it is the same however many run at once.
+"""
 
 import itertools
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence

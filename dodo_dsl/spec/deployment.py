@@ -1,4 +1,8 @@
-"""The deployment: ``dodo.yml`` at the root of a user's repository."""
+"""The deployment: ``dodo.yml`` at the root of a user's repository, with the limits and services that it gives.
+
+``sandbox`` has limits, with sizes that can be. ``services`` are folders that hold a folder with a manifest for each
+service.
+"""
 
 import ipaddress
 import os

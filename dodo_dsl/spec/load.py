@@ -1,4 +1,8 @@
-"""A file's tests: read, merged over what it extends, and made into instances."""
+"""A file's tests: read, merged over what it extends, set by the command line, and made into instances.
+
+Settings of the command line override the specs before anything is checked or built. ``rig: {any: dynamic}``, a test
+that any rig of a kind, or any of some, may run, is an instance for each of them.
+"""
 
 from collections.abc import Iterator
 from collections.abc import Mapping as Known

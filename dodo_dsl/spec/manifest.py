@@ -1,4 +1,8 @@
-"""Service manifests: a service with its layers, parameters and ports."""
+"""Service manifests: a service with its layers, parameters and ports, and rules that the schema cannot express.
+
+``wrong-manifest``: what concerns two places of a manifest. ``manifest-name``: the service and its folder have the same
+name.
+"""
 
 import functools
 import re

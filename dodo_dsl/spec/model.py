@@ -1,4 +1,9 @@
-"""A spec as it was written: fields that are missing or of a wrong type are None, and diagnostics report them."""
+"""A spec as it was written, with its goals, its pool of rigs, and the resources that it allows.
+
+Fields that are missing or of a wrong type are None, and diagnostics report them. Soft goals are scores of checks, by
+which ``dodo rank`` compares applications. A pool is ``{any: dynamic}`` or ``{any: [kiwi-1, kiwi-2]}``. ``resources``
+are what each service of the application may use of the machine.
+"""
 
 import itertools
 import math

@@ -1,4 +1,7 @@
-"""Finding specs: registries are folders, a test is ``<name>/<name>.dodo.yml``."""
+"""Finding specs, and what a test may be called: registries are folders, a test is ``<name>/<name>.dodo.yml``.
+
+A test is called as its file, which is a job of a pipeline, too.
+"""
 
 import os
 import re

@@ -1,4 +1,8 @@
-"""A service's link to the clock: steps that come once, and answers that are repeated on demand."""
+"""A service's link to the clock: steps that come once, and answers that are repeated on demand.
+
+It is a socket beside the bus, between the clock of a lockstep test and one service, which wakes no others. What they
+exchange is split into datagrams and reassembled.
+"""
 
 import logging
 import select

@@ -1,4 +1,7 @@
-"""Flags in OpenDLV style, ``--key=value``, made from the service's manifest."""
+"""Flags in OpenDLV style, ``--key=value``, and the text of ``--help``, made from the service's manifest.
+
+The manifest is read as far as a command line needs it; the compiler validates manifests.
+"""
 
 import difflib
 import re

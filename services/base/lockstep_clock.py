@@ -1,7 +1,14 @@
 """The clock of a service in lockstep: the clock service alone advances the time of the test.
 
 What a service consumes comes inside the step message and nowhere else, and what it produces goes back inside the
-answer, so that no lost or late datagram can change a result (``docs/explanation/lockstep.md``).
+answer, so that no lost or late datagram can change a result (``docs/explanation/lockstep.md``). A picture in shared
+memory is announced when the clock says so and all its readers wait. A service that observes the bus gets each message
+once, in the step that it belongs to.
+
+A recording has marks of the steps. The messages of the test's services are in it as they were sent, ``received`` at 0,
+behind the ``dodo.RecordedStep`` in which services got it. That holds the application's messages as the clock passed
+them on: with the sample time of the frame, and without surplus answers. They are also in the recording as they were on
+the bus, which does not count here.
 """
 
 import time

@@ -1,4 +1,8 @@
-"""The one loop of all services: deliver, update, send, until there is a verdict, an end or a signal."""
+"""The one loop of all services: deliver, update, send, until there is a verdict, an end or a signal.
+
+It counts how late a service is against its schedule in real time, and which sender stamps it heard: a message under
+another stamp than its own is easily taken for silence.
+"""
 
 import json
 import logging

@@ -1,6 +1,8 @@
-"""The services of a test in real time: each says its address, with a proof that it has the key.
+"""The services of a test: their key, their addresses, who may send what, and what the application must not hear.
 
-From there it sends, and there it gets what the application must not hear.
+In real time each says its address, with a proof that it has the key: DoDo's services alone have it, the application
+never. From there it sends, and there it gets what the application must not hear. The table of who may send which
+message is made by the compiler, of the wiring.
 """
 
 import ctypes

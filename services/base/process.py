@@ -1,4 +1,8 @@
-"""A service as a process: flags, log, signals, readiness, and its exit code."""
+"""A service as a process: flags, log, signals, readiness, and its exit code.
+
+Its log is also sent on the bus, as LogMessages. An error that ends it says what is wrong, where in the service's own
+code, and the way there. Signals also end a service that is being built, which may wait for hardware.
+"""
 
 import contextlib
 import json
@@ -50,7 +54,7 @@ def sentence(error: Exception, folder: Path) -> str:
 
 
 def short_traceback(error: Exception, folder: Path) -> str:
-    """These frames as Python prints them; empty where there are none."""
+    """The frames but those of libraries, as Python prints them; empty where there are none."""
     lines = [f'  File "{file}", line {f.lineno}, in {f.name}\n    {f.line}' for file, f in _frames(error, folder)]
     return "\n".join(["Traceback without libraries (most recent call last):", *lines]) if lines else ""
 

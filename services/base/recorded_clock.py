@@ -1,4 +1,7 @@
-"""The clock for a recording: its steps where it has them, else its messages by when they were received."""
+"""The clock for a recording: its steps where it has them, else its messages by when they were received.
+
+Recorded steps take the place of the link to the clock. The session of services that judge a recording is without a bus.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -157,7 +160,7 @@ class RecordingClock:
 
 
 def clock_of(recording: Path, session: Session, role: str) -> Clock:
-    """For the service ``role``; raises OSError for a file that cannot be read."""
+    """The clock for the service ``role``; raises OSError for a file that cannot be read."""
     if next(read_steps(recording, session.messages), None) is None:
         return RecordingClock(recording, session.messages)
     return LockstepClock(session, role, 1, RecordedSteps(recording, session.messages))

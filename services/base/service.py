@@ -1,4 +1,4 @@
-"""The interface of services: a model with inputs and a period, built from flags."""
+"""The interface of services: a model with inputs and a period, built from flags, and an evaluator's verdict."""
 
 import json
 import logging

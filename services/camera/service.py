@@ -1,4 +1,4 @@
-"""The camera as a service: pictures into shared memory at a fixed rate."""
+"""The camera as a service: pictures into shared memory at a fixed rate, and its state for observers of the bus."""
 
 from collections.abc import Iterable
 from pathlib import Path

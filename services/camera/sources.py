@@ -1,4 +1,8 @@
-"""Pictures from an image, a video or a recording, repeated."""
+"""Sources of pictures: a camera, read in a thread so that the service never waits, and files, repeated.
+
+A V4L2 device is read through OpenCV, the camera of a Raspberry Pi as raw I420 from the pipe of ``rpicam-vid``. Files
+are an image, a video or a recording.
+"""
 
 import contextlib
 import importlib
@@ -345,7 +349,7 @@ class RpiCamera:
 
 
 def argv(width: int, height: int, freq: float, exposure: float) -> list[str]:
-    """The command: no preview, no end, raw pictures on standard output, each exposed for ``exposure`` s."""
+    """``rpicam-vid``: no preview, no end, raw pictures on standard output, each exposed for ``exposure`` s."""
     size = ["--width", str(width), "--height", str(height)]
     rate = ["--framerate", f"{freq:g}", "--shutter", str(round(exposure * 1e6))]
     return [PROGRAM, "--nopreview", "--timeout", "0", "--codec", "yuv420", "--flush", *size, *rate, "--output", "-"]

@@ -1,4 +1,7 @@
-"""The application under test as the clock sees it: it gets pictures and answers them."""
+"""The application under test as the clock sees it: it gets pictures and answers them.
+
+How long it takes for an answer is measured: lockstep hides that, as the world waits for it.
+"""
 
 import statistics
 import time

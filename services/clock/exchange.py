@@ -1,4 +1,7 @@
-"""Commands to services and their results, over the bus and beside it: repeated until each is answered."""
+"""Commands of the clock to the services of a test: repeated until each is answered; and how a test can end.
+
+Commands and results go over the bus and beside it.
+"""
 
 import select
 import time

@@ -1,4 +1,8 @@
-"""The evaluator of a closed loop: gates and goal are to be reached in time, and no wall touched before."""
+"""The evaluator of a closed loop: gates and goal are to be reached in time, and no wall touched before.
+
+Checks are made of measures taken while the vehicle drives, and of the application's requests: which came, and for how
+long none did.
+"""
 
 import math
 from collections.abc import Iterator, Sequence

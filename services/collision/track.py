@@ -1,4 +1,8 @@
-"""The track by which a vehicle is judged: the obstacles of a map by their purpose."""
+"""The track by which a vehicle is judged: the obstacles of a map by their purpose, gates, and the vehicle's area.
+
+Metres and rad, world frame. Obstacles of an OpenDLV map are lines on the ground that have a name. Gates are lines that
+the vehicle's centre has to cross in order. A vehicle is a rectangle on the ground, which covers an area when it moves.
+"""
 
 import difflib
 import math

@@ -1,4 +1,9 @@
-"""How far a signal is from its target: equations 4.6 to 4.9 of the thesis, the same over time, and the checks."""
+"""How a signal compares with its target: its distance, the time that samples cover, late samples, and its shape.
+
+The distance is by equations 4.6 to 4.9 of the thesis, and the same over time. Late are samples whose times are not
+believed: holes must not be filled afterwards, nor the future be answered. The shape is how late the signal follows its
+target, and how long it stays the same.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

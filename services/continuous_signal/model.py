@@ -1,4 +1,4 @@
-"""The evaluator of an open loop: a signal of the application against its target."""
+"""The evaluator of an open loop: a signal of the application against its target, with the verdict in one sentence."""
 
 from array import array
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,8 @@
-"""The target of a signal: samples in the order of their times, and straight lines between them."""
+"""A signal, which is a field of a message, and its target, from a CSV table or a recording.
+
+A target is samples in the order of their times, and straight lines between them. That from a recording is the field of
+a recorded message over its sample times.
+"""
 
 import difflib
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The line to the rig: found first, then supervised, and never left without a stop."""
+"""The line to the rig's Arduino, a serial port: found first, then supervised, and never left without a stop."""
 
 import contextlib
 import errno

@@ -4,6 +4,7 @@ Where standard input is a pipe, its end stops the rig, too: the command that mov
 Actions: ``status``, ``home``, ``goto X Y YAW`` (m, m, degrees), ``calibrate`` and ``check``. The rig is stopped
 at every exit, unless a fault has stopped it: that is kept to be seen, and ``calibrate`` acknowledges it. Exit codes:
 0 done, 1 the rig cannot (``error`` says why; of ``check``, ``reason`` says why it is not fit), 2 usage.
+A rig is fit for a test when its line answers reliably and in time, and its home has not moved.
 """
 
 import json

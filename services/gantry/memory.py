@@ -1,4 +1,7 @@
-"""The limits in the rig's memory: those of its file, read and where needed written before anything moves."""
+"""A rig's limits by the gantry's flags: true ones for what moves it, and its firmware's in the rig's memory.
+
+Those in the memory are read, and where needed written, before anything moves.
+"""
 
 import logging
 import math
@@ -103,7 +106,7 @@ def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = Fa
 
 
 def read(link: Link) -> Limits | None:
-    """The limits that hold; None for a firmware that does not know them, and says so twice. Raises RigError."""
+    """The memory's limits; None for a firmware that does not know them, and says so twice. Raises RigError."""
     unknown = 0
     for _ in range(start.TRIES):
         found = link.exchange(command(Word.LIMITS) + command(Word.STATUS), start.ANSWER)

@@ -1,7 +1,12 @@
-"""Velocities of the vehicle's body as the rig can follow them: turned into its frame and kept within its limits.
+"""Velocities of the vehicle's body as the rig can follow them, and places as its firmware converts them.
 
-The rig's frame: x forward, y to the left, 0 in the middle, heading counter-clockwise from forward. The camera stands
-for the vehicle's centre of mass.
+Velocities are turned into the rig's frame and kept within its limits. The rig's frame: x forward, y to the left, 0 in
+the middle, heading counter-clockwise from forward. The camera stands for the vehicle's centre of mass.
+
+The firmware's conversion to steps (Table 4.2) is built in: a place is y = c x + offset full steps from home. Where c
+and offset were measured on a rig, commands carry the place that the firmware converts to the same steps. So there are
+two frames: true places, of specs, kinematic states, frames and limits of ``dodo.yml``; and the firmware's, of the line
+and of the limits in the rig's memory.
 """
 
 import math

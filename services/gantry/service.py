@@ -1,4 +1,7 @@
-"""The gantry on the bus: moves the rig as the vehicle moves, and publishes the rig's position."""
+"""The gantry on the bus: moves the rig as the vehicle moves, and publishes the rig's position.
+
+Its telemetry says how evenly commands are sent to the rig, and how long the rig takes to answer.
+"""
 
 import math
 import statistics

@@ -1,4 +1,7 @@
-"""Position and orientation of a body from its velocities, exactly, whatever the step."""
+"""Position and orientation of a body from its velocities, exactly, whatever the step.
+
+Rotations are unit quaternions (x, y, z, w); the motion of a body of constant velocities is exact.
+"""
 
 import math
 from dataclasses import dataclass

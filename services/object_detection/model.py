@@ -1,4 +1,7 @@
-"""The evaluator of a perception: the application's boxes against the true ones, frame by frame."""
+"""The evaluator of a perception: the application's boxes against the true ones, frame by frame.
+
+The verdict is one sentence.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,8 @@
-"""How frames are judged, what is counted over all of them, and the checks made of it."""
+"""How frames are judged: objects found, false or missed, kinds of mistakes, silence, and the checks made of them.
+
+Kinds of mistakes let a verdict say what is wrong. Silence is which frames the application left without an answer, and
+for how long it said nothing.
+"""
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -1,4 +1,7 @@
-"""Where a vehicle was when a picture was taken, from the poses measured before and after it."""
+"""Where a vehicle was when a picture was taken, from the poses measured before and after it.
+
+The pictures are those that another program shares; their sample times are followed in its memory.
+"""
 
 from bisect import bisect_left
 from collections import deque

@@ -1,4 +1,7 @@
-"""A recording that is written: frames in order, up to a size, while recording is on."""
+"""A recording that is written: frames in order, up to a size, while recording is on; of pictures, the newest ones.
+
+What a test may send has limits: a flood ends the recording, and the error says which messages it is made of.
+"""
 
 import json
 import logging

@@ -1,4 +1,7 @@
-"""The part of a recording to play: a span of time, some messages, and the pictures of one camera."""
+"""The part of a recording to play (a span of time, some messages, one camera's pictures), and where its player is.
+
+A player goes by test time and by commands; it is pure, without a recording.
+"""
 
 import logging
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The entries of a part in order, read in blocks, pictures decoded ahead."""
+"""The entries of a part in order, read in blocks; pictures decoded ahead and put into shared memory."""
 
 import logging
 from collections.abc import Iterator

@@ -1,4 +1,8 @@
-"""The models of a scene as seen from a place: culled, and the right drawing chosen for each copy."""
+"""The models of a scene as seen from a place: culled, and the right drawing chosen for each copy.
+
+Models that stick into one another or into a block are solids: their faces are cut up so that they hide one another
+rightly. All others are drawn one after another, the farthest first, which is right as long as they do not intersect.
+"""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence

@@ -1,8 +1,9 @@
-"""Where the camera is and how it maps the world to pixels: poses, the pinhole, its frustum.
+"""Where the camera on a vehicle is, how it moves, and how it maps the world to pixels: poses, pinhole, frustum.
 
 Frames of reference: world (z up); body (x forward, y left, z up); camera (x right, y down, z forward).
 Picture coordinates count pixels from the upper left corner and are whole at pixel *centres*: the
-picture spans -0.5 to width - 0.5.
+picture spans -0.5 to width - 0.5. A vehicle is where its frames say; motion is that of its last two
+frames, so that a picture can show what passes while the shutter is open.
 """
 
 import math

@@ -1,4 +1,9 @@
-"""A map loaded for drawing: shapes and where they stand, flat faces, colours of sky and ground."""
+"""A map loaded for drawing: shapes and where they stand, flat faces, colours of sky and ground.
+
+Lines of its obstacles may be tape on the ground, background clutter may be boxes of all colours that stand around what
+it holds, and models may stand beside their places, as people put them down; clutter and places are the same ones for
+the same seed.
+"""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,7 @@
-"""Copies of a shape in front of a camera as flat pieces: shaded, projected, ready to be filled."""
+"""Copies of a shape in front of a camera as flat pieces: shaded, projected, ready to be filled.
+
+The light has a direction, and says how bright it leaves a surface.
+"""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Draws the sky, the ground up to the horizon, and flat faces in one colour or textured."""
+"""Draws the sky, the ground up to the horizon, and flat convex faces in one colour or textured.
+
+Faces are those of the surroundings: floors, walls, boxes.
+"""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""True bounding boxes of the models that a picture shows."""
+"""True bounding boxes of the models that a picture shows, found and sent as messages."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass

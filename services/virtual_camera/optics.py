@@ -1,4 +1,10 @@
-"""From what passes before a camera to the picture that it gives: shutter, lens, overlays and sensor, in this order."""
+"""From what passes before a camera to the picture that it gives: shutter, lens, overlays and sensor, in this order.
+
+Overlays are pictures that the map lays over the camera's, such as a part of the vehicle that is always seen. A sensor
+has exposure, noise and gain. Pictures hold values that are encoded for display (a gamma of 2.2): twice the light is a
+value 2^(1/2.2) times as large. A value v becomes G (E v + n), cut off at 0 and 255, with E and G the encoded exposure
+and gain, and n the noise.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Paths of the host in a compose file: files of the repository, and what else an application may mount."""
+"""Paths of the host in a compose file: files of the repository, what else an application may mount, and rigs' ports.
+
+A rig is moved by its own service, and no application gets its port.
+"""
 
 import contextlib
 import os

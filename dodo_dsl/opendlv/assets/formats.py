@@ -1,6 +1,7 @@
 """The formats of files that parameters name: each a function that yields what is wrong with a file.
 
-Readers are imported where they are needed, as few tests need all of them.
+Of a CSV table it is what all services mind: its columns and rows, and its times. Readers are imported where they are
+needed, as few tests need all of them.
 """
 
 import csv
@@ -232,7 +233,7 @@ Row = tuple[int, str, list[str]]
 
 
 def problem_in_table(path: Path) -> InputError | None:
-    """The first problem; None where each reader has to say what is wrong, and for what is no text."""
+    """The first problem of a CSV table; None where each reader has to say what is wrong, and for what is no text."""
     try:
         rows = list(_rows(regular_file.text(path, encoding="utf-8-sig")))
     except (OSError, ValueError, csv.Error):

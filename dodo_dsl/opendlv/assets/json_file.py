@@ -1,4 +1,7 @@
-"""JSON values that know their file and path, so that every error names its place."""
+"""JSON values that know their file and path, so that every error names its place.
+
+What is wrong with text that is not JSON is in our own words: a table of the mistakes that people make.
+"""
 
 import difflib
 import functools

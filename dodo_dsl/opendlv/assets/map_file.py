@@ -1,4 +1,7 @@
-"""An OpenDLV ``map.json``, checked; models and textures are not loaded yet."""
+"""An OpenDLV ``map.json``, checked, and its obstacles as an evaluator needs them: named lines on the ground.
+
+Models and textures are not loaded yet.
+"""
 
 import math
 from collections.abc import Callable, Iterator

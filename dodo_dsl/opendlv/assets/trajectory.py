@@ -1,4 +1,4 @@
-"""A trajectory through points: where a vehicle is at a time, its heading and its velocity.
+"""A trajectory through way points of a table or a list: where a vehicle is at a time, its heading and its velocity.
 
 World: metres, z up, heading counter-clockwise from the x axis. Between two way points position and heading change
 evenly, the heading by the shorter way round (at exactly half a turn: to the left).

@@ -1,4 +1,7 @@
-"""One service of the copy: its content, the properties of its test, and the changes made."""
+"""One service of the copy: its content, its CID and image, the properties of its test, and the changes made.
+
+The CID is set by flag or by variable.
+"""
 
 from collections.abc import Mapping, MutableSequence
 from dataclasses import dataclass, field

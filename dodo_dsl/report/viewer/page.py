@@ -1,4 +1,4 @@
-"""A test's page: the data of its drive beside it, and what all pages of a report share."""
+"""A test's page: the data of its drive, the lines of the spec that set each limit, and what all pages share."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,8 @@
-"""Names for the images that a run builds, so that an application's file replaces no image on the engine."""
+"""Builds of an application's images: their names in a run, and copies of the folders that they get.
+
+The names let an application's file replace no image on the engine. The copies are without tests, their output and
+``.git``.
+"""
 
 import hashlib
 import json

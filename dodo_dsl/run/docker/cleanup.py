@@ -1,4 +1,8 @@
-"""Stops and removes compose projects on an engine, by their label, and those that killed runs left."""
+"""The end of compose projects on an engine: stopped, reports copied, removed; also those that killed runs left.
+
+Projects are known by their label. Files are copied out of a container from the stream that the engine sends, with one
+chunk at a time in memory.
+"""
 
 import contextlib
 import errno

@@ -1,4 +1,8 @@
-"""``docker compose`` for one compiled test: its configuration, images, network, volumes and containers."""
+"""``docker compose`` for one compiled test: its configuration, images, network, volumes and containers.
+
+Empty folders lie over what an application's mounts would show of the tests: their files, results and history. An error
+message about a generated file leads back to the line of the spec.
+"""
 
 import asyncio
 import contextlib
@@ -37,7 +41,7 @@ from dodo_dsl.run.rigs.permission import known_ports
 
 
 def masks(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> list[dict[str, Any]]:
-    """The mounts that hide them, as ``docker compose config`` shows the service and the file's ``volumes``."""
+    """Mounts that hide folders of tests, as ``docker compose config`` shows the service and the file's ``volumes``."""
     targets = list(dict.fromkeys(map(Path, _targets(service, volumes, hidden))))
     outer = [target for target in targets if not any(parent in targets for parent in target.parents)]
     return [{"type": "tmpfs", "target": str(target), "read_only": True} for target in outer]

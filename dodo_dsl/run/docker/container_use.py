@@ -1,4 +1,4 @@
-"""What the containers of a test's application have used."""
+"""The processes of a test's containers on this machine, and what those of its application have used."""
 
 import contextlib
 import threading

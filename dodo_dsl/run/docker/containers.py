@@ -1,4 +1,7 @@
-"""Tests in containers; apart from the other backends, as its libraries take long to load."""
+"""Tests in containers; apart from the other backends, as its libraries take long to load.
+
+Cameras that containers of DoDo's cannot have are refused.
+"""
 
 import asyncio
 import contextlib

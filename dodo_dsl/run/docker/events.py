@@ -1,4 +1,7 @@
-"""Watches the events of one compose project on an engine, in a thread of its own."""
+"""The events of one compose project on an engine, watched in a thread, and the begin of its test, announced.
+
+Services hear of the begin through their sandbox container, or on the host.
+"""
 
 import asyncio
 import contextlib

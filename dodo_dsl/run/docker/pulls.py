@@ -1,4 +1,7 @@
-"""Pulls images before a test begins: DoDo's own when they are missing, the application's always."""
+"""Pulls images before a test begins: DoDo's own when they are missing, the application's always.
+
+Where engine and registry have none, it says where images of DoDo's services and a user's own come from.
+"""
 
 import asyncio
 import threading

@@ -1,4 +1,8 @@
-"""Whether a machine was too busy for a verdict in real time; the test then ends in error."""
+"""What measured load means: a machine too busy for a verdict, or an application that is slow or takes too much.
+
+A test in real time on a machine that was too busy ends in error. Answers in lockstep, by their times, and the
+application's use of processors and memory become checks where the test asks for them, else notes.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,7 @@
-"""Measures the load of the machine while a test runs: snapshots at short intervals, and what they add up to."""
+"""Measures the load of the machine and the use of the application's services while a test runs, at short intervals.
+
+Snapshots add up to the load. Use is processor time, memory, and how that grows.
+"""
 
 import asyncio
 import bisect

@@ -1,4 +1,10 @@
-"""The processes that ``/proc`` shows, and which descend from which."""
+"""Processes by ``/proc``: which descend from which, their memory, and their processor time and run delay by service.
+
+Memory is told without cgroups, which not every machine hands out. Programs and files that are only read do not count.
+Files in memory that only a descriptor holds (memfd_create(2)), and System V memories that processes are attached to,
+count as shared memory that is mapped does; the larger of both. System V memories to which no process is attached count
+beside these. Time is by thread, added up by service.
+"""
 
 import contextlib
 import os

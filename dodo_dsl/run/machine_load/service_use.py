@@ -1,4 +1,7 @@
-"""What services use so far, with all their processes, by ``/proc``."""
+"""What services use so far, with all their processes: by ``/proc``, or of a container by its control group.
+
+The kernel counts for control groups of versions 1 and 2.
+"""
 
 import contextlib
 import os
@@ -207,7 +210,7 @@ def processor_s(descriptor: int) -> float | None:
 
 
 def of_process(pid: int, proc: Path = Path("/proc")) -> ControlGroup | None:
-    """The group of a process; None where it has none that counts both, as without the controller of memory."""
+    """The control group of a process; None where it has none that counts both, as without the controller of memory."""
     try:
         mounts = (proc / "self" / "mountinfo").read_text()
         groups = (proc / str(pid) / "cgroup").read_text()

@@ -1,4 +1,7 @@
-"""The processes of a sandbox: started or forked, collected when they end, and ended with all their descendants."""
+"""The processes of a sandbox: started or forked, collected when they end, and ended with all their descendants.
+
+A Python module that is forked instead of started has what its parent has loaded already.
+"""
 
 import contextlib
 import functools

@@ -1,4 +1,8 @@
-"""A program of the application in its own sandbox, with the interface of subprocess.Popen that ``Children`` uses."""
+"""A program of the application in its own sandbox, whether this machine can confine it, and how much memory it uses.
+
+The process has the interface of subprocess.Popen that ``Children`` uses. Where an application cannot be confined, the
+probe says whether the machine lacks what that takes.
+"""
 
 import contextlib
 import errno

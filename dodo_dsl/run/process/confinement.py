@@ -1,4 +1,9 @@
-"""What a service of the application sees and may use, as the runner tells its sandbox."""
+"""What a service of the application sees and may use, and the words by which bubblewrap (bwrap(1)) confines it.
+
+A program gets its environment only when it is confined and has given up root: variables such as LD_PRELOAD and PATH
+would otherwise act on the programs that confine it. They come by a file without a name, as everybody on the machine can
+read words of a command line.
+"""
 
 import functools
 import os

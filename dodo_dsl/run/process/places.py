@@ -1,6 +1,10 @@
-"""What a sandbox prepares once for the application: ``/tmp``, a home, its folder with writes apart, what it reads.
+"""What a sandbox prepares once for the application: its folders, and under root a user id that nobody else has.
 
-The user's umask decides about none of these folders: the application's user must enter them.
+Folders are ``/tmp``, a home, the application's own with writes apart, and what it reads. The user's umask decides about
+none of them: the application's user must enter them.
+
+The kernel counts processes, inotify instances and bytes of message queues by user, on the whole machine: in all
+containers and namespaces, whose processes this one may not see. So an id is taken as long as a process has it.
 """
 
 import contextlib
@@ -121,7 +125,7 @@ def own(cid: int) -> int | None:
 
 
 def lease(preferred: int) -> int:
-    """An id that no process on the machine has, held by a child of this process until that is killed.
+    """A user id that no process on the machine has, held by a child of this process until that is killed.
 
     The ``preferred`` one if it is free, else another. Raises OSError where none is, and where the kernel refuses.
     """

@@ -1,4 +1,7 @@
-"""Manual access to a rig through its service's program, while nobody else uses the rig."""
+"""Manual access to a rig and its camera through their programs, while nobody else uses the rig.
+
+A rig's settings become flags of the programs that move it, and limits that its operator permits.
+"""
 
 import asyncio
 import contextlib

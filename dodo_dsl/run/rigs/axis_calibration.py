@@ -1,4 +1,7 @@
-"""The line through an axis' readings: full steps per unit, steps at 0, and how well the readings fit it."""
+"""Calibration of axes: readings as answers, flags and files write them, and the line through those of an axis.
+
+The line has full steps per unit, steps at 0, and how well the readings fit it.
+"""
 
 import math
 from collections.abc import Sequence

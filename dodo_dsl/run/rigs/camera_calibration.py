@@ -1,4 +1,7 @@
-"""The ChArUco board that a camera looks at: what OpenCV knows of it, and its drawing in true size."""
+"""Calibration of a camera: the ChArUco board in true size, and intrinsics from pictures of the board.
+
+Intrinsics are focal length, centre and distortion, with how well they fit.
+"""
 
 import itertools
 import math
@@ -21,7 +24,7 @@ _PIXELS = 2
 
 
 def board() -> cv2.aruco.CharucoBoard:
-    """OpenCV's model of it, in m."""
+    """OpenCV's model of the board, in m."""
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
     return cv2.aruco.CharucoBoard((COLUMNS, ROWS), SQUARE / 1000, MARKER / 1000, dictionary)
 

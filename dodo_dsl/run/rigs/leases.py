@@ -1,4 +1,9 @@
-"""The leases of a rig: of its CID, and of its devices."""
+"""Leases and quarantine of rigs, by CID, name and devices.
+
+A device is the same under all its names: it is known by its serial number, or else by the path that a name resolves to.
+A quarantine of a rig that failed its health check lasts until somebody clears it. It belongs to the rig's devices, so
+that another name in a ``dodo.yml`` does not end it, and to its name, as a device may be unplugged.
+"""
 
 import contextlib
 import hashlib
@@ -142,7 +147,7 @@ _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
 def folder(is_hardware: bool = False) -> Path:
-    """The operator's folder, else ``DODO_RIGS``, else one in this user's state folder; raises RigProblem.
+    """Where quarantines are: the operator's folder, else ``DODO_RIGS``, else in this user's state; raises RigProblem.
 
     Variables do not count for hardware, as a job could set them.
     """

@@ -1,4 +1,8 @@
-"""What the operator of a machine permits with its rigs, before anything opens their devices."""
+"""What the operator of a machine permits with its rigs, before anything opens their devices: ports and motion.
+
+The limits of a rig's motion are by its repository, as the operator measures them. No program of a test may open a
+rig's port but the service that moves the rig.
+"""
 
 import contextlib
 import math

@@ -1,4 +1,7 @@
-"""What the runner does about a real rig during a test: leases, health check and heartbeat."""
+"""What the runner does about a real rig during a test: leases, health check and heartbeat.
+
+A rig that fails the check before a test goes into quarantine.
+"""
 
 import contextlib
 from collections.abc import AsyncIterator, Callable, Sequence
