@@ -20,7 +20,7 @@ def run() -> None:
 
         answer()
     if sys.argv[1:2] == ["run"]:
-        from dodo_dsl.cli.run_jobs import begin
+        from dodo_dsl.cli.loading import begin
 
         begin(sys.argv[2:])
     try:

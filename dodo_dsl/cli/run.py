@@ -17,10 +17,11 @@ from dodo_dsl.cli import display, progress, run_report, selection
 from dodo_dsl.cli.display import Verbosity, chatter
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
 from dodo_dsl.cli.forecast import at_once, expectation, run_forecast, usage
+from dodo_dsl.cli.loading import Loading, loading
 from dodo_dsl.cli.numbers import positive, seconds, seed
 from dodo_dsl.cli.provenance import Origin, origin, recording
 from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.run_jobs import Loading, loading, prepare
+from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.cli.run_report import drawable, save_report
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, signals_interrupt, undisturbed
 from dodo_dsl.outcome import Outcome

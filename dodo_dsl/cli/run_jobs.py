@@ -6,10 +6,9 @@ then.
 """
 
 import argparse
-import contextlib
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
@@ -27,7 +26,6 @@ from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import named, runs
 from dodo_dsl.plan.test_files import file_problem
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.rigs.session import is_real
 from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
@@ -211,50 +209,3 @@ def sample(checked: compiler.Checked, number: int) -> tuple[compiler.Checked, di
         return values
 
     return compiler.sampled(checked, swept), origins
-
-
-_WITHOUT = {"-h", "--help", "docker", "--backend=docker", "host", "--isolation=host"}
-"""Words of commands that hardly need one; a test of such a name only begins later."""
-_USUAL = ("clock", "rec_recorder", "virtual_camera", "integrator", "dynamic_model", "collision")
-"""Services of most tests: which ones they have is known only when they are compiled."""
-_ahead: list[ForkServer] = []
-
-
-def begin(words: Sequence[str]) -> None:
-    """Starts a fork server for ``dodo run`` with these words, before its modules are loaded and they are understood."""
-    if not _WITHOUT & set(words):
-        server = ForkServer()
-        server.load(f"services.{name}" for name in _USUAL)
-        _ahead.append(server)
-
-
-@dataclass
-class Loading:
-    """A fork server until a backend takes it; ``descriptor`` is that of a lease which its sandboxes hold, too."""
-
-    descriptor: int
-    fork_server: ForkServer | None
-
-    def take(self) -> ForkServer | None:
-        taken, self.fork_server = self.fork_server, None
-        return taken
-
-
-@contextlib.contextmanager
-def loading(options: argparse.Namespace, descriptor: int) -> Iterator[Loading]:
-    """The fork server that ``begin`` started, or one that starts now, unless ``dodo run``'s options need none.
-
-    One that nobody took ends.
-    """
-    load = Loading(descriptor, _ahead.pop() if _ahead else None)
-    try:
-        if options.backend == "docker" or options.isolation == "host":
-            if unneeded := load.take():
-                unneeded.kill()
-        else:
-            load.fork_server = load.fork_server or ForkServer()
-            load.fork_server.hold(descriptor)
-        yield load
-    finally:
-        if left := load.take():
-            left.kill()

@@ -13,8 +13,8 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
 from dodo_dsl.cli.forecast import expectation
+from dodo_dsl.cli.loading import Loading, loading
 from dodo_dsl.cli.progress import about, count
-from dodo_dsl.cli.run_jobs import Loading, loading
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
 from dodo_dsl.diagnostics import format_text, has_errors, ordered, told_once
 from dodo_dsl.emit.pipeline import SearchJobs

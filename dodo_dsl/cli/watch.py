@@ -15,9 +15,10 @@ from typing import TextIO
 
 from dodo_dsl.cli import run as cli_run
 from dodo_dsl.cli.errors import UsageError, of_outcomes
+from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.provenance import origin
 from dodo_dsl.cli.run import reserved
-from dodo_dsl.cli.run_jobs import loading, prepare
+from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.comparison import compare, lines
 from dodo_dsl.report.results import GivenReport

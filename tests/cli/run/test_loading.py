@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.cli.run_jobs import begin, loading
+from dodo_dsl.cli.loading import begin, loading
 from dodo_dsl.run.process import fork_server_client
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from tests.run.desk import ROOT
@@ -104,3 +104,10 @@ def test_it_stays_with_who_took_it() -> None:
         assert server is not None and server.is_alive
         server.kill()
     assert not server.is_alive
+
+
+def test_it_begins_before_anything_large_is_loaded() -> None:
+    """As it is to load beside the command."""
+    program = "import sys, dodo_dsl.cli.loading; print(*sys.modules)"
+    words = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert {"asyncio", "yaml", "jinja2", "numpy", "google.protobuf", "dodo_dsl.compiler"}.isdisjoint(words)

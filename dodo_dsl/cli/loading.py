@@ -1,0 +1,57 @@
+"""The fork server loads while the command does, and tests are compiled: on another core, it costs no time then.
+
+Only what takes no time to load is imported here.
+"""
+
+import argparse
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from dodo_dsl.run.process.fork_server_client import ForkServer
+
+_WITHOUT = {"-h", "--help", "docker", "--backend=docker", "host", "--isolation=host"}
+"""Words of commands that hardly need one; a test of such a name only begins later."""
+_USUAL = ("clock", "rec_recorder", "virtual_camera", "integrator", "dynamic_model", "collision")
+"""Services of most tests: which ones they have is known only when they are compiled."""
+_ahead: list[ForkServer] = []
+
+
+def begin(words: Sequence[str]) -> None:
+    """Starts one for ``dodo run`` with these words, before its modules are loaded and the words are understood."""
+    if not _WITHOUT & set(words):
+        server = ForkServer()
+        server.load(f"services.{name}" for name in _USUAL)
+        _ahead.append(server)
+
+
+@dataclass
+class Loading:
+    """A fork server until a backend takes it; ``descriptor`` is that of a lease which its sandboxes hold, too."""
+
+    descriptor: int
+    fork_server: ForkServer | None
+
+    def take(self) -> ForkServer | None:
+        taken, self.fork_server = self.fork_server, None
+        return taken
+
+
+@contextlib.contextmanager
+def loading(options: argparse.Namespace, descriptor: int) -> Iterator[Loading]:
+    """The one that has begun, or one that starts now, unless the options of ``dodo run`` say that none is needed.
+
+    One that nobody took ends.
+    """
+    load = Loading(descriptor, _ahead.pop() if _ahead else None)
+    try:
+        if options.backend == "docker" or options.isolation == "host":
+            if unneeded := load.take():
+                unneeded.kill()
+        else:
+            load.fork_server = load.fork_server or ForkServer()
+            load.fork_server.hold(descriptor)
+        yield load
+    finally:
+        if left := load.take():
+            left.kill()
