@@ -68,13 +68,15 @@ def take(folder):
             except OSError as error:
                 print(error.strerror, name, flush=True)
 """
+OWN = "take('/tmp')\nopen('/tmp/app.log', 'w').close()\nprint('own file', flush=True)\n"
 
 
 def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate) -> None:
     """They are mounted in the ``/tmp`` that the application shares with them, and reaches from a service without it."""
     judge = READY + AFTER_START + f"time.sleep(2)\nos.stat({str(crate.bench.folder)!r})\n" + PASS
-    job = separate(crate.job("takes", judge, TAKES + "take('/tmp')\n" + WAIT, user="0:0"), crate.bench.folder)
+    job = separate(crate.job("takes", judge, TAKES + OWN + WAIT, user="0:0"), crate.bench.folder)
     (app,) = job.plan.application.services
+    app = replace(app, environment={"LOG": "/tmp/app.log"})
     services = (app, replace(app, name="other", after={"app": "service_started"}))
     job = replace(job, plan=replace(job.plan, application=replace(job.plan.application, services=services)))
     (job.folder / "test.json").write_text(to_json(job.plan))
@@ -93,6 +95,7 @@ def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate)
         lines = crate.log("takes", service).splitlines()
         assert names and all(lines.count(f"Device or resource busy {name}") == 2 for name in names), (service, lines)
         assert not [line for line in lines if line.startswith("replaced")]
+    assert "own file" in crate.log("takes")
 
 
 def test_default_without_images_of_dodo(tmp_path: Path) -> None:
