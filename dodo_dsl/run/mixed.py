@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import json
 import os
+import secrets
 import shutil
 from collections.abc import AsyncIterator, Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -104,11 +105,11 @@ class ApplicationCompose(Compose):
         masked, problems = super()._masks()
         if self.plan.isolation == "network":
             shown = Entered.with_own(0, *needed_paths(self.plan, self.folder, self.report)).shown
-            application = {one.name: self.services[one.name] for one in self.plan.application.services
-                           if one.name in self.services}  # fmt: skip
-            for name, mounts in covers(application, shown).items():
+            mounts = covers(shown)
+            for name in {service.name for service in self.plan.application.services} & self.services.keys():
+                own = {volume["target"] for volume in self.services[name].get("volumes") or ()}
                 given = masked.setdefault(name, {"volumes": []})["volumes"]
-                given += [mount for mount in mounts if mount["target"] not in {one["target"] for one in given}]
+                given += [mount for mount in mounts if mount["target"] not in own]
         return masked, problems
 
     def _files(self, folder: Path) -> list[str]:
@@ -117,21 +118,22 @@ class ApplicationCompose(Compose):
         return [_APPLICATION_FILE, str(path)]
 
 
-def covers(services: dict[str, Any], shown: Iterable[Path]) -> dict[str, list[dict[str, Any]]]:
-    """Empty folders over the ``shown`` ones in ``/tmp`` and shared memory, by service, wherever it has the test's.
+def covers(shown: Iterable[Path]) -> list[dict[str, Any]]:
+    """Empty folders over those that processes of DoDo mount in the test's ``/tmp`` and shared memory, as mounts.
 
-    The kernel removes and renames no folder that is a mount to the process that tries it.
+    The kernel removes and renames no folder on which something is mounted in the namespace of who tries it, at whatever
+    path. So each service of the application needs them, as one without ``/tmp`` may reach another's; at a path that no
+    image knows, so that no symbolic link of an image leads them elsewhere.
     """
-    own = {name: {v["target"]: v for v in service.get("volumes") or ()} for name, service in services.items()}
-    places = {name: [t for t, v in mounts.items() if (v.get("type"), v.get("source")) == ("volume", _TMP)]
-              for name, mounts in own.items()}  # fmt: skip
-    every = [target for targets in places.values() for target in targets]
-    found = {}
-    for name, service in services.items():
-        at = {namespaces.SHARED[0]: every if service.get("volumes_from") else places[name]}
-        targets = [str(Path(target, p.name)) for p in shown for target in at.get(p.parent, [str(p.parent)])]
-        found[name] = [{"type": "tmpfs", "target": t, "read_only": True} for t in targets if t not in own[name]]
-    return found
+    apart = Path(f"/.dodo-{secrets.token_hex(8)}")
+    tmp, memory = namespaces.SHARED
+    folders = [path for path in shown if path.is_dir() and not path.is_symlink()]  # as only these are mounted
+    places = [{tmp: apart, memory: memory}[path.parent] / path.name for path in folders]
+    mounts: list[dict[str, Any]] = [{"type": "tmpfs", "target": str(place), "read_only": True} for place in places]
+    if apart in {place.parent for place in places}:
+        options = {"read_only": True, "volume": {"nocopy": True}}
+        mounts.insert(0, {"type": "volume", "source": _TMP, "target": str(apart), **options})
+    return mounts
 
 
 def replacing(services: dict[str, Any], application: set[str], own: dict[str, Any]) -> str:

@@ -50,6 +50,10 @@ class Check:
         }
 
 
+_MOST_REASON = 2000
+"""Characters of a reason: of longer ones the runner takes no verdict."""
+
+
 @dataclass(frozen=True)
 class Verdict:
     """Passed or failed, in one sentence, with checks; ``silent`` when nothing of the application came.
@@ -71,6 +75,7 @@ class Verdict:
         """
         checks = [check.as_json() for check in self.checks]
         reason = f"{self.reason}; the test is on CID {cid}" if self.silent else self.reason
+        reason = reason if len(reason) <= _MOST_REASON else reason[: _MOST_REASON - 1] + "…"
         message: dict[str, Any] = {"dodo": "verdict", "outcome": self.outcome, "reason": reason, "checks": checks}
         if self.evidence:
             numbers = {key: v if isinstance(v, str) else _number(v) for key, v in self.evidence.items()}

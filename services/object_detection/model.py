@@ -19,6 +19,7 @@ from services.object_detection.score import (
     Score,
     Silence,
     areas,
+    class_name,
     compare,
 )
 
@@ -48,7 +49,7 @@ def _telling(broken: Sequence[Check], labels: Sequence[str]) -> list[Check]:
         measure, _, label = check.name.partition("-")
         of = f"-{label}" if label else ""
         is_implied = measure == "f1" and bool({f"precision{of}", f"recall{of}"} & names)
-        alike = {f"{measure}-{each or 'unnamed'}" for each in labels}
+        alike = {f"{measure}-{class_name(each)}" for each in labels}
         if not is_implied and not (label and measure in MEASURES and {measure, *alike} <= names):
             told.append(check)
     return told
@@ -75,7 +76,7 @@ def _fault(check: Check, score: Score) -> str:
     name = f"{'F1' if measure == 'f1' else measure}{f' of {label}' if label else ''}"
     if check.value is None:
         return f"{name} has no value ({bound}), as {_nothing(measure)}"
-    counts = dict(score.counts)["" if label == "unnamed" else label] if label else score.counts.total()
+    counts = {class_name(each): of for each, of in score.counts}[label] if label else score.counts.total()
     wrong = {"precision": _count(counts.false, "false detection"), "recall": f"{counts.missed} missed"}
     both = f"{wrong['precision']} and {wrong['recall']}"
     return f"{name} is {_number(check)} ({bound}), with {wrong.get(measure, both)} beside {counts.hits} found"

@@ -247,6 +247,7 @@ class Silence:
 
 
 MEASURES = ("precision", "recall", "f1")
+MOST_NAME = 100
 
 
 @dataclass(frozen=True)
@@ -367,7 +368,12 @@ class Score:
         for label, counts in self.counts:
             for name in MEASURES:
                 limit = limits.of(name) if limits.each_class else None
-                yield _check(f"{name}-{label or 'unnamed'}", getattr(counts, name), limit, (f"min-{name}",))
+                yield _check(f"{name}-{class_name(label)}", getattr(counts, name), limit, (f"min-{name}",))
+
+
+def class_name(label: str) -> str:
+    """A class in names of checks, of at most ``MOST_NAME`` characters: an application's labels may be of any length."""
+    return (label if len(label) <= MOST_NAME else label[: MOST_NAME - 1] + "…") or "unnamed"
 
 
 def _check(name: str, value: float | None, least: float | None, parameters: tuple[str, ...] = ()) -> Check:

@@ -106,10 +106,10 @@ class Crate:
             text=True,
         )
 
-    def log(self, slug: str) -> str:
-        """What the application of a test logged."""
+    def log(self, slug: str, service: str = "app") -> str:
+        """What a service of a test's application logged."""
         logs = self.bench.folder / "report" / f"{self.mark}-{slug}" / "logs"
-        return (logs / "application.app.log").read_text()
+        return (logs / f"application.{service}.log").read_text()
 
     def left(self) -> list[str]:
         """Containers, networks and volumes of these tests, and leases.

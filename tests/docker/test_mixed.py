@@ -6,10 +6,12 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.docker.containers import Containers
 from dodo_dsl.run.mixed import Mixed
@@ -55,27 +57,45 @@ def test_faults_beside_processes_of_dodo(faults: dict[str, Fault], crate: Crate,
 
 
 TAKES = """
-for name in [name for name in os.listdir("/tmp") if os.path.isdir(f"/tmp/{name}")]:
-    for remove in (os.rmdir, lambda path: os.rename(path, path + "-gone")):
-        try:
-            remove(f"/tmp/{name}")
-            os.symlink("/etc", f"/tmp/{name}")
-            print("replaced", name, flush=True)
-        except OSError as error:
-            print(error.strerror, name, flush=True)
+import os, time
+def take(folder):
+    for name in [name for name in os.listdir(folder) if os.path.isdir(f"{folder}/{name}")]:
+        for remove in (os.rmdir, lambda path: os.rename(path, path + "-gone")):
+            try:
+                remove(f"{folder}/{name}")
+                os.symlink("/etc", f"{folder}/{name}")
+                print("replaced", name, flush=True)
+            except OSError as error:
+                print(error.strerror, name, flush=True)
 """
+OWN = "take('/tmp')\nopen('/tmp/app.log', 'w').close()\nprint('own file', flush=True)\n"
 
 
 def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate) -> None:
-    """They are mounted in the ``/tmp`` that the application shares with them."""
-    judge = READY + AFTER_START + f"time.sleep(1)\nos.stat({str(crate.bench.folder)!r})\n" + PASS
-    job = separate(crate.job("takes", judge, TAKES + WAIT, user="0:0"), crate.bench.folder)
+    """They are mounted in the ``/tmp`` that the application shares with them, and reaches from a service without it."""
+    judge = READY + AFTER_START + f"time.sleep(2)\nos.stat({str(crate.bench.folder)!r})\n" + PASS
+    job = separate(crate.job("takes", judge, TAKES + OWN + WAIT, user="0:0"), crate.bench.folder)
+    (app,) = job.plan.application.services
+    app = replace(app, environment={"LOG": "/tmp/app.log"})
+    services = (app, replace(app, name="other", after={"app": "service_started"}))
+    job = replace(job, plan=replace(job.plan, application=replace(job.plan.application, services=services)))
+    (job.folder / "test.json").write_text(to_json(job.plan))
+    path = job.folder / "application.compose.yml"
+    content = json.loads(path.read_text())
+    after = {**content["services"]["app"]["depends_on"], "app": {"condition": "service_started"}}
+    entrypoint = ["python3", "-u", "-c", TAKES + "take('/proc/1/root/tmp')\ntime.sleep(600)"]
+    other = {**content["services"]["app"], "pid": "service:app", "entrypoint": entrypoint, "depends_on": after}
+    content["services"]["other"] = {**other, "volumes": []}
+    path.write_text(json.dumps(content))
     runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(1, lambda job: 1.0), Policy())
     (outcome,) = asyncio.run(runner.run([job]))
     assert outcome.outcome == "passed", outcome.reason
-    names, lines = {path.parts[2] for path in (crate.bench.folder, job.folder)}, crate.log("takes").splitlines()
-    assert names and all(lines.count(f"Device or resource busy {name}") == 2 for name in names), lines
-    assert not [line for line in lines if line.startswith("replaced")]
+    names = {path.parts[2] for path in (crate.bench.folder, job.folder)}
+    for service in ("app", "other"):
+        lines = crate.log("takes", service).splitlines()
+        assert names and all(lines.count(f"Device or resource busy {name}") == 2 for name in names), (service, lines)
+        assert not [line for line in lines if line.startswith("replaced")]
+    assert "own file" in crate.log("takes")
 
 
 def test_default_without_images_of_dodo(tmp_path: Path) -> None:

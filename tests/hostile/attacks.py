@@ -436,6 +436,7 @@ def takes_the_place_of_folders_of_services() -> object:
 
 @attack
 def sees_names_of_the_machines_folders() -> object:
+    """Its own variables and words, and one of the runner, name the folder."""
     return os.path.lexists(PLACES["folder"])
 
 

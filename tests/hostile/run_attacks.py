@@ -38,9 +38,10 @@ def main(argv: list[str]) -> int:
     (app,) = plan.application.services
     places |= {"tests-in-its-folder": str(own / "tests" / "truth.json"), "results": str(folder / "report")}
     places["history-of-its-folder"] = str(own / ".git" / "packed")
-    service = replace(app, process=("python", str(program)), environment={"ATTACKED": json.dumps(places)})
+    guessed = {"ATTACKED": json.dumps(places), "GUESSED": places["folder"]}
+    service = replace(app, process=("python", str(program), places["folder"]), environment=guessed)
     application = replace(plan.application, folder="../application", services=(service,), hidden=("tests",))
-    os.environ |= {"CI_JOB_TOKEN": "secret", "MY_SECRET": "secret"}
+    os.environ |= {"CI_JOB_TOKEN": "secret", "MY_SECRET": "secret", "OF_RUNNER": places["folder"]}
     (outcome,) = bench.run(replace(plan, application=application))
     lines = [json.loads(line) for line in bench.log(plan, "application.app").splitlines() if line.startswith("{")]
     kept = (own / "data.txt").read_text(), (own / "tests" / "truth.json").read_text()

@@ -7,7 +7,7 @@ from typing import Any
 from dodo_dsl.application import host_access
 from dodo_dsl.application.access.compose_keys import BELOW, SERVICE, removed
 from dodo_dsl.application.access.limit_findings import UNLIMITED, dotted, put, service_limits
-from dodo_dsl.application.access.model import Access, AccessFinding, Kind, at, mapping_findings, mappings
+from dodo_dsl.application.access.model import Access, AccessFinding, Kind, at, items, mapping_findings, mappings
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
@@ -64,10 +64,11 @@ def remove_hardware(copy: ServiceCopy) -> None:
     found = [finding for finding in every if not access.allows(finding.kind)]
 
     def take(key: str, kind: Kind) -> list[Any]:
-        """Removes the items of a list in which there was something of the kind, and returns them."""
+        """Removes the items of a list, or its single value, in which there was something of the kind; returns them."""
         numbers = {f.steps[1] for f in found if f.steps[0] == key and f.kind == kind and len(f.steps) > 1}
-        taken = [item for number, item in enumerate(before.get(key) or ()) if number in numbers]
-        copy.keep_items(key, [item for item in service.get(key) or () if item not in taken])
+        taken = [item for (_, number), item in items(before, key) if number in numbers]
+        if taken:
+            copy.keep_items(key, [item for _, item in items(service, key) if item not in taken])
         return taken
 
     if not setting.keeps_privileges:

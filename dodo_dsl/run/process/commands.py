@@ -24,6 +24,8 @@ from dodo_dsl.run.rigs.permission import masked
 OWN_VARIABLES = ("PYTHONPATH", SLOT_VARIABLE)
 """Variables with other values in the sandbox than in the runner: they are always set."""
 
+_NUL = "\0"
+
 
 @dataclass(frozen=True)
 class Command:
@@ -103,6 +105,12 @@ class Commands:
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.slot.cid), self.slot.memory_prefix)
         environment = {**inherited, **own, SLOT_VARIABLE: self.slot.name}
+        broken = [f"variable {name.partition(_NUL)[0]}" for name, value in own.items() if _NUL in name + value]
+        if broken or _NUL in "".join(argv):
+            what = (*broken, "the command")[0]
+            raise EnvironmentProblem(
+                f"{what} of '{service.name}' holds a NUL character, which no process takes: remove it"
+            )
         hidden = tuple(masked(self.plan, None))
         return Command(service.name, "application", argv, environment, folder, masked=hidden)
 
@@ -113,12 +121,14 @@ def import_paths(plan: Plan, folder: Path) -> list[Path]:
 
 
 def needed_paths(plan: Plan, folder: Path, report: Path) -> list[Path]:
-    """What a test's processes are given, and may find in the machine's ``/tmp``: folders, programs, variables."""
+    """What a test's processes are given, and may find in the machine's ``/tmp``: folders, programs, parameters.
+
+    Nothing that the application says but its program: it would learn by guesses what is there.
+    """
     paths = application_paths(plan.application, folder)
     words = [word for service in plan.services for word in (*service.process, *(flag.value for flag in service.flags))]
-    words += [word for service in plan.application.services for word in service.process or ()]
+    words += [word for service in plan.application.services for word in (service.process or ())[:1]]
     words += [*plan.variables.values()]
-    words += [value for service in plan.application.services for value in service.environment.values() if value]
     reads = [paths.folder / Path(path).expanduser() for path in plan.application.limits.reads]
     return [folder, report, *import_paths(plan, folder), paths.folder, *paths.roots, *reads, *named_paths(words)]
 

@@ -41,6 +41,8 @@ class Slot:
 
 
 _FLAG = "--enter="
+_VARIABLES = ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV", "HOME", "DODO_FIRMWARE")
+"""Where DoDo's services find programs, libraries, settings and the emulated rig; no other variable shows a folder."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +54,9 @@ class Entered:
 
     @classmethod
     def with_own(cls, process: int, *needed: Path) -> Self:
-        """With what in ``/tmp`` and ``/dev/shm`` holds ``needed`` paths, Python, DoDo, or paths in variables."""
+        """With what in ``/tmp`` and ``/dev/shm`` holds ``needed`` paths, Python, DoDo, or those of ``_VARIABLES``."""
         own = (Path(sys.prefix), Path(sys.base_prefix), *(Path(place) for place in sys.path if place))
-        given = named_paths(os.environ.values())
+        given = named_paths(os.environ.get(name, "") for name in _VARIABLES)
         every = (*needed, *own, *given)
         names = {name for path in every for name in (os.path.abspath(path), os.path.realpath(path))}  # noqa: PTH100
         inside = ((folder, name.relative_to(folder).parts) for folder in namespaces.SHARED for name in map(Path, names)
@@ -77,7 +79,9 @@ class Entered:
 
 def named_paths(words: Iterable[str]) -> list[Path]:
     """The whole paths among words, each of which may have several, as ``PATH`` does."""
-    return [Path(name) for word in words for name in word.split(os.pathsep) if name.startswith("/")]
+    return [
+        Path(name) for word in words for name in word.split(os.pathsep) if name.startswith("/") and "\0" not in name
+    ]
 
 
 def package_path(own: Iterable[Path] = ()) -> str:

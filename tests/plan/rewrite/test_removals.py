@@ -84,6 +84,21 @@ def test_without_a_rig() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("word", "changed", "notes"),
+    [
+        ("${X}", {}, ["a: cap_add: removed ${X}"]),
+        ("${C:-SYS_ADMIN}", {}, ["a: cap_add: removed ${C:-SYS_ADMIN}"]),
+        ("SYS_NICE", {"cap_add": "SYS_NICE"}, []),
+    ],
+)
+def test_a_single_word_is_one_item(word: str, changed: dict[str, Any], notes: list[str]) -> None:
+    """Compose takes lists alone, which a variable may be mistaken for."""
+    own = copy({"cap_add": word})
+    remove_hardware(own)
+    assert (own.service, own.changes) == (changed, notes)
+
+
 def test_on_a_rig_devices_stay() -> None:
     own = copy(dict(FULL), hil=True)
     remove_hardware(own)

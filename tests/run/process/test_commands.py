@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Application, Plan, PlannedService
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.rewrite.service_copy import Setting
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
+from tests.run import scripted
 
 COMPOSE = """\
 services:
@@ -75,6 +77,17 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 def test_variables_that_the_deployment_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = command(tmp_path, monkeypatch, "LICENSE_KEY", "UNNAMED")
     assert [made.environment[name] for name in ("LICENSE", "LICENSE_KEY", "UNNAMED", "LEAK")] == ["here"] * 3 + [""]
+
+
+@pytest.mark.parametrize("where", ["environment", "process"])
+def test_a_nul_character_is_named_without_its_value(tmp_path: Path, where: str) -> None:
+    changed = {"environment": {"environment": {"LOG": "se\0cret"}}, "process": {"process": ("python", "se\0cret")}}
+    one = scripted.plan()
+    (app,) = one.application.services
+    app = replace(app, **changed[where])
+    what = {"environment": "variable LOG", "process": "the command"}[where]
+    with pytest.raises(EnvironmentProblem, match=f"^{what} of '{app.name}' holds a NUL character"):
+        Commands(one, tmp_path, tmp_path, Slot(150)).of(app)
 
 
 def own_path(process: tuple[str, ...], folder: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,7 +24,7 @@ def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It may lie below ``/tmp``, which is another one there."""
+    """It may lie below ``/tmp``, which is another one there; what only the application names is not shown."""
     shown: list[Entered | None] = []
 
     async def opened(_client: SandboxClient, _slot: Slot, _folder: Path, entered: Entered | None) -> None:
@@ -32,10 +33,17 @@ def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(SandboxClient, "open", opened)
     folder = Path("/tmp/dodo-a/repository/generated/test")
     one = plan(import_paths=("../../../../dodo-b",))
-    monkeypatch.setenv("LIBRARIES", f"/usr/lib{os.pathsep}/dev/shm/dodo-d/lib")
+    (app,) = one.application.services
+    guesses = {"LOG": "/tmp/dodo-log", "GUESS": "/tmp/dodo-guess:/tmp/\0"}
+    app = replace(app, process=("/tmp/dodo-e/program", "/tmp/dodo-word"), environment=guesses)
+    one = replace(one, application=replace(one.application, services=(app,)))
+    monkeypatch.setenv("SSH_AUTH_SOCK", "/tmp/dodo-agent/socket")
+    monkeypatch.setenv("LD_LIBRARY_PATH", f"/usr/lib{os.pathsep}/dev/shm/dodo-d/lib")
     for container in (0, 12):
         backend = ProcessBackend(one, folder, Path("/tmp/dodo-c/report"), "network", Slot(130))
         asyncio.run(backend.open(container))
         entered = shown.pop()
         assert entered is not None and entered.process == container
-        assert {"dodo-a", "dodo-b", "dodo-c", "dodo-d"} <= {path.name for path in entered.shown}
+        names = {path.name for path in entered.shown}
+        assert {"dodo-a", "dodo-b", "dodo-c", "dodo-d", "dodo-e"} <= names
+        assert not names & {"dodo-log", "dodo-guess", "dodo-word", "dodo-agent"}

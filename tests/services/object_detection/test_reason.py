@@ -1,3 +1,5 @@
+from dodo_dsl.run.protocol import VerdictEvent
+from dodo_dsl.run.service_protocol import read_line
 from services.object_detection.model import verdict
 from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score
 
@@ -75,3 +77,14 @@ def test_a_class_that_is_worse_than_another_is_named() -> None:
 def test_f1_alone_is_told() -> None:
     reason = verdict(score(8, 1, 1), DetectionLimits(precision=0.8, recall=0.8, f1=0.9), "").reason
     assert reason == "F1 is 0.8889 (at least 0.9), with 1 false detection and 1 missed beside 8 found"
+
+
+def test_labels_of_an_application_cannot_make_a_verdict_that_is_not_read() -> None:
+    """A class of any length, and more classes than a reason may name."""
+    made_up = {f"{n} {'x' * 3000}": Counts(0, 1, 0) for n in range(40)}
+    failed = verdict(by_class(yellow=Counts(1, 0, 0), **made_up), ALL, "")
+    event = read_line("judge", True, failed.line(111).encode())
+    assert isinstance(event, VerdictEvent) and not event.passed
+    assert max(len(check.name) for check in failed.checks) == len("precision-") + 100
+    assert f"precision-0 {'x' * 97}…" in {check.name for check in failed.checks}
+    assert event.reason.startswith("precision is 0.02439 (at least 0.9)") and event.reason.endswith("…")
