@@ -136,6 +136,18 @@ def covers(shown: Iterable[Path]) -> list[dict[str, Any]]:
     return mounts
 
 
+_OWN_MEMORY = "a folder below /dev/shm: remove that mount, or keep the repository and what the test needs elsewhere"
+
+
+def uncovered(attributes: Mapping[str, Any]) -> str:
+    """What a container mounts in the place of shared memory, so that covers are none there; empty where they are."""
+    folders = {mount["Destination"] for mount in attributes.get("Mounts") or ()}
+    folders |= set(attributes["HostConfig"].get("Tmpfs") or ())
+    memory = namespaces.SHARED[1]
+    own = [str(folder) for folder in (memory.parent, memory) if str(folder) in folders]
+    return own[0] if own and any(Path(folder).parent == memory for folder in folders) else ""
+
+
 def replacing(services: dict[str, Any], application: set[str], own: dict[str, Any]) -> str:
     """A compose file over the application's in which nothing waits for services of DoDo; ``own`` is added."""
     lines = ["services:"]
@@ -161,6 +173,10 @@ class ApplicationContainers(DockerBackend):
 
     async def open(self) -> None:
         await super().open()
+        for service in self.plan.application.services:
+            container = self._containers.get(service.name)
+            if container is not None and (name := uncovered(container.attrs)):
+                raise BackendError(f"service '{service.name}' mounts {name} itself, and the test needs {_OWN_MEMORY}")
         if SANDBOX in self._containers:
             self.process = await asyncio.to_thread(self._find_process, self._containers[SANDBOX])
 
