@@ -4,11 +4,12 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dodo_dsl import source
 from dodo_dsl.application.access import secret_variables
-from dodo_dsl.source import Entry, Node
+
+if TYPE_CHECKING:
+    from dodo_dsl.source import Node
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LINE = re.compile(r"\s*(?:export\s+)?(?P<name>[A-Za-z_][A-Za-z0-9_.-]*)[ \t]*[=:][ \t]*")
@@ -161,15 +162,19 @@ def interpolated(written: Any, known: Mapping[str, str]) -> Any:
         return written
 
 
-def interpolated_node(written: Node, known: Mapping[str, str]) -> Node:
+def interpolated_node(written: "Node", known: Mapping[str, str]) -> "Node":
     """The same for a node; every part keeps its place."""
     return changed_node(written, lambda word: interpolated(word, known))
 
 
-def changed_node(written: Node, change: Callable[[str], str]) -> Node:
+def changed_node(written: "Node", change: Callable[[str], str]) -> "Node":
     """A node with ``change`` applied to each text that has a variable; every part keeps its place."""
+    from dodo_dsl import source  # which programs that only read variables do not load
+
     if isinstance(written, source.Mapping):
-        entries = {key: Entry(entry.key, changed_node(entry.value, change)) for key, entry in written.entries.items()}
+        entries = {
+            key: source.Entry(entry.key, changed_node(entry.value, change)) for key, entry in written.entries.items()
+        }
         return replace(written, entries=entries)
     if isinstance(written, source.Sequence):
         return replace(written, items=tuple(changed_node(item, change) for item in written.items))

@@ -43,7 +43,7 @@ def sleeping(user: int, count: int) -> Iterator[None]:
 
 def leased(preferred: Sequence[int]) -> list[int]:
     """The ids that one process leases, which holds them until it ends."""
-    program = f"{LEASES}print(json.dumps([users.lease(each) for each in {list(preferred)}]))"
+    program = f"{LEASES}print(json.dumps([users.lease_user(each) for each in {list(preferred)}]))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
     return [int(each) for each in json.loads(done.stdout)]
 
