@@ -62,7 +62,7 @@ def suites(folder: Path) -> Iterator[tuple[int, Path]]:
         values = rng.uniform(0, 1, (size, RUNS, len(CHECKS))).tolist()
         names = [check["name"] for check in CHECKS]
         runs = [[{"outcome": "passed", "checks": dict(zip(names, run, strict=True))} for run in v] for v in values]
-        overview.write(place, {o.slug: r for o, r in zip(outcomes, runs, strict=True)})
+        overview.write_history(place, {o.slug: r for o, r in zip(outcomes, runs, strict=True)})
         write_summaries(place, outcomes)
         yield size, place / "index.html"
 

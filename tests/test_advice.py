@@ -273,7 +273,7 @@ def test_images_that_were_never_built(prefix: str, tmp_path: Path, monkeypatch: 
 
     monkeypatch.chdir(tmp_path)
     reference = f"{prefix}/sandbox:7"
-    command = re.fullmatch("'dodo (.+)' makes it", pulls.hints(plan(sandbox_image=reference))[reference])
+    command = re.fullmatch("'dodo (.+)' makes it", pulls.image_hints(plan(sandbox_image=reference))[reference])
     assert command
     options = parser().parse_args(shlex.split(command[1]))
     assert reference in {image.reference for image in images._chosen(options, checked_deployment())}

@@ -188,7 +188,7 @@ def measured(folder: str, hidden: frozenset[str], most_files: int, _changed_ns: 
 _OUTPUT = ("generated", "dodo-report")
 
 
-def folders(application: ApplicationSource, deployment: Deployment) -> list[Path]:
+def unseen_folders(application: ApplicationSource, deployment: Deployment) -> list[Path]:
     """What no application sees: folders with tests and own services, ``.git``, compiled tests and reports by default.
 
     A registry that is the application's own folder, or above it, is none of them.
@@ -217,7 +217,7 @@ def read_by_tests(application: ApplicationSource, deployment: Deployment, files:
 
 def unseen_problems(application: ApplicationSource, deployment: Deployment) -> Iterator[Diagnostic]:
     """Mounts, configs, secrets, files of variables and builds' contexts in a folder that no application sees."""
-    hidden = folders(application, deployment)
+    hidden = unseen_folders(application, deployment)
     for source, span in _asked_for(application):
         if application.paths.is_open(source) or application.paths.is_writable(source):
             continue

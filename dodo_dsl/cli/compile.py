@@ -199,7 +199,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
     parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
-    display.add(parser, "print only problems, and what is stale", "print the name of each test, too")
+    display.add_verbosity(parser, "print only problems, and what is stale", "print the name of each test, too")
     parser.add_argument("--fix", action="store_true",
                         help="with --check: correct names, units and spaces where there is one way to")  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="text",

@@ -47,7 +47,7 @@ def are_wanted(stream: TextIO) -> bool:
     return bool(os.environ.get("FORCE_COLOR")) or commands_terminal(stream)
 
 
-def write(stream: TextIO, parts: Iterable[Piece]) -> None:
+def write_coloured(stream: TextIO, parts: Iterable[Piece]) -> None:
     """Writes the text of all parts, those with a style coloured where that is wanted."""
     if not are_wanted(stream):
         stream.writelines(text for text, _ in parts)
@@ -65,7 +65,7 @@ def write(stream: TextIO, parts: Iterable[Piece]) -> None:
 def write_diagnostics(stream: TextIO, diagnostics: Iterable[Diagnostic]) -> None:
     """As ``format_text`` has them."""
     width = columns(stream)
-    write(stream, (piece for diagnostic in diagnostics for piece in pieces(diagnostic, width)))
+    write_coloured(stream, (piece for diagnostic in diagnostics for piece in pieces(diagnostic, width)))
 
 
 class Verbosity(IntEnum):
@@ -74,7 +74,7 @@ class Verbosity(IntEnum):
     VERBOSE = 1
 
 
-def add(parser: argparse.ArgumentParser, quiet: str, verbose: str) -> None:
+def add_verbosity(parser: argparse.ArgumentParser, quiet: str, verbose: str) -> None:
     """Adds ``-q`` and ``-v``, with their help."""
     group = parser.add_mutually_exclusive_group()
     parser.set_defaults(verbosity=Verbosity.NORMAL)

@@ -89,8 +89,8 @@ def _usage_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.opendlv.regular_file import NotAFile
     from dodo_dsl.plan.test_files import FilesError
     from dodo_dsl.rec.coco import LabelError
-    from dodo_dsl.rec.excerpt import NothingSelected
     from dodo_dsl.rec.frames import FramesError
+    from dodo_dsl.rec.recording_filter import NothingSelected
     from dodo_dsl.rec.steering import SplitError
     from dodo_dsl.rec.truth import TruthError
     from dodo_dsl.report.child_jobs import NoChildJobs

@@ -107,7 +107,7 @@ def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str], dic
             found, own = _of_application(plan, folder / plan.slug)
             wanted |= found | ({service.image for service in plan.services} if with_own else set())
             built |= own
-            hints |= pulls.hints(plan)
+            hints |= pulls.image_hints(plan)
     return sorted(wanted), sorted(built), hints
 
 

@@ -206,7 +206,7 @@ def _own_contexts(
         folder.mkdir(parents=True, exist_ok=True)
         own = Path(tempfile.mkdtemp(dir=folder))
         written = compose_paths.unescaped(builds)
-        hidden = mounts.folders(source, deployment)
+        hidden = mounts.unseen_folders(source, deployment)
         for root in source.paths.roots:
             found = files_of_tests(root.resolve(), source.folder.resolve(), hidden)
             hidden += found.paths
@@ -256,7 +256,7 @@ def _packages(base_image: str, platform: str, whole: bool, stdout: TextIO) -> Pa
     python = build_context.python_of(base_image, platform)
     stdout.write(f"downloading packages for Python {python.tag} on {python.machine} with pip\n")
     stdout.flush()
-    return build_context.provide(python, build_context.cache_folder(), whole=whole)
+    return build_context.provide_wheels(python, build_context.cache_folder(), whole=whole)
 
 
 def _require_built(options: argparse.Namespace, images: list[Image]) -> None:

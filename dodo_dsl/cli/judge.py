@@ -210,7 +210,7 @@ def _told(
     if options.json:
         stdout.write(as_json(plan, recording, judgement, run))
     else:
-        display.write(stdout, as_pieces(plan, recording, judgement, run))
+        display.write_coloured(stdout, as_pieces(plan, recording, judgement, run))
     return _EXITS[judgement.finding.result]
 
 

@@ -22,7 +22,7 @@ from dodo_dsl.cli.new_files import (
     included,
     missing_schemas,
     say_next,
-    write,
+    write_new,
 )
 from dodo_dsl.cli.new_test import copied_files, kinds, once, start
 from dodo_dsl.compiler import Checked, load
@@ -171,7 +171,7 @@ def new_application(language: str, stdout: TextIO, stderr: TextIO) -> int:
     images = language in _BUILDS
     around = [file for file in deployment_files(root, images=images) if file.path not in made]
     kept = [file for file in around if file.path.exists()]
-    write([*own, *(file for file in around if file not in kept), *first], stdout)
+    write_new([*own, *(file for file in around if file not in kept), *first], stdout)
     included = _say_kept(kept, images, stdout, stderr)
     program = next(file.path.name for file in own if file.path.stem == "steering")
     steps = [*_BUILDS.get(language, ()), f"dodo run {_FIRST}", f"make {program} and the test yours"]
@@ -183,7 +183,7 @@ def new_deployment(stdout: TextIO, stderr: TextIO) -> int:
     files = deployment_files(Path.cwd())
     there = [file for file in files if file.path.exists()]
     new = [file for file in files if file not in there]
-    write(new, stdout)
+    write_new(new, stdout)
     included = _say_kept(there, False, stdout, stderr)
     if not new:
         stdout.write("\nnothing to write\n")
@@ -310,7 +310,7 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
     there = [file.path for file in made if file.path.exists()]
     if there:
         raise UsageError(f"'{shown_path(str(there[0]))}' exists already; nothing was written")
-    write([*place.files, *made], stdout)
+    write_new([*place.files, *made], stdout)
     stdout.write(note)
     todo = [place.todo] if place.todo else []
     spec = shown_path(str(made[0].path))

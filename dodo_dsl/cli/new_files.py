@@ -177,7 +177,7 @@ def _stages(root: source.Mapping) -> tuple[str, ...]:
     return () if _STAGE in names or len(names) < len(node.items) else names
 
 
-def write(files: Sequence[New], stdout: TextIO) -> None:
+def write_new(files: Sequence[New], stdout: TextIO) -> None:
     """Writes new files, none of which may be there."""
     for file in files:
         file.path.parent.mkdir(parents=True, exist_ok=True)

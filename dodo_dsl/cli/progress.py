@@ -48,7 +48,7 @@ class PlainProgress:
 
     def done(self, outcome: Outcome) -> None:
         verdict = (outcome.outcome, display.OF_OUTCOMES[outcome.outcome])
-        display.write(self.stream, [(self._head(outcome.slug), ""), verdict, ("\n", "")])
+        display.write_coloured(self.stream, [(self._head(outcome.slug), ""), verdict, ("\n", "")])
         self.stream.flush()
 
     def _head(self, slug: str) -> str:

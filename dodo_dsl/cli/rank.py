@@ -17,7 +17,7 @@ from markupsafe import Markup
 
 from dodo_dsl import __version__
 from dodo_dsl.cli.errors import Exit, UsageError
-from dodo_dsl.cli.stats import quantile
+from dodo_dsl.cli.stats import student_t_quantile
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
 from dodo_dsl.report.overview import environment, source_hash, style
@@ -131,7 +131,7 @@ def _interval(score: float, tests: Sequence[TestScore]) -> tuple[float, float] |
     if total == 0:
         return score, score
     spread = sum((v / total) ** 2 / (len(t.scores) - 1) for v, t in zip(variances, tests, strict=True))
-    wide = quantile((1 + LEVEL) / 2, max(1, math.floor(1 / spread + 1e-9))) * math.sqrt(total)
+    wide = student_t_quantile((1 + LEVEL) / 2, max(1, math.floor(1 / spread + 1e-9))) * math.sqrt(total)
     return max(0.0, score - wide), min(1.0, score + wide)
 
 

@@ -19,10 +19,10 @@ from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.rec import contents, excerpt
+from dodo_dsl.rec import contents, recording_filter
 from dodo_dsl.rec.contents import contents_text
-from dodo_dsl.rec.excerpt import Excerpt, NothingSelected
 from dodo_dsl.rec.frames import IMAGE
+from dodo_dsl.rec.recording_filter import Excerpt, NothingSelected
 from dodo_dsl.spec.deployment import find_deployment, load_deployment
 from dodo_dsl.terminal import json_text, printable
 
@@ -160,5 +160,5 @@ def _cut(job: RecJob) -> None:
     output = job.file()
     rows = job.rows()
     with atomic.replacing(output, durable=True) as place, job.progress(f"writing {output.name}", len(rows)) as progress:
-        excerpt.write(job.recording, rows, place, progress)
+        recording_filter.copy_rows(job.recording, rows, place, progress)
     job.stdout.write(f"{output}: {len(rows)} of {len(job.recording)} messages\n")

@@ -21,9 +21,9 @@ from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import coco, csv_table, steering
 from dodo_dsl.rec import video as rec_video
 from dodo_dsl.rec.coco import LabelError
-from dodo_dsl.rec.excerpt import NothingSelected
 from dodo_dsl.rec.frames import images_of
-from dodo_dsl.rec.steering import split
+from dodo_dsl.rec.recording_filter import NothingSelected
+from dodo_dsl.rec.steering import split_recordings
 from dodo_dsl.rec.video import MOST_GAP, write_video
 
 MOST_TABLES = 1000
@@ -110,7 +110,7 @@ def tell_lost(stderr: TextIO, lost: int) -> None:
 def _frames(job: RecJob) -> None:
     recording, options, folder = job.recording, job.options, job.folder()
     images, _ = images_for(job, "choose a sender with --camera")
-    names = rec_video.names(recording, images, options.pictures)
+    names = rec_video.frame_names(recording, images, options.pictures)
     refuse_existing([folder / name for name in names], options.force)
     with atomic.files_into(folder) as place, job.progress("decoding frames", len(images)) as progress:
         written = rec_video.write_frames(recording, images, options.pictures, place, progress, job.tell)
@@ -142,7 +142,7 @@ def _mcap(job: RecJob) -> None:
     topics = len(csv_table.names(job.recording, job.messages, known))
     _refuse_many(job, topics, "topics")
     with atomic.replacing(output) as place, job.progress(f"writing {output.name}", len(known)) as progress:
-        written = mcap.write(job.recording, job.messages, known, place, progress)
+        written = mcap.write_mcap(job.recording, job.messages, known, place, progress)
     _tell_skipped(job, written.undecodable, unknown)
     job.stdout.write(f"{output}: {written.messages} messages, and {written.converted} of them for Foxglove, too\n")
 
@@ -172,7 +172,7 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
     folder: Path = options.output or files[0].with_suffix("")
     if folder.exists() and not folder.is_dir():
         raise NothingSelected(f"'{folder}' is not a folder; name one with -o")
-    parts = split(files, options.validation, options.seed)
+    parts = split_recordings(files, options.validation, options.seed)
     refuse_existing([folder / part / _TABLES[options.format] for part in parts], options.force)
     numbers = {path: f"{number:03}" for number, path in enumerate(files, 1)} if len(files) > 1 else {}
     said = []

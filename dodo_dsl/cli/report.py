@@ -11,7 +11,7 @@ from typing import TextIO
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report import results
-from dodo_dsl.report.comparison import compare, lines
+from dodo_dsl.report.comparison import change_lines, compare
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import GivenReport, read_given
 from dodo_dsl.terminal import printable
@@ -48,14 +48,14 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         output = options.output or (REPORT if options.gitlab else None)
         reports = [read_given(path) for path in folders]
         target, outcomes = _drawn(reports, output, stdout)
-    from dodo_dsl.report.join import write
+    from dodo_dsl.report.join import write_other_ways
 
     comparison = compare(outcomes, other) if other else None
     circumstances = results.joined([results.Results(one.outcomes, one.circumstances) for one in reports])
     write_summaries(target, outcomes, comparison, circumstances)
-    write(target, comparison, other)
+    write_other_ways(target, comparison, other)
     if comparison:
-        stdout.writelines(f"{line}\n" for line in lines(comparison))
+        stdout.writelines(f"{line}\n" for line in change_lines(comparison))
     stdout.write(f"report: {target / 'index.html'}\n")
     return of_outcomes(outcome.outcome for outcome in outcomes) if comparison else Exit.OK
 

@@ -106,7 +106,7 @@ def _one(options: argparse.Namespace, rig: Rig, root: Path, say: Callable[[str],
     if options.action != "status":
         refuse_forbidden(devices, STILL if options.action == "clear" else access.motion(rig), [root])
     if options.action == "clear":
-        leases.clear(rig.name, devices)
+        leases.clear_quarantine(rig.name, devices)
         return result
     if not rig.is_emulated:
         result["quarantine"] = leases.quarantined(rig.name, devices)

@@ -68,7 +68,7 @@ def _locked(descriptor: int) -> bool:
     return True
 
 
-def choose(plans: Sequence[Plan]) -> BackendName:
+def choose_backend(plans: Sequence[Plan]) -> BackendName:
     """Process where the application allows that backend; mixed on rigs and without DoDo's images; else docker."""
     by_application = default_backend(plans)
     if by_application == "process":
@@ -150,7 +150,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
     parser.add_argument("--watch", action="store_true",
                         help="run again, in lockstep, what a saved file affects, and show the change")  # fmt: skip
-    display.add(
+    display.add_verbosity(
         parser,
         "print only what did not pass, and a last line with the counts",
         "print each test's phases, checks, what the application used, and errors and warnings in logs",
@@ -198,7 +198,7 @@ def runner_of(
 ) -> Runner:
     """The runner of these jobs, announced."""
     plans = [job.plan for job in jobs]
-    backend = options.backend or choose(plans)
+    backend = options.backend or choose_backend(plans)
     order = schedule(options.jobs, expectation(backend), usage(backend))
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{run_forecast(order, jobs, backend)}\n")

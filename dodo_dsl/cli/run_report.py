@@ -41,24 +41,24 @@ def write_summary(
     stream.write(blank)
     width = max((len(outcome.name) for outcome in shown), default=0)
     for outcome in shown:
-        display.write(stream, summary_line(outcome, width))
+        display.write_coloured(stream, summary_line(outcome, width))
         stream.writelines(f"        note: {printable(note)}\n" for note in outcome.notes)
         if verbosity is Verbosity.VERBOSE:
             stream.writelines(
-                f"        {printable(comparison.line(check, outcome.checks))}\n" for check in outcome.checks
+                f"        {printable(comparison.check_line(check, outcome.checks))}\n" for check in outcome.checks
             )
             stream.writelines(f"        {printable(use.service)}: {use.in_words()}\n" for use in outcome.resources)
-            display.write(stream, _complaints((logs or {}).get(outcome.slug)))
+            display.write_coloured(stream, _complaints((logs or {}).get(outcome.slug)))
         if outcome.outcome != "passed":
             stream.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
     stream.write(blank)
     if len(set(tests.values())) < len(tests):
         stream.writelines(f"{line}\n" for line in _rates(outcomes, tests))
-    display.write(stream, _counts(outcomes))
+    display.write_coloured(stream, _counts(outcomes))
     if not_run:
         names = ", ".join(test.name for test in not_run[:_MOST_NAMES])
         more = f" and {len(not_run) - _MOST_NAMES} more" if len(not_run) > _MOST_NAMES else ""
-        display.write(stream, [(f"{count(len(not_run))} not run", "not run")])
+        display.write_coloured(stream, [(f"{count(len(not_run))} not run", "not run")])
         stream.write(f", as {not_run[0].reason}: {printable(names)}{more}\n")
 
 

@@ -12,10 +12,10 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError, require_extra
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.search_session import INTERRUPTED, Session, session
+from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, session
 from dodo_dsl.cli.uninterrupted import undisturbed
 from dodo_dsl.search import postgres
-from dodo_dsl.search.drives import Limits
+from dodo_dsl.search.drives import DriveLimits
 from dodo_dsl.search.findings import Findings, document, failures_of, lines
 from dodo_dsl.search.postgres import MAIN
 from dodo_dsl.search.search_loop import SamplingOrder, SearchLoop
@@ -105,7 +105,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return Exit.PROBLEMS if findings.failures or fails_at_nominal else Exit.OK
 
 
-def _study(own: Session) -> Study:
+def _study(own: SearchSession) -> Study:
     """The study of the options; raises UsageError and NotSearchable where the test cannot be searched."""
     checked = own.selected([own.options.test])
     if checked.ok:
@@ -119,13 +119,13 @@ def _store(options: argparse.Namespace, study: Study, report: Path) -> AbstractC
     return postgres.opened(options.storage, options.study or MAIN, study.test.spec.slug, study.key)
 
 
-def _search(own: Session, study: Study, store: Store, report: Path) -> tuple[Findings, bool]:
+def _search(own: SearchSession, study: Study, store: Store, report: Path) -> tuple[Findings, bool]:
     """What was found, and whether an interrupt ended it."""
     options, deadline = own.options, _deadline(own.options)
     runs = min(options.runs or (_MOST_BY_TIME if options.minutes else _RUNS), _MOST_RUNS)
     order = SamplingOrder(study.space, runs, options.seed, not options.sweep)
     total = runs + 1 if options.runs or not deadline else None
-    with own.drives(study, store, report / "drives", Limits(deadline), total) as drives:
+    with own.drives(study, store, report / "drives", DriveLimits(deadline), total) as drives:
         loop = SearchLoop(study.test.spec, order, drives, options.until_failure)
         shrinker = Shrinker(study, drives, report, runs + 1, _registry(study) if options.save else None)
         end = drives.run(_follow(loop, shrinker))

@@ -24,7 +24,7 @@ from dodo_dsl.run.rigs.session import RigSession
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
-from dodo_dsl.search.drives import Drives, KeptBackends, Limits, Machine, end_like_interrupt
+from dodo_dsl.search.drives import DriveHost, DriveLimits, Drives, KeptBackends, end_like_interrupt
 from dodo_dsl.search.store import Drive, Store
 from dodo_dsl.search.study import Study, refuse_search
 from dodo_dsl.spec.load import Settings
@@ -35,7 +35,7 @@ INTERRUPTED = "interrupted: the same command goes on from here\n"
 
 
 @dataclass(frozen=True)
-class Session:
+class SearchSession:
     """One ``dodo search`` or ``dodo tune``; ``work`` takes what it compiles, and ``stdout`` may lose its reader."""
 
     options: argparse.Namespace
@@ -61,7 +61,9 @@ class Session:
         return made
 
     @contextmanager
-    def drives(self, study: Study, store: Store, folder: Path, limits: Limits, total: int | None) -> Iterator[Drives]:
+    def drives(
+        self, study: Study, store: Store, folder: Path, limits: DriveLimits, total: int | None
+    ) -> Iterator[Drives]:
         """Drives by processes, with progress of ``total`` of them, None where time ends them."""
         progress = SearchProgress(self.stdout, total, limits.deadline)
         try:
@@ -69,21 +71,21 @@ class Session:
         finally:
             progress.close()
 
-    def _machine(self, study: Study) -> Machine:
+    def _machine(self, study: Study) -> DriveHost:
         deployment, options, rigs = study.checked.deployment, self.options, RigSession()
         descriptors, roots = (self.load.descriptor,), [deployment.root]
         processes = Processes(deployment.cids, options.isolation, descriptors, roots, self.load.take, rigs)
-        return Machine(KeptBackends(processes), schedule(options.jobs, expectation(processes.name)), self.work, rigs)
+        return DriveHost(KeptBackends(processes), schedule(options.jobs, expectation(processes.name)), self.work, rigs)
 
 
 @contextmanager
-def session(options: argparse.Namespace, stdout: TextIO) -> Iterator[Session]:
+def session(options: argparse.Namespace, stdout: TextIO) -> Iterator[SearchSession]:
     end_like_interrupt()
     more_descriptors()
     reap_folders()
     options.backend = "process"
     with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
-        yield Session(options, cast(TextIO, UninterruptedStream(stdout)), folder.path, load)
+        yield SearchSession(options, cast(TextIO, UninterruptedStream(stdout)), folder.path, load)
 
 
 class SearchProgress:

@@ -19,7 +19,7 @@ from dodo_dsl.spec.model import Spec
 from dodo_dsl.terminal import json_text, printable
 
 
-def quantile(probability: float, freedom: int) -> float:
+def student_t_quantile(probability: float, freedom: int) -> float:
     """The value that t exceeds with 1 - ``probability``, for a probability from 0.5 to below 1, by bisection."""
     low, high = 0.0, 1.0
     while _cumulative(high, freedom) < probability:
@@ -92,7 +92,7 @@ def fit(counts: Sequence[float]) -> Power | None:
     ln_a = float(y.mean() - b * x.mean())
     freedom = len(counts) - 2
     variance = float(((y - ln_a - b * x) ** 2).sum()) / freedom
-    wide = quantile((1 + LEVEL) / 2, freedom)
+    wide = student_t_quantile((1 + LEVEL) / 2, freedom)
     of_b = wide * math.sqrt(variance / spread)
     of_a = wide * math.sqrt(variance * (1 / len(counts) + float(x.mean()) ** 2 / spread))
     return Power(ln_a, (ln_a - of_a, ln_a + of_a), b, (b - of_b, b + of_b))

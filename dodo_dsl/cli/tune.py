@@ -11,9 +11,9 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, require_extra
 from dodo_dsl.cli.numbers import minutes, positive, seed
 from dodo_dsl.cli.report import REPORT
-from dodo_dsl.cli.search_session import INTERRUPTED, Session, session
+from dodo_dsl.cli.search_session import INTERRUPTED, SearchSession, session
 from dodo_dsl.cli.uninterrupted import undisturbed
-from dodo_dsl.search.drives import Limits, RigFailure
+from dodo_dsl.search.drives import DriveLimits, RigFailure
 from dodo_dsl.search.store import Store, opened
 from dodo_dsl.search.study import Study, tune_study
 from dodo_dsl.search.tuning import Scenarios, Tuning, document, env, scenarios, table, tuning_order
@@ -91,7 +91,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     return Exit.PROBLEMS if tuning.best.margin < 0 else Exit.OK
 
 
-def _tune(own: Session, study: Study, store: Store, report: Path) -> tuple[Tuning, BaseException | None]:
+def _tune(own: SearchSession, study: Study, store: Store, report: Path) -> tuple[Tuning, BaseException | None]:
     """The tuning, and what ended it early: an interrupt, or a rig."""
     options = own.options
     runs = min(options.runs or (_MOST_RUNS if options.minutes else _RUNS), _MOST_RUNS)
@@ -103,7 +103,7 @@ def _tune(own: Session, study: Study, store: Store, report: Path) -> tuple[Tunin
         return tuning, drives.run(tuning.follow())
 
 
-def _limits(own: Session, driven: Scenarios) -> Limits:
+def _limits(own: SearchSession, driven: Scenarios) -> DriveLimits:
     options = own.options
     if driven.rigs:
         options.minutes = options.minutes or _RIG_MINUTES
@@ -111,7 +111,7 @@ def _limits(own: Session, driven: Scenarios) -> Limits:
         said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of way"
         own.stdout.write(printable(said) + "\n")
     deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
-    return Limits(deadline, options.metres or math.inf)
+    return DriveLimits(deadline, options.metres or math.inf)
 
 
 def _write(tuning: Tuning, report: Path, stdout: TextIO) -> None:

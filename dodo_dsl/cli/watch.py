@@ -20,7 +20,7 @@ from dodo_dsl.cli.provenance import origin
 from dodo_dsl.cli.run import reserved
 from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.report.comparison import compare, lines
+from dodo_dsl.report.comparison import change_lines, compare
 from dodo_dsl.report.results import GivenReport
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.rigs.session import is_real
@@ -176,7 +176,7 @@ class Watch:
         before = [self.outcomes[outcome.slug] for outcome in outcomes if outcome.slug in self.outcomes]
         if before:
             comparison = compare(outcomes, GivenReport(BEFORE, before))
-            self._stdout.writelines(f"{line}\n" for line in lines(comparison))
+            self._stdout.writelines(f"{line}\n" for line in change_lines(comparison))
 
 
 def _deployment(words: Sequence[str]) -> Deployment:

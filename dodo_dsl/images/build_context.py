@@ -143,7 +143,7 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dodo" / "wheels"
 
 
-def provide(python: Python, cache: Path, *, whole: bool = False) -> Path:
+def provide_wheels(python: Python, cache: Path, *, whole: bool = False) -> Path:
     """A folder with a wheel for each requirement and nothing else, all with locked hashes; raises WheelsError.
 
     It is named after its requirements, and appears only when it is complete. The requirements are those of services,

@@ -27,7 +27,7 @@ _PLACEHOLDER: Schema = {"type": "string", "pattern": _REFERENCE}
 _TEXT: Schema = {"type": "string"}
 
 
-def path() -> Path:
+def schema_path() -> Path:
     """The schema's file."""
     return package_data.schemas() / "dodo.schema.json"
 
@@ -142,7 +142,7 @@ def _converts(written: str, unit: str) -> bool:
 
 def write(file: Path | None = None) -> None:
     """Generates the schema's file from the shipped services."""
-    target = file or path()
+    target = file or schema_path()
     atomic.write_text(target, generate(target.read_text(encoding="utf-8"), load_manifests()[0]))
 
 

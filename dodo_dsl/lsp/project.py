@@ -117,7 +117,7 @@ class _Outdated(Exception):
 
 
 @dataclass(frozen=True)
-class Project:
+class OpenProject:
     """The tests of one ``dodo.yml``, or one test outside all; ``folder`` is where it was looked for."""
 
     folder: Path
@@ -158,7 +158,7 @@ class Projects:
         """Anything may have changed: manifests, maps, messages. The next check looks at all of it."""
         self._is_outdated = True
 
-    def check(self, shown: Mapping[Path, str]) -> list[Project]:
+    def check(self, shown: Mapping[Path, str]) -> list[OpenProject]:
         """The projects, checked with the texts that are shown, by resolved path."""
         if self._is_outdated:
             self._is_outdated = False
@@ -171,7 +171,7 @@ class Projects:
             groups.setdefault(find_deployment(file.parent) or file, []).append(file)
         return [self._project(key, files) for key, files in groups.items()]
 
-    def _project(self, key: Path, files: list[Path]) -> Project:
+    def _project(self, key: Path, files: list[Path]) -> OpenProject:
         specs = [file for file in files if file.name.endswith(SUFFIX)]
         paths = specs
         if key.name == FILE_NAME:
@@ -179,7 +179,7 @@ class Projects:
             outside = [file for file in specs if not any(file.is_relative_to(folder) for folder in registry)]
             paths = [*registry, *outside] if outside else []
         sources = self._sources.setdefault(key, ChangedSources(key.parent, self._texts))
-        return Project(key.parent, without_unsatisfied(load(paths, sources=sources), specs))
+        return OpenProject(key.parent, without_unsatisfied(load(paths, sources=sources), specs))
 
 
 def by_file(found: Iterable[Diagnostic]) -> Mapping[Path, list[Diagnostic]]:
@@ -231,7 +231,7 @@ class DocumentContext:
         return manifest.parameters.get(str(place.steps[3]))
 
 
-def scene(path: Path, lines: Lines, projects: Sequence[Project]) -> DocumentContext:
+def scene(path: Path, lines: Lines, projects: Sequence[OpenProject]) -> DocumentContext:
     """A document with what was found about its test when it was checked last."""
     root, _ = parse_text(lines.text, path)
     for project in projects:

@@ -19,7 +19,7 @@ from dodo_dsl.lsp.documents import Document, Lines, opened, path_of, saved_text,
 from dodo_dsl.lsp.edits import prepare, quick_fixes, rename
 from dodo_dsl.lsp.hover import hover
 from dodo_dsl.lsp.navigation import definition, outline
-from dodo_dsl.lsp.project import DocumentContext, Project, Projects, by_file, is_ours, scene
+from dodo_dsl.lsp.project import DocumentContext, OpenProject, Projects, by_file, is_ours, scene
 from dodo_dsl.terminal import printable
 
 PAUSE_S = 0.05
@@ -34,7 +34,7 @@ class DodoServer(LanguageServer):
 
     def __init__(self) -> None:
         super().__init__("dodo", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
-        self.projects: Sequence[Project] = ()
+        self.projects: Sequence[OpenProject] = ()
         self._checker = Projects()
         self._timer: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
@@ -125,7 +125,7 @@ class DodoServer(LanguageServer):
         self._published = {uri for uri, message in messages.items() if message.diagnostics}
 
 
-def _planned(found: Sequence[Project], is_outdated: Callable[[], bool]) -> list[Diagnostic]:
+def _planned(found: Sequence[OpenProject], is_outdated: Callable[[], bool]) -> list[Diagnostic]:
     return [problem for project in found for problem in project.planned(is_outdated)]
 
 

@@ -72,11 +72,11 @@ class Column:
     values: Any
 
 
-def names(layout: Layout, prefix: str = "") -> Iterator[tuple[str, str]]:
+def column_names(layout: Layout, prefix: str = "") -> Iterator[tuple[str, str]]:
     """Name and type of each column of a message."""
     for field in layout.definition.fields:
         if field.name in layout.inner:
-            yield from names(layout.inner[field.name], f"{field.name}.")
+            yield from column_names(layout.inner[field.name], f"{field.name}.")
         else:
             yield prefix + field.name, field.type
 

@@ -136,7 +136,7 @@ class Result(Enum):
     SIGNAL = auto()
 
 
-def operate(id_: int, value: int, timeout: float | None, undo: bool = False) -> Result:
+def operate_semaphore(id_: int, value: int, timeout: float | None, undo: bool = False) -> Result:
     """Add ``value`` to a semaphore (waiting while it would become negative), or wait for zero where ``value`` is 0.
 
     ``undo`` lets the kernel take the change back when this process dies. Raises OSError when the semaphore is gone.
@@ -222,14 +222,14 @@ class Segment:
 
     def lock(self, timeout: float) -> Result:
         """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError when it is gone."""
-        return operate(self.mutex.id, -1, timeout, undo=True)
+        return operate_semaphore(self.mutex.id, -1, timeout, undo=True)
 
     def unlock(self) -> None:
-        operate(self.mutex.id, 1, None, undo=True)
+        operate_semaphore(self.mutex.id, 1, None, undo=True)
 
     def wait(self, timeout: float | None) -> Result:
         """Wait for a notification; raises OSError when the creator has removed the memory."""
-        return operate(self.condition.id, 0, timeout)
+        return operate_semaphore(self.condition.id, 0, timeout)
 
     def wake(self) -> None:
         try:

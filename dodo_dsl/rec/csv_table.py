@@ -58,7 +58,7 @@ def names(recording: Recording, messages: MessageSet, rows: Numbers) -> list[str
 
 
 def _header(layout: Layout) -> str:
-    return "".join(f"{name};" for name in (*TIMES, *(name for name, _ in message_columns.names(layout)))) + "\n"
+    return "".join(f"{name};" for name in (*TIMES, *(name for name, _ in message_columns.column_names(layout)))) + "\n"
 
 
 def _groups(batch: Batch) -> Iterator[tuple[int, int, Batch]]:

@@ -124,7 +124,7 @@ class McapCounts:
     undecodable: Counter[int] = field(default_factory=Counter)
 
 
-def write(
+def write_mcap(
     recording: Recording, messages: MessageSet, rows: Numbers, place: Path, progress: Callable[[int], None]
 ) -> McapCounts:
     """Write the known messages among ``rows`` in the order of their times; ``progress`` gets the number of rows done.

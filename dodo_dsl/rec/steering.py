@@ -102,7 +102,7 @@ class SplitError(ValueError):
     """Recordings that cannot be split; one sentence."""
 
 
-def split(files: Sequence[Path], share: float, seed: int) -> dict[str, list[Path]]:
+def split_recordings(files: Sequence[Path], share: float, seed: int) -> dict[str, list[Path]]:
     """The files by part, in their order; all in one part with the name "" where ``share`` is 0.
 
     Whole recordings are chosen, as frames of one drive are alike; the same ones for the same number of files and seed.

@@ -178,7 +178,7 @@ class _Mp4:
         self._mux(packet)
 
 
-def names(recording: Recording, images: Numbers, picture_type: str) -> list[str]:
+def frame_names(recording: Recording, images: Numbers, picture_type: str) -> list[str]:
     """A file name for each image message: sender stamp and sample time in us, and a number where both are taken."""
     index, taken = recording.index[images], Counter[tuple[int, int]]()
     found = []
@@ -203,7 +203,7 @@ def write_frames(
     FramesError where that is all of them, and OSError.
     """
     written = 0
-    pairs = zip(names(recording, images, picture_type), decoded(recording, images, problem), strict=True)
+    pairs = zip(frame_names(recording, images, picture_type), decoded(recording, images, problem), strict=True)
     for done, (name, (_, frame)) in enumerate(pairs, 1):
         if frame is not None:
             write_picture(folder / name, frame)

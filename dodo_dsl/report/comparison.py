@@ -55,7 +55,7 @@ def limits(check: Check) -> Iterator[str]:
             yield bound(side, check["limit"][side], check.get("unit") or "", exclusive)
 
 
-def line(check: Check, checks: Sequence[Check]) -> str:
+def check_line(check: Check, checks: Sequence[Check]) -> str:
     """A check of a test in a line."""
     value = "none" if check["value"] is None else f"{check['value']:g} {check.get('unit') or ''}".strip()
     if only_follows(check, checks):
@@ -284,7 +284,7 @@ def _keys(checks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[tuple[str, int]
         counts[check["name"]] += 1
 
 
-def value(number: float | None, unit: str) -> str:
+def value_text(number: float | None, unit: str) -> str:
     """``0.052 m``, or ``none``"""
     return "none" if number is None else f"{number:.4g} {unit}".rstrip()
 
@@ -300,7 +300,8 @@ def change_words(check: CheckChange) -> str:
     was = f", was {old or 'none'}" if limit != old else ""
     notes = [difference(check), f"limit: {limit or 'none'}{was}" if limit or was else ""]
     told = "; ".join(filter(None, notes))
-    return f"{value(check.before, check.old_unit)} -> {value(check.after, check.unit)}{f' ({told})' if told else ''}"
+    before, after = value_text(check.before, check.old_unit), value_text(check.after, check.unit)
+    return f"{before} -> {after}{f' ({told})' if told else ''}"
 
 
 def outcomes(test: TestChange) -> str:
@@ -333,7 +334,7 @@ def to_markdown(comparison: Comparison) -> str:
     return "\n".join([*head, *body]) + "\n"
 
 
-def write(folder: Path, comparison: Comparison | None) -> None:
+def write_markdown(folder: Path, comparison: Comparison | None) -> None:
     """Writes the Markdown into a report, or without a comparison removes that of an earlier one; raises OSError."""
     path = folder / FILE_NAME
     is_there = path.is_symlink() or path.exists()
@@ -389,7 +390,7 @@ def _check(test: TestChange, change: str, name: str) -> str:
 _SHOWN: tuple[Direction, ...] = ("worse", "better", "different")
 
 
-def lines(comparison: Comparison) -> Iterator[str]:
+def change_lines(comparison: Comparison) -> Iterator[str]:
     """A line a test that does not pass as before, one a check whose value changed, and counts of the rest."""
     yield f"compared with {printable(comparison.other)}: {comparison.in_words()}"
     for kind in KINDS:

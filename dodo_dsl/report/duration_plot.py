@@ -32,7 +32,7 @@ class Tick(NamedTuple):
     text: str
 
 
-class Row(NamedTuple):
+class Bar(NamedTuple):
     """A test: its place, the lengths of its bars and the places of its runs in pixels, and its times in words."""
 
     name: str
@@ -76,12 +76,12 @@ def _template() -> jinja2.Template:
     return environment.get_template("times.svg.j2")
 
 
-def _row(number: int, name: str, runs: Sequence[Times], scale: float) -> Row:
+def _row(number: int, name: str, runs: Sequence[Times], scale: float) -> Bar:
     setup, execution = _median(runs)
     shown = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
     places = [round(_LEFT + sum(run) * scale, 1) for run in runs]
     text = f"{name}: set-up {setup:.2f} s, execution {execution:.2f} s"
-    return Row(shown, _TOP + _ROW * number, round(setup * scale, 1), round(execution * scale, 1), places, text)
+    return Bar(shown, _TOP + _ROW * number, round(setup * scale, 1), round(execution * scale, 1), places, text)
 
 
 def round_step(least: float) -> float:

@@ -22,7 +22,7 @@ _ATTACHMENT = "[[ATTACHMENT|"
 """What GitLab takes a file by, wherever it stands in a test's output: text of others has another."""
 
 
-def write(
+def write_junit(
     path: Path,
     outcomes: Sequence[Outcome],
     attachments: Mapping[str, str],
@@ -62,7 +62,7 @@ def _case(outcome: Outcome, attachment: str | None, link: str | None) -> Any:
         result.text = _plain("\n".join([outcome.reason, *replay, *outcome.last_lines]))
         case.result = [result]
     # GitLab shows the text of a failure in place of this, and takes the attachment from here
-    said = [comparison.line(check, outcome.checks) for check in outcome.checks] + [
+    said = [comparison.check_line(check, outcome.checks) for check in outcome.checks] + [
         f"note: {note}" for note in outcome.notes
     ]
     lines = [_plain(line) for line in said]
@@ -92,7 +92,7 @@ def xml_text(text: str) -> str:
     return _NOT_XML.sub("\ufffd", text)
 
 
-def to_text(outcomes: Sequence[Outcome]) -> str:
+def metrics_text(outcomes: Sequence[Outcome]) -> str:
     """``metrics.txt``: duration of set-up and execution, outcome, margins, checks' values, the application's use.
 
     All are labelled with the test.

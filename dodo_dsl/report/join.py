@@ -242,7 +242,7 @@ BEFORE_VARIABLE = "dodoBefore"
 FIELDS = ("x", "y", "qx", "qy", "qz", "qw")
 
 
-def write(folder: Path, comparison: Comparison | None, other: GivenReport | None) -> None:
+def write_other_ways(folder: Path, comparison: Comparison | None, other: GivenReport | None) -> None:
     """Puts the other report's ways into ``folder``, a report, in place of an earlier comparison's; raises OSError."""
     for path in sorted(folder.glob(f"*/{BEFORE}")):
         path.unlink()

@@ -44,7 +44,7 @@ class NextReport:
         gone = forget(self.place, self._slugs, self._others)
         for name in OF_MACHINE:
             (self.place / name).unlink(missing_ok=True)
-        comparison.write(self.place, None)
+        comparison.write_markdown(self.place, None)
         entries = [entry for entry in self.folder.iterdir() if not entry.is_symlink()]
         for entry in sorted(entries, key=lambda entry: (entry.name == results.FILE_NAME, entry.is_file())):
             _move(entry, self.place / entry.name)

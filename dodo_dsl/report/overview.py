@@ -100,7 +100,7 @@ def decisive_value(outcome: Outcome) -> str:
     )
     judged = sorted(((share, check) for share, check in shares if share), key=lambda pair: pair[0])
     found = failed or [check for _, check in judged]
-    return f"{found[0]['name']} {comparison.value(found[0]['value'], found[0].get('unit') or '')}" if found else ""
+    return f"{found[0]['name']} {comparison.value_text(found[0]['value'], found[0].get('unit') or '')}" if found else ""
 
 
 def _parted(name: str) -> tuple[str, dict[str, str]]:
@@ -135,12 +135,12 @@ Past = Mapping[str, Sequence[Mapping[str, Any]]]
 _WIDTH, _HEIGHT, _EDGE = 64, 20, 3
 
 
-def write(folder: Path, past: Past) -> None:
+def write_history(folder: Path, past: Past) -> None:
     """Writes what the checks of a report's tests measured in the latest runs; raises OSError."""
     atomic.write_text(folder / FILE_NAME, json.dumps(past, separators=(",", ":"), allow_nan=False) + "\n")
 
 
-def read(folder: Path) -> Past:
+def read_history(folder: Path) -> Past:
     """What ``write`` wrote into a report's folder; empty where there is nothing."""
     try:
         past = json.loads(regular_file.text(folder / FILE_NAME))

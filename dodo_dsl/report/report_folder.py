@@ -99,7 +99,7 @@ def write_report(
     for name in OF_MACHINE:
         (folder / name).unlink(missing_ok=True)
     if past:
-        overview.write(folder, past)
+        overview.write_history(folder, past)
     if times:
         try:
             atomic.write_text(folder / TIMES, draw_times(times, platform.node() or "this machine"))
@@ -183,8 +183,8 @@ def write_summaries(
     Without one, that of an earlier report is removed. ``place`` is where ``folder`` will be moved to. Raises OSError.
     """
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
-    atomic.write_text(folder / "metrics.txt", for_gitlab.to_text(outcomes))
-    report_comparison.write(folder, comparison)
+    atomic.write_text(folder / "metrics.txt", for_gitlab.metrics_text(outcomes))
+    report_comparison.write_markdown(folder, comparison)
     _write_linked(folder, outcomes, comparison, circumstances, place)
 
 
@@ -201,7 +201,7 @@ def _write_linked(
     with atomic.replacing(folder / "junit.xml") as part:
         attachments = {slug: f"{shown}/{found[0].path}" for slug, found in pictures.items() if found}
         moments = for_gitlab.to_moments(outcomes, pages, shown)
-        for_gitlab.write(part, outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
+        for_gitlab.write_junit(part, outcomes, attachments, moments, circumstances.not_run, circumstances.runs)
     times = TIMES if (folder / TIMES).is_file() else ""
     files = overview.ReportFiles(
         pictures,
@@ -210,7 +210,7 @@ def _write_linked(
         _specs(place or folder, outcomes),
         pages,
         times,
-        overview.read(folder),
+        overview.read_history(folder),
     )
     atomic.write_text(folder / "index.html", overview.render(outcomes, files, comparison, circumstances))
 
@@ -257,9 +257,9 @@ def _specs(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
 
 
 def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
-    from dodo_dsl.report.viewer import judged
+    from dodo_dsl.report.viewer import record
 
-    way = judged.read(test.plan, folder / viewer.LOGS).way
+    way = record.read(test.plan, folder / viewer.LOGS).way
     drive = read_drive(test.plan, test.folder, folder / RECORDING, way or Way())
     if drive is None:
         return

@@ -102,7 +102,7 @@ def read_ground(place: Path) -> Ground:
         for model in found.models
     ]
     try:
-        lines = map_file.read(found.path)
+        lines = map_file.read_obstacles(found.path)
     except MapError:
         lines = {}
     return Ground(models, [(name, [(*a, *b) for a, b in each]) for name, each in lines.items()])

@@ -143,7 +143,7 @@ class LeaseTimeout(Exception):
     """Waiting for a lease took too long; the text names the holder."""
 
 
-def folder() -> Path:
+def lease_folder() -> Path:
     """This user's lease folder, into which no other user can write; raises OSError where one can.
 
     It is the one that the machine's operator named for its rigs, else the one in ``DODO_LEASES``.
@@ -179,7 +179,7 @@ class Lease:
 
 
 def _lock_file(name: str) -> Path:
-    return folder() / f"{name}.lock"
+    return lease_folder() / f"{name}.lock"
 
 
 def _open(name: str) -> int:
@@ -205,7 +205,7 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
         if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
             return None
         raise
-    record = folder() / f"{name}.{os.getpid()}.json"
+    record = lease_folder() / f"{name}.{os.getpid()}.json"
     try:
         _write_new(record, json.dumps({"pid": os.getpid(), **about}))
     except OSError:
@@ -238,7 +238,7 @@ def _write_new(record: Path, text: str) -> None:
 
 def holder(name: str) -> str:
     """Who holds a lease, for a message; its record may be another user's."""
-    for record in sorted(folder().glob(f"{name}.*.json")):
+    for record in sorted(lease_folder().glob(f"{name}.*.json")):
         with contextlib.suppress(OSError, *_NO_RECORD):
             about = json.loads(regular_file.text(record))
             if _is_alive(int(about["pid"])):
@@ -269,7 +269,7 @@ async def lease_any(
     ``attempt`` takes one. ``waiting`` is called with a sentence whenever fewer are ahead. Raises LeaseTimeout when the
     queue has not moved for ``patience_s``. Times are of the event loop's clock, in s.
     """
-    place, since = folder(), arrival_time()
+    place, since = lease_folder(), arrival_time()
 
     def may_take(name: str) -> bool:
         """Who is about to take all leases of a rig holds up nobody here, who may hold what that one still needs."""
@@ -297,7 +297,7 @@ async def in_turn(
     now = asyncio.get_running_loop().time
     deadline, known = now() + patience_s, -1
     while (taken := take()) is None:
-        before = sum(not one.turn for one in ahead_in_line(folder(), names, since, shared=shared))
+        before = sum(not one.turn for one in ahead_in_line(lease_folder(), names, since, shared=shared))
         if before < known:
             deadline = now() + patience_s
         if now() > deadline:
@@ -320,7 +320,7 @@ def _kind(names: Sequence[str]) -> str:
 
 def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
     """This user's leases that nobody holds but whose record is still there; each is yielded held, with its record."""
-    for record in sorted(folder().glob(f"{prefix}*.json")):
+    for record in sorted(lease_folder().glob(f"{prefix}*.json")):
         name = record.name.split(".")[0]
         with contextlib.suppress(OSError):
             if record.lstat().st_uid != os.getuid():
@@ -345,8 +345,8 @@ def _about(record: Path) -> dict[str, Any]:
 
 def forget_dead() -> None:
     """Removes the records of machine leases, and the tickets, whose process has ended; their locks ended with it."""
-    remove_dead(folder())
-    for record in folder().glob("machine.*.json"):
+    remove_dead(lease_folder())
+    for record in lease_folder().glob("machine.*.json"):
         with contextlib.suppress(OSError, *_NO_RECORD):
             if not Path("/proc", str(int(json.loads(regular_file.text(record))["pid"]))).exists():
                 record.unlink(missing_ok=True)

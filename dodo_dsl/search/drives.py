@@ -104,7 +104,7 @@ def end_like_interrupt() -> None:
 
 
 @dataclass(frozen=True)
-class Point:
+class SearchPoint:
     """A test at values of its ranges, none for one without ranges, with ``variables`` for its application.
 
     ``name`` names its drive in the store; with ``repeat`` it is driven again at the same values.
@@ -117,9 +117,9 @@ class Point:
     repeat: int = 1
 
 
-def point_at(spec: Spec, values: Values, repeat: int = 1) -> Point:
+def point_at(spec: Spec, values: Values, repeat: int = 1) -> SearchPoint:
     """The point of a search."""
-    return Point(spec, values, drive_name(values, repeat), repeat=repeat)
+    return SearchPoint(spec, values, drive_name(values, repeat), repeat=repeat)
 
 
 def drive_name(values: Values, repeat: int = 1) -> dict[str, str]:
@@ -128,7 +128,7 @@ def drive_name(values: Values, repeat: int = 1) -> dict[str, str]:
 
 
 @dataclass
-class Machine:
+class DriveHost:
     """Where drives run: ``work`` takes compiled tests, and ``session`` spares rigs that stay fit their checks."""
 
     backends: KeptBackends
@@ -138,7 +138,7 @@ class Machine:
 
 
 @dataclass
-class Limits:
+class DriveLimits:
     """No drive begins after ``deadline`` of the monotonic clock, or when rigs drove ``metres`` of ``way``."""
 
     deadline: float | None = None
@@ -156,10 +156,10 @@ class Drives:
 
     checked: compiler.Checked
     store: Store
-    machine: Machine
+    machine: DriveHost
     progress: DriveProgress
     folder: Path
-    limits: Limits
+    limits: DriveLimits
     _counted: set[str] = field(default_factory=set)
     _free: int = 0
 
@@ -176,13 +176,13 @@ class Drives:
             self.machine.backends.end()
         return None
 
-    async def drive(self, points: Sequence[Point], first: int | None = None) -> None:
+    async def drive(self, points: Sequence[SearchPoint], first: int | None = None) -> None:
         """Drives the points, as far as the limits allow; those with the same name share a drive.
 
         They are numbered from ``first`` on, else those that are not known by numbers that are free in the folder.
         Raises Interrupted and RigFailure.
         """
-        missing: dict[int, Point] = {}
+        missing: dict[int, SearchPoint] = {}
         known = self.store.known([point.name for point in points])
         for number, (point, drive) in enumerate(zip(points, known, strict=True), first or 0):
             name = point_text(point.name)
@@ -203,7 +203,7 @@ class Drives:
                 end_like_interrupt()
                 self.store.wait()
 
-    def _renumbered(self, points: dict[int, Point]) -> dict[int, Point]:
+    def _renumbered(self, points: dict[int, SearchPoint]) -> dict[int, SearchPoint]:
         """By the next free numbers: drives of an earlier call that did not pass, or that was killed, keep theirs."""
         names = [path.name for path in self.folder.iterdir()] if self.folder.is_dir() else []
         numbers = [int(found[1]) for name in names if (found := _NUMBERED.search(name))]
@@ -211,7 +211,7 @@ class Drives:
         self._free = first + len(points)
         return dict(enumerate(points.values(), first))
 
-    def _size(self, points: Sequence[Point]) -> int:
+    def _size(self, points: Sequence[SearchPoint]) -> int:
         """How many drives a round has."""
         if any(point.spec.rig for point in points):
             return 1
@@ -220,7 +220,7 @@ class Drives:
         on_host = any(point.spec.isolation == "host" for point in points)
         return min(size, len(self.checked.deployment.cids)) if on_host else size
 
-    def _claimed(self, missing: dict[int, Point], most: int) -> dict[int, Point]:
+    def _claimed(self, missing: dict[int, SearchPoint], most: int) -> dict[int, SearchPoint]:
         """Takes up to ``most`` of the first points out of ``missing``, and those that others have driven."""
         first = dict(itertools.islice(missing.items(), max(most, _WINDOW)))
         if self.store.is_shared:
@@ -229,7 +229,7 @@ class Drives:
                 if drive:
                     self.progress.count_other(drive)
                     del missing[number], first[number]
-        claimed: dict[int, Point] = {}
+        claimed: dict[int, SearchPoint] = {}
         for number, point in first.items():
             if len(claimed) == most:
                 break
@@ -237,7 +237,7 @@ class Drives:
                 claimed[number] = missing.pop(number)
         return claimed
 
-    async def _round(self, points: dict[int, Point]) -> None:
+    async def _round(self, points: dict[int, SearchPoint]) -> None:
         folder = self.machine.work / f"round-{min(points)}"
         jobs = self._jobs(points, folder)
         for job in jobs.values():
@@ -269,13 +269,13 @@ class Drives:
         if failures:
             raise RigFailure(failures[0])
 
-    def _keep(self, number: int, point: Point, outcome: Outcome) -> None:
+    def _keep(self, number: int, point: SearchPoint, outcome: Outcome) -> None:
         checks = ",".join(failed_checks(outcome))
         drive = Drive(number, point.name, outcome.outcome, worst_margin(outcome), outcome.reason, checks)
         self.store.add(drive)
         self.progress.driven(drive, point.repeat)
 
-    def _jobs(self, points: dict[int, Point], folder: Path) -> dict[int, Job]:
+    def _jobs(self, points: dict[int, SearchPoint], folder: Path) -> dict[int, Job]:
         tests = {number: self._test(number, point) for number, point in points.items()}
         made = compiler.plan(replace(self.checked, tests=tuple(tests.values()), diagnostics=()), folder)
         if has_errors(made.problems):
@@ -287,7 +287,7 @@ class Drives:
             n: Job(plans[slug], folder / slug, self.folder / slug, points[n].spec.slug) for n, slug in slugs.items()
         }
 
-    def _test(self, number: int, point: Point) -> ResolvedTest:
+    def _test(self, number: int, point: SearchPoint) -> ResolvedTest:
         (test,) = compiler.at_values(self.checked, point.spec, {str(number): point.values}).tests
         given = {name: Entry(value.span, value) for name, value in point.variables.items()}
         return replace(test, spec=replace(test.spec, variables=test.spec.variables | given)) if given else test

@@ -27,7 +27,7 @@ class Influence:
 
 
 @dataclass(frozen=True)
-class Failure:
+class SearchFailure:
     """Drives that ended for the same reason but for its numbers; ``worst`` has the least margin."""
 
     kind: str
@@ -74,8 +74,8 @@ class Findings:
     high: float
     influences: tuple[Influence, ...]
     worst: Drive | None
-    failures: tuple[Failure, ...]
-    left_out: tuple[Failure, ...]
+    failures: tuple[SearchFailure, ...]
+    left_out: tuple[SearchFailure, ...]
     ended_early: bool = False
     shrunk: tuple[Shrunk, ...] = ()
 
@@ -142,12 +142,12 @@ def _margin(drive: Drive) -> float:
     return -1.0 if drive.margin is None else drive.margin
 
 
-def failures_of(failed: Sequence[Drive]) -> list[Failure]:
+def failures_of(failed: Sequence[Drive]) -> list[SearchFailure]:
     """Failed drives by the kinds of their reasons, the most frequent first."""
     kinds: dict[str, list[Drive]] = {}
     for drive in failed:
         kinds.setdefault(kind_of(drive.reason), []).append(drive)
-    found = [Failure(kind, len(group), min(group, key=_margin)) for kind, group in kinds.items()]
+    found = [SearchFailure(kind, len(group), min(group, key=_margin)) for kind, group in kinds.items()]
     return sorted(found, key=lambda failure: -failure.drives)
 
 

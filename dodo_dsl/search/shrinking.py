@@ -15,7 +15,7 @@ from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.search.drives import Drives, drive_name, point_at
-from dodo_dsl.search.findings import Failure, Shrunk, is_alike, kind_of
+from dodo_dsl.search.findings import SearchFailure, Shrunk, is_alike, kind_of
 from dodo_dsl.search.space import Space, nominal, scalar, step_of, texts
 from dodo_dsl.search.store import Drive
 from dodo_dsl.search.study import Study
@@ -50,7 +50,7 @@ class Shrinker:
     registry: Path | None = None
     found: list[Shrunk] = field(default_factory=list)
 
-    async def shrink(self, failures: Sequence[Failure], failed: Sequence[tuple[Values, Drive]]) -> None:
+    async def shrink(self, failures: Sequence[SearchFailure], failed: Sequence[tuple[Values, Drive]]) -> None:
         """Shrinks the first failures of ``failed`` drives, however long it takes. Raises Interrupted."""
         self.drives.folder, self.drives.limits.deadline = self.report / FOLDER, None
         kinds = [

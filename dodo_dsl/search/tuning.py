@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.search.drives import Drives, Point
+from dodo_dsl.search.drives import Drives, SearchPoint
 from dodo_dsl.search.search_loop import Candidate, Margins, SamplingOrder, key
 from dodo_dsl.search.space import Space, nominal, space_of, sweep, texts
 from dodo_dsl.spec import vary
@@ -36,9 +36,9 @@ class Scenario:
     def name(self) -> str:
         return json.dumps([self.spec.slug, texts(self.values)], ensure_ascii=False)
 
-    def point(self, candidate: Values) -> Point:
+    def point(self, candidate: Values) -> SearchPoint:
         """The drive with a candidate's values as variables of the application."""
-        return Point(self.spec, self.values, {**texts(candidate), _SCENARIO: self.name}, candidate)
+        return SearchPoint(self.spec, self.values, {**texts(candidate), _SCENARIO: self.name}, candidate)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def tuning_order(space: Space, runs: int, seed: int) -> SamplingOrder:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedPoint:
     """Values with the objective, a margin from -1 to 1."""
 
     values: Values
@@ -109,11 +109,11 @@ class Tuning:
     order: SamplingOrder
     drives: Drives
     mean: bool
-    done: list[Judged] = field(default_factory=list)
-    finals: list[Judged] = field(default_factory=list)
+    done: list[JudgedPoint] = field(default_factory=list)
+    finals: list[JudgedPoint] = field(default_factory=list)
 
     @property
-    def best(self) -> Judged:
+    def best(self) -> JudgedPoint:
         """The first of those with the greatest margin, after the finals if they were driven."""
         if self.finals:
             values = max(self.finals, key=lambda one: one.margin).values
@@ -134,7 +134,7 @@ class Tuning:
         await self._drive([one.values for one in best], self.scenarios.deciding)
         both = (*self.scenarios.guiding, *self.scenarios.deciding)
         margins = [(one.values, self.margin(one.values, both)) for one in best]
-        self.finals = [Judged(values, margin) for values, margin in margins if margin is not None]
+        self.finals = [JudgedPoint(values, margin) for values, margin in margins if margin is not None]
 
     async def _judge(self, batch: Sequence[Candidate], margins: Margins) -> bool:
         """Drives the candidates; ``margins`` has negative objectives, as an order looks for the least."""
@@ -153,7 +153,7 @@ class Tuning:
                 return
             margins[key(values)] = -margin
             if key(values) not in seen:
-                self.done.append(Judged(values, margin))
+                self.done.append(JudgedPoint(values, margin))
                 seen.add(key(values))
 
     async def _drive(self, candidates: Sequence[Values], scenarios: Sequence[Scenario]) -> None:

@@ -288,7 +288,7 @@ class RpiCamera:
         self._shape, self._size = (height * 3 // 2, width), width * height * 3 // 2
         self._closed = threading.Event()
         self._process = subprocess.Popen(
-            argv(width, height, freq, exposure),
+            rpicam_command(width, height, freq, exposure),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -348,7 +348,7 @@ class RpiCamera:
         return f"{PROGRAM} ended with code {self._process.returncode}" + (f": {words}" if words else "")
 
 
-def argv(width: int, height: int, freq: float, exposure: float) -> list[str]:
+def rpicam_command(width: int, height: int, freq: float, exposure: float) -> list[str]:
     """``rpicam-vid``: no preview, no end, raw pictures on standard output, each exposed for ``exposure`` s."""
     size = ["--width", str(width), "--height", str(height)]
     rate = ["--framerate", f"{freq:g}", "--shutter", str(round(exposure * 1e6))]

@@ -10,7 +10,7 @@ from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
 from services.collision.model import Requests, TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, load, pick
+from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
 
 SILENCE, GAPS = 2.0, 3.0
 """s without a frame, and how often the longest time between two of them, after which their sender hangs."""
@@ -89,7 +89,7 @@ def track(flags: Flags) -> Track:
         raise ValueError("--min-margin needs --walls")
     if not flags["requests"]:
         raise ValueError("--requests is empty: a drive is the application's only if it sends something")
-    obstacles = load(path)
+    obstacles = load_obstacles(path)
     picked = pick(obstacles, gates, "gates", path)
     return Track(
         walls=pick(obstacles, walls, "walls", path),

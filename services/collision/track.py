@@ -192,13 +192,13 @@ class ObstaclesError(ValueError):
     """A map that cannot be read, or that lacks an obstacle; the message names file and place."""
 
 
-def load(path: Path) -> dict[str, shapely.MultiLineString]:
+def load_obstacles(path: Path) -> dict[str, shapely.MultiLineString]:
     """The obstacles of the map in a folder (its `map.json`) or of the map file itself, by name, in metres.
 
     Obstacles of one name are one. Raises ObstaclesError.
     """
     try:
-        found = map_file.read(path)
+        found = map_file.read_obstacles(path)
     except MapError as error:
         raise ObstaclesError(str(error)) from None
     return {name: shapely.MultiLineString(lines) for name, lines in found.items()}

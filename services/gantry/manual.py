@@ -281,7 +281,7 @@ def _where(link: Link, limits: MotionLimits) -> dict[str, Any]:
         "x": at.x if at else None,
         "y": at.y if at else None,
         "yaw": math.degrees(at.yaw) if at else None,
-        "limits": memory.shown(memory.read(link), link.conversion),
+        "limits": memory.shown(memory.read_memory(link), link.conversion),
         "reach": {
             "x": [limits.low.x, limits.high.x],
             "y": [limits.low.y, limits.high.y],

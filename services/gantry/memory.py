@@ -73,7 +73,7 @@ def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = Fa
     last. A firmware without such a memory has the built-in limits; tighter ones are kept by the programs that move it
     alone, which is logged.
     """
-    found = read(link)
+    found = read_memory(link)
     if found is None:
         tighter = {name: limit for name, limit in limits.items() if limit < LIMITS[name][1] - _NEAR}
         if tighter:
@@ -97,7 +97,7 @@ def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = Fa
     if answers.refusals:
         raise RigError(f"the rig at {link.name} refuses its limits: {answers.refusals[0]}")
     end = time.monotonic() + _WRITING
-    while (found := read(link) or found).source == Source.WRITING and time.monotonic() < end:
+    while (found := read_memory(link) or found).source == Source.WRITING and time.monotonic() < end:
         time.sleep(start.POLL)
     if not _is(found, limits):
         what = _deviation(found, limits, link.conversion)
@@ -105,7 +105,7 @@ def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = Fa
     _log.info("the rig at %s keeps its limits: %s", link.name, _text(limits, link.conversion))
 
 
-def read(link: Link) -> Limits | None:
+def read_memory(link: Link) -> Limits | None:
     """The memory's limits; None for a firmware that does not know them, and says so twice. Raises RigError."""
     unknown = 0
     for _ in range(start.TRIES):

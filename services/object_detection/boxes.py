@@ -198,7 +198,7 @@ class DetectedFrame:
     answered: float | None = None
 
 
-__all__ = ["Truth", "TruthFileError", "load"]
+__all__ = ["Truth", "TruthFileError", "load_truth"]
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ class Truth:
         return sorted({each.label for boxes in self.pictures.values() for each in boxes})
 
 
-def load(path: Path, frames: Frames) -> Truth:
+def load_truth(path: Path, frames: Frames) -> Truth:
     """The truth in a file; raises TruthFileError."""
     found = truth_file.read(path, frames)
     pictures = {key: tuple(LabelledBox(label, Box(*area)) for label, area in boxes) for key, boxes in found.items()}

@@ -6,7 +6,7 @@ from typing import Any
 
 from dodo_dsl.opendlv.assets.truth_file import no_box
 from services.base import Context, Flags, Handler
-from services.object_detection.boxes import Box, FrameKey, Truth, TypeNumber, Value, load
+from services.object_detection.boxes import Box, FrameKey, Truth, TypeNumber, Value, load_truth
 from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import MEASURES, DetectionLimits, Rules
 
@@ -64,7 +64,7 @@ def _truth(flags: Flags) -> Truth | None:
         raise ValueError(f"--truth-sender={sender} is the --sender of the detections")
     if path is None:
         return None
-    truth = load(Path(path), flags["truth-frames"])
+    truth = load_truth(Path(path), flags["truth-frames"])
     for name in classes:
         if name not in truth.labels():
             raise ValueError(f"--classes: {path} has {no_box(name, truth.labels())}")

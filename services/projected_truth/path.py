@@ -8,7 +8,7 @@ from collections import deque
 from operator import itemgetter
 
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
-from services.scene.camera import LONGEST_GAP, CameraPose, between, still
+from services.scene.camera import LONGEST_GAP, CameraPose, motion_between, still
 
 _KEPT = 256
 MICROSECONDS = 1_000_000
@@ -48,14 +48,14 @@ class MeasuredPath:
         earlier, before = self._poses[after - 1]
         if later - earlier > _GAP:
             return None
-        return between(before, pose, later - earlier).after((time - later) / MICROSECONDS)
+        return motion_between(before, pose, later - earlier).after((time - later) / MICROSECONDS)
 
     def _onwards(self, time: int) -> CameraPose | None:
         if not self._poses or time - self._poses[-1][0] > _GAP:
             return None
         last, pose = self._poses[-1]
         before = self._poses[-2] if len(self._poses) > 1 else None
-        motion = between(before[1], pose, last - before[0]) if before else still(pose)
+        motion = motion_between(before[1], pose, last - before[0]) if before else still(pose)
         return motion.after((time - last) / MICROSECONDS)
 
 

@@ -176,7 +176,7 @@ def still(pose: CameraPose) -> CameraMotion:
     return CameraMotion(pose, np.zeros(3), np.zeros(3))
 
 
-def between(earlier: CameraPose, later: CameraPose, microseconds: int) -> CameraMotion:
+def motion_between(earlier: CameraPose, later: CameraPose, microseconds: int) -> CameraMotion:
     """The motion that led from one pose to another, at the other; none where the gap or the speed makes no sense."""
     seconds = microseconds / 1e6
     if not 0.0 < seconds <= LONGEST_GAP:

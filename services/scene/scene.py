@@ -38,9 +38,9 @@ THICKNESS = 0.0002
 """How high above z = 0 tape lies, in m: enough to be above the floor, and less than a model notices."""
 
 
-def pick(path: Path, names: Sequence[str]) -> list[Line]:
+def picked_lines(path: Path, names: Sequence[str]) -> list[Line]:
     """The lines of a map's obstacles with these names; MapError when one is not there."""
-    known = map_file.read(find_map(path)) if names else {}
+    known = map_file.read_obstacles(find_map(path)) if names else {}
     for name in names:
         if name not in known:
             have = ", ".join(sorted(known)) or "none"
@@ -227,7 +227,7 @@ def _block_faces(entry: BlockEntry, memory: _Budget) -> list[Face]:
 def _faces(entries: MapFile, options: SceneOptions) -> Iterator[Face]:
     memory = _Budget(entries.path, MAX_TEXTURE_BYTES, "bytes of textures")
     blocks = [face for block in entries.blocks for face in _block_faces(block, memory)]
-    lines = pick(entries.path, options.lines)
+    lines = picked_lines(entries.path, options.lines)
     for face in [*(blocks or [_default_floor()]), *line_faces(lines, options.line_width)]:
         yield face.shaded(options.light.on(face.normal))
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from services.scene.camera import LONGEST_GAP, CameraFrame, CameraPose, between, body_pose, still
+from services.scene.camera import LONGEST_GAP, CameraFrame, CameraPose, body_pose, motion_between, still
 from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.virtual_camera.optics import Optics
@@ -63,7 +63,7 @@ class VirtualCamera:
         if self._motion is None or self._framed is None:
             self._motion = still(pose)
         else:
-            self._motion = between(self._motion.pose, pose, sample_time - self._framed)
+            self._motion = motion_between(self._motion.pose, pose, sample_time - self._framed)
         self._framed = sample_time
 
     def update(self, now: int) -> CameraPose | None:

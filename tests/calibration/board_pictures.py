@@ -39,7 +39,7 @@ def _rays() -> Any:
 
 def _picture(rays: Any, a: float, b: float, x: float, y: float) -> Any:
     """Each pixel's ray meets the board's plane in a place of the board, whose colour it has."""
-    drawn = camera_calibration.picture(4)
+    drawn = camera_calibration.board_picture(4)
     rotation, _ = cv2.Rodrigues(np.array([math.radians(a), math.radians(b), 0.0]))
     middle = np.array([x, y, 0.28])
     normal = rotation[:, 2]

@@ -59,4 +59,4 @@ def test_the_board_is_drawn_in_true_size() -> None:
         float(part[part.index("h") + 1 : part.index("v")]) * float(part[part.index("v") + 1 :].split("h")[0])
         for part in root.findall("{*}path")[0].get("d", "").split("z")[:-1]
     )
-    assert ink == pytest.approx((camera_calibration.picture(2) == 0).sum() / 4)
+    assert ink == pytest.approx((camera_calibration.board_picture(2) == 0).sum() / 4)

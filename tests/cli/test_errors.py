@@ -20,7 +20,7 @@ from dodo_dsl.opendlv.recording import RecordingError
 from dodo_dsl.opendlv.session import SessionError
 from dodo_dsl.plan.plan_json import json_text
 from dodo_dsl.plan.test_files import FilesError
-from dodo_dsl.rec.excerpt import NothingSelected
+from dodo_dsl.rec.recording_filter import NothingSelected
 from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.report.results import ResultsError
 from dodo_dsl.run.leases import LeaseTimeout

@@ -23,6 +23,8 @@ OF_ITS_ENGINE = {"call-io_uring_setup", "call-ptrace", "socket-to-the-hypervisor
 """What the engine's filter of system calls allows, by its version: docs/explanation/security.md says so."""
 OF_ITS_NETWORK = {"other-devices-of-the-network", "sends-to-the-networks-of-the-machine"}
 """The test's own device, from which nothing gets any further: see test_networks."""
+WHERE_THERE_ARE_NONE = {"takes-the-place-of-folders-of-services"}
+"""DoDo's services are containers of their own here, with nothing of the machine mounted below the shared ``/tmp``."""
 OF_ITS_ROOT = {
     *("becomes-root", "becomes-root-in-a-saved-id", "is-root", "changes-groups", "has-groups-of-root"),
     *("has-capabilities", "call-chroot", "lease-on-a-file-of-the-machine"),
@@ -33,7 +35,7 @@ OF_ITS_ROOT = {
     ),
 }
 """What the image's root may do to the image's own files, which nobody else uses."""
-CONTAINED = {"root": OF_ITS_IMAGE | OF_ITS_ENGINE | OF_ITS_NETWORK | OF_ITS_ROOT}
+CONTAINED = {"root": OF_ITS_IMAGE | OF_ITS_ENGINE | OF_ITS_NETWORK | OF_ITS_ROOT | WHERE_THERE_ARE_NONE}
 CONTAINED["user"] = CONTAINED["root"] - OF_ITS_ROOT | {"has-capabilities"}
 CASES = [(user, name) for user, contained in CONTAINED.items() for name in sorted({*attacks.ATTACKS} - contained)]
 TEST, LONG = "sil-closed-straight", {"track": {"with": {"max-time": "900 s"}}}

@@ -12,7 +12,7 @@ import pytest
 
 from services.base import Verdict
 from services.collision.model import TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, load, pick
+from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
 from services.dynamic_model.model import Vehicle
 from services.integrator.model import BodyPose as Attitude
 from services.integrator.model import Integrator, Twist, quaternion
@@ -54,7 +54,7 @@ class Loop:
     delay: int = 0
 
     def run(self) -> Verdict:
-        obstacles = load(MAPS / self.map)
+        obstacles = load_obstacles(MAPS / self.map)
         walls = pick(obstacles, ["left", "right"], "walls", MAPS)
         evaluator = TrackEvaluator(
             Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), VehicleBox(0.36, 0.16)

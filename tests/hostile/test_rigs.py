@@ -180,7 +180,7 @@ def test_no_variable_moves_the_quarantine_of_hardware(repository: Path, monkeypa
         monkeypatch.setenv(name, str(repository / "empty"))
     assert rigs_leases.quarantined("renamed", ["/dev/null"]) == "it has lost steps"
     assert rigs_leases.all_quarantined() == {"fake": "it has lost steps"}
-    assert rigs_leases.clear("renamed", ["/dev/null"])
+    assert rigs_leases.clear_quarantine("renamed", ["/dev/null"])
     assert rigs_leases.all_quarantined() == {}
 
 

@@ -140,10 +140,10 @@ def test_lines_of_obstacles_are_counted(tmp_path: Path, monkeypatch: pytest.Monk
     written = [{"name": name, "lines": [[0, 0, 1, 1]] * 5} for name in "ab"]
     (tmp_path / "map.json").write_text(json.dumps({"obstacles": written}))
     monkeypatch.setattr(map_file, "MAX_LINES", 10)
-    map_file.read(tmp_path)
+    map_file.read_obstacles(tmp_path)
     monkeypatch.setattr(map_file, "MAX_LINES", 9)
     with pytest.raises(MapError, match="10 lines of obstacles, expected at most 9"):
-        map_file.read(tmp_path)
+        map_file.read_obstacles(tmp_path)
 
 
 def test_overlays_are_counted(tmp_path: Path) -> None:

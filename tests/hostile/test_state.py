@@ -21,7 +21,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_state_is_made_for_its_user_alone(folder: Path) -> None:
     before = os.umask(0)
     try:
-        assert leases.folder() == folder
+        assert leases.lease_folder() == folder
     finally:
         os.umask(before)
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700

@@ -22,11 +22,11 @@ def test_platforms_go_from_the_base_images_glibc_down_to_manylinux2014() -> None
 
 @pytest.mark.slow
 def test_every_requirement_has_a_wheel_for_64_bit_arm(tmp_path: Path) -> None:
-    folder = build_context.provide(ARM, tmp_path)
+    folder = build_context.provide_wheels(ARM, tmp_path)
     names = [path.name for path in folder.iterdir()]
     assert len(names) >= 7
     assert all(name.endswith("aarch64.whl") or name.endswith("-any.whl") for name in names)
-    assert build_context.provide(ARM, tmp_path) == folder
+    assert build_context.provide_wheels(ARM, tmp_path) == folder
     assert [path.name for path in tmp_path.iterdir()] == [folder.name]  # nothing half done is left
 
 
@@ -39,5 +39,5 @@ def test_what_pip_cannot_download_is_one_sentence_and_leaves_nothing(
     with pytest.raises(
         build_context.WheelsError, match=r"cannot download wheels for Python 3\.11 on aarch64: ERROR: \S"
     ):
-        build_context.provide(ARM, tmp_path)
+        build_context.provide_wheels(ARM, tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.rec.steering import SplitError, split
+from dodo_dsl.rec.steering import SplitError, split_recordings
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, pictures, video
 
 PREFIX = "opendlv.logic.perception.Detection"
@@ -130,7 +130,7 @@ def test_one_recording_is_not_split(drives: list[Path], tmp_path: Path) -> None:
 @given(st.integers(2, 50), st.floats(0.01, 0.99), st.integers(0, 5))
 def test_both_parts_have_recordings_and_each_is_in_one(number: int, share: float, seed: int) -> None:
     files = [Path(str(one)) for one in range(number)]
-    parts = split(files, share, seed)
+    parts = split_recordings(files, share, seed)
     assert sorted((*parts["train"], *parts["validation"])) == sorted(files)
     assert parts["train"] and parts["validation"]
     assert abs(len(parts["validation"]) - share * number) <= 1
@@ -138,4 +138,4 @@ def test_both_parts_have_recordings_and_each_is_in_one(number: int, share: float
 
 def test_a_single_recording_cannot_be_split() -> None:
     with pytest.raises(SplitError):
-        split([Path("a")], 0.5, 0)
+        split_recordings([Path("a")], 0.5, 0)

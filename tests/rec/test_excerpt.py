@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.rec.excerpt import Excerpt, NothingSelected
+from dodo_dsl.rec.recording_filter import Excerpt, NothingSelected
 from tests.rec.conftest import BEGIN, MESSAGES, message
 
 DISTANCE, STEERING = "opendlv.proxy.DistanceReading", "opendlv.proxy.GroundSteeringRequest"

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.rec.truth import Mark, TruthError, check, drawn_boxes, mark, read, truth_text
-from services.object_detection.boxes import load
+from services.object_detection.boxes import load_truth
 
 WIDTH, HEIGHT = 640, 480
 starts = st.integers(0, 400).map(lambda thousandth: thousandth / 1.25)
@@ -38,7 +38,7 @@ def test_what_is_written_is_read_here_and_by_the_evaluator(path: Path, written: 
     check(written, WIDTH, HEIGHT, ())
     path.write_text(truth_text(written, "truth.png", WIDTH, HEIGHT))
     assert read(path, WIDTH, HEIGHT) == written
-    (things,) = load(path, "one").pictures.values()
+    (things,) = load_truth(path, "one").pictures.values()
     assert [thing.label for thing in things] == [each.label for each in written]
     for thing, each in zip(things, written, strict=True):
         assert np.multiply(thing.box, (WIDTH, HEIGHT, WIDTH, HEIGHT)) == pytest.approx(each[1:])

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.report.comparison import line, only_follows
+from dodo_dsl.report.comparison import check_line, only_follows
 
 
 def check(name: str, value: float | None, ok: bool, unit: str = "m", **limit: float) -> dict[str, Any]:
@@ -36,7 +36,7 @@ LATE = check("time-to-goal", None, False, "s", max=40.0)
     ],
 )
 def test_a_check_in_a_line(shown: dict[str, Any], others: list[dict[str, Any]], text: str) -> None:
-    assert line(shown, [shown, *others]) == text
+    assert check_line(shown, [shown, *others]) == text
 
 
 def test_what_is_met_follows_from_nothing() -> None:

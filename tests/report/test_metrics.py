@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from dodo_dsl.outcome import ServiceUse, with_margin
-from dodo_dsl.report.for_gitlab import to_text
+from dodo_dsl.report.for_gitlab import metrics_text
 from tests.report.test_report_folder import OUTCOME
 
 CHECKS = (
@@ -17,7 +17,7 @@ def samples(text: str, name: str) -> list[str]:
 
 
 def test_margins_are_labelled_as_values_are() -> None:
-    text = to_text([replace(OUTCOME, checks=CHECKS)])
+    text = metrics_text([replace(OUTCOME, checks=CHECKS)])
     assert samples(text, "dodo_check_margin") == ['check="wall-margin",test="test",unit="m"} -0.020000000000000004']
     assert len(samples(text, "dodo_check_value")) == 2
     assert samples(text, "dodo_worst_margin") == ['test="test"} -0.28571428571428575']
@@ -25,18 +25,18 @@ def test_margins_are_labelled_as_values_are() -> None:
 
 def test_what_the_application_used() -> None:
     use = ServiceUse("steering", 1.2345, 0.4, 150_000_000, 0.0, None)
-    text = to_text([replace(OUTCOME, resources=(use,))])
+    text = metrics_text([replace(OUTCOME, resources=(use,))])
     assert samples(text, "dodo_processor_seconds") == ['service="steering",test="test"} 1.234']
     assert samples(text, "dodo_peak_memory_bytes") == ['service="steering",test="test"} 1.5e+08']
 
 
 def test_an_error_has_no_margin() -> None:
-    assert samples(to_text([replace(OUTCOME, outcome="error")]), "dodo_worst_margin") == []
+    assert samples(metrics_text([replace(OUTCOME, outcome="error")]), "dodo_worst_margin") == []
 
 
 def test_text_of_others_commands_no_terminal() -> None:
     check = {"name": "a\x1b[31m\nb", "value": 1, "limit": {}, "unit": "m\x1b", "ok": True, "margin": 1}
     use = ServiceUse("s\x1b", 1.0, 0.4, 1, 0.0, None)
-    text = to_text([replace(OUTCOME, slug="t\x1b", checks=(check,), resources=(use,))])
+    text = metrics_text([replace(OUTCOME, slug="t\x1b", checks=(check,), resources=(use,))])
     assert "\x1b" not in text
     assert samples(text, "dodo_check_value") == ['check="a�[31m�b",test="t�",unit="m�"} 1.0']

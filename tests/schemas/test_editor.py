@@ -18,7 +18,7 @@ SPECS = sorted(package_data.registry().glob("*/*.dodo.yml"))
 
 @pytest.fixture(scope="module")
 def schema() -> dict[str, Any]:
-    made: dict[str, Any] = json.loads(editor_schema.generate(editor_schema.path().read_text(), MANIFESTS))
+    made: dict[str, Any] = json.loads(editor_schema.generate(editor_schema.schema_path().read_text(), MANIFESTS))
     return made
 
 
@@ -29,19 +29,19 @@ def problems(schema: dict[str, Any], use: object) -> list[str]:
 
 
 def test_the_schema_is_what_the_manifests_say() -> None:
-    text = editor_schema.path().read_text()
+    text = editor_schema.schema_path().read_text()
     assert editor_schema.generate(text, MANIFESTS) == text, "run `make schema`"
 
 
 @pytest.mark.thorough
 def test_a_schema_without_services_gets_them_back(tmp_path: Path) -> None:
-    bare = json.loads(editor_schema.path().read_text())
+    bare = json.loads(editor_schema.schema_path().read_text())
     bare["$defs"] = {k: v for k, v in bare["$defs"].items() if not k.startswith(editor_schema.PREFIX)}
     bare["$defs"]["use"].pop("allOf", None)
     file = tmp_path / "dodo.schema.json"
     file.write_text(json.dumps(bare))
     editor_schema.write(file)
-    assert file.read_text() == editor_schema.generate(editor_schema.path().read_text(), MANIFESTS)
+    assert file.read_text() == editor_schema.generate(editor_schema.schema_path().read_text(), MANIFESTS)
 
 
 def test_each_service_is_offered_with_its_sentence_and_all_its_parameters(schema: dict[str, Any]) -> None:

@@ -98,7 +98,7 @@ class Look:
 Check = Callable[[Mapping[str, Any], Look], Iterator[AccessFinding]]
 
 
-class Row(NamedTuple):
+class KeyRow(NamedTuple):
     """What becomes of a key, and why; the ``check`` judges the mapping that may have it for the values of the key."""
 
     treatment: Treatment
@@ -106,7 +106,7 @@ class Row(NamedTuple):
     check: Check | None = None
 
 
-Rows = Mapping[str, Row]
+Rows = Mapping[str, KeyRow]
 
 
 def mapping_findings(what: str, rows: Rows, written: Mapping[str, Any], look: Look) -> Iterator[AccessFinding]:

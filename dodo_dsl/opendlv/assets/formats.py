@@ -94,7 +94,7 @@ def _obstacles(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputErro
         found = [error]
     yield from found
     if all(problem.is_slip for problem in found):
-        yield from _raised(path, lambda: map_file.read(path))
+        yield from _raised(path, lambda: map_file.read_obstacles(path))
 
 
 def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:

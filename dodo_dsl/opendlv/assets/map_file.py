@@ -265,7 +265,7 @@ MAX_LINES = 10_000
 """Of all obstacles of a map, to each of which evaluators measure the distance."""
 
 
-def read(path: Path) -> dict[str, list[Line]]:
+def read_obstacles(path: Path) -> dict[str, list[Line]]:
     """The lines of each obstacle of the map in a folder (its `map.json`) or of the map file itself, in metres.
 
     Obstacles of one name are one. Raises MapError.

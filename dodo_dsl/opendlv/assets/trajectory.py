@@ -22,7 +22,7 @@ class TrajectoryError(ValueError):
 
 
 @dataclass(frozen=True)
-class Point:
+class PathPoint:
     """A way point as written: ``place`` is where, x, y, z in m, ``yaw`` in rad and ``time`` in s where known."""
 
     place: str
@@ -67,7 +67,7 @@ class Trajectory:
     between the last two where the trajectory is ``endless``.
     """
 
-    def __init__(self, points: Sequence[Point], speed: float, endless: bool = False) -> None:
+    def __init__(self, points: Sequence[PathPoint], speed: float, endless: bool = False) -> None:
         """``speed`` (m/s) makes the times where the points have none; raises TrajectoryError."""
         if len(points) < 2:
             place = f"{points[0].place}: " if points else ""
@@ -96,7 +96,7 @@ def wrapped(angle: float) -> float:
     return math.pi if turned == -math.pi else turned
 
 
-def headings(points: Sequence[Point]) -> list[float]:
+def headings(points: Sequence[PathPoint]) -> list[float]:
     """The heading (rad) at each point of a vehicle that looks where it goes.
 
     It is half-way between the directions of the parts before and after the point. Raises TrajectoryError when all
@@ -114,7 +114,7 @@ def headings(points: Sequence[Point]) -> list[float]:
     return [directions[0], *inner, directions[-1]]
 
 
-def _timed(points: Sequence[Point]) -> list[float]:
+def _timed(points: Sequence[PathPoint]) -> list[float]:
     times = [p.time for p in points if p.time is not None]
     if times[0] < 0:
         raise TrajectoryError(f"{points[0].place}: time: {times[0]:g} is before the start")
@@ -124,7 +124,7 @@ def _timed(points: Sequence[Point]) -> list[float]:
     return times
 
 
-def _at_speed(points: Sequence[Point], speed: float) -> list[float]:
+def _at_speed(points: Sequence[PathPoint], speed: float) -> list[float]:
     times = [0.0]
     for a, b in pairwise(points):
         length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
@@ -148,7 +148,7 @@ def _standing(knot: _Knot) -> TrajectoryPose:
 
 def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Trajectory:
     """A straight trajectory from a place along ``yaw`` (rad), without end where it has no ``length`` (m)."""
-    begin = Point("the start", x, y, z, yaw)
+    begin = PathPoint("the start", x, y, z, yaw)
     reach = length or 1.0
     end = replace(begin, x=x + reach * math.cos(yaw), y=y + reach * math.sin(yaw))
     return Trajectory([begin, end], speed, endless=length is None)
@@ -157,7 +157,7 @@ def straight(x: float, y: float, z: float, yaw: float, length: float | None, spe
 NEEDED, POSSIBLE = ("x", "y"), ("x", "y", "z", "yaw", "time")
 
 
-def read_table(path: Path, height: float) -> list[Point]:
+def read_table(path: Path, height: float) -> list[PathPoint]:
     """The way points of a CSV file with a header; ``height`` (m) counts where there is no column z.
 
     Columns x, y and z in m, yaw in rad, time in s; other columns are ignored, as are blank lines and those that begin
@@ -177,7 +177,7 @@ def read_table(path: Path, height: float) -> list[Point]:
     return [_point(place, columns, cells, height) for place, cells in rows[1:]]
 
 
-def read_points(texts: Iterable[str], height: float) -> list[Point]:
+def read_points(texts: Iterable[str], height: float) -> list[PathPoint]:
     """Way points written as ``x y``, in m, at ``height``; raises TrajectoryError."""
     return [_written(text, height) for text in texts]
 
@@ -202,7 +202,7 @@ def _columns(place: str, cells: Sequence[str]) -> list[str]:
     return list(cells)
 
 
-def _point(place: str, columns: Sequence[str], cells: Sequence[str], height: float) -> Point:
+def _point(place: str, columns: Sequence[str], cells: Sequence[str], height: float) -> PathPoint:
     if len(cells) != len(columns):
         raise TrajectoryError(f"{place}: {len(cells)} values, expected {len(columns)}: {', '.join(columns)}")
     values = {
@@ -211,7 +211,7 @@ def _point(place: str, columns: Sequence[str], cells: Sequence[str], height: flo
     return _from(place, values, height)
 
 
-def _written(text: str, height: float) -> Point:
+def _written(text: str, height: float) -> PathPoint:
     words = text.split()
     if len(words) != len(NEEDED):
         raise TrajectoryError(f"the point '{text}' has {len(words)} numbers, expected x and y in m, such as '2 0.5'")
@@ -219,8 +219,8 @@ def _written(text: str, height: float) -> Point:
     return _from(place, {name: _number(place, word) for name, word in zip(NEEDED, words, strict=True)}, height)
 
 
-def _from(place: str, values: Mapping[str, float], height: float) -> Point:
-    return Point(place, values["x"], values["y"], values.get("z", height), values.get("yaw"), values.get("time"))
+def _from(place: str, values: Mapping[str, float], height: float) -> PathPoint:
+    return PathPoint(place, values["x"], values["y"], values.get("z", height), values.get("yaw"), values.get("time"))
 
 
 def _number(what: str, text: str) -> float:

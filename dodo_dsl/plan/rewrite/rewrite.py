@@ -16,7 +16,7 @@ from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, 
 from dodo_dsl.application.variables import with_variables
 from dodo_dsl.plan.model import STARTED, Application, ApplicationService
 from dodo_dsl.plan.rewrite import confinement, service_copy, service_namespaces, volumes
-from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy, Setting
+from dodo_dsl.plan.rewrite.service_copy import ComposeProject, ServiceCopy, Setting
 from dodo_dsl.source import Node, Scalar
 
 _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
@@ -74,19 +74,19 @@ def plan_application(application: ApplicationSource, setting: Setting) -> Applic
     )
 
 
-def _project(application: ApplicationSource, setting: Setting, services: Iterable[Any], named: Any) -> Project:
+def _project(application: ApplicationSource, setting: Setting, services: Iterable[Any], named: Any) -> ComposeProject:
     """What the copies of the services share; their paths and those of the ``named`` volumes are as the copies have."""
     paths = replace(application.paths, folder=setting.folder)
     look = Look(paths, containers=application.containers, ports=application.access.ports, limits=setting.limits)
     copies = volumes.FileCopies(paths, application.known, services, named)
-    return Project(setting, frozenset(application.services), look, application.known, copies)
+    return ComposeProject(setting, frozenset(application.services), look, application.known, copies)
 
 
 def _relative(path: Path, folder: Path) -> str:
     return Path(os.path.relpath(path, folder)).as_posix()
 
 
-def _copied(service: ComposeService, node: Node, project: Project, changes: list[str]) -> dict[str, Any]:
+def _copied(service: ComposeService, node: Node, project: ComposeProject, changes: list[str]) -> dict[str, Any]:
     """The service rewritten, without keys that have no value, most of which compose refuses."""
     kept = {key: value for key, value in _with_values(plain(node)).items() if key not in KEYS}
     copy = ServiceCopy(service.name, kept, project, changes)

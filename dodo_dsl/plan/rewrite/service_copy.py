@@ -46,7 +46,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Project:
+class ComposeProject:
     """What the services of one copy share: the ``names`` of those that start, and the variables that are ``known``.
 
     ``look`` judges what they may have, and ``copies`` are the folders of the repository that the test copies.
@@ -65,7 +65,7 @@ class ServiceCopy:
 
     name: str
     service: dict[str, Any]
-    project: Project
+    project: ComposeProject
     changes: MutableSequence[str]
 
     @property

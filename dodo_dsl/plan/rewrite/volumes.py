@@ -13,7 +13,7 @@ from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.limit_findings import put, volume_limits
 from dodo_dsl.application.access.value_findings import OWN_VOLUMES
 from dodo_dsl.application.interpolation import interpolated, split_outside
-from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy
+from dodo_dsl.plan.rewrite.service_copy import ComposeProject, ServiceCopy
 
 COPY = "files-"
 """How the volumes of copies begin, each with a number."""
@@ -193,7 +193,7 @@ def too_long(slug: str, volumes: Iterable[str]) -> str:
     return next((name for name in volumes if len(f"dodo-{slug}-{_MARK}_{name}") > _LONGEST), "")
 
 
-def own_volumes(volumes: Any, changes: MutableSequence[str], project: Project) -> dict[str, Any]:
+def own_volumes(volumes: Any, changes: MutableSequence[str], project: ComposeProject) -> dict[str, Any]:
     """Top-level ``volumes``: each test has its own, so names that all of the host would share are removed.
 
     File systems in memory get no more than a service may have. A folder of the repository is one of the project's

@@ -23,9 +23,10 @@ from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
 from dodo_dsl.plan.model import Place, Plan, PlannedService
 from dodo_dsl.report import comparison
 from dodo_dsl.report.trajectory import Way, ground_of
-from dodo_dsl.report.viewer import judged, log_lines, moment, pictures, recorded
+from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded
 from dodo_dsl.report.viewer.encoded import packed, script, shown
 from dodo_dsl.report.viewer.names import BEFORE, DATA, LOGS, PAGE, SHARED
+from dodo_dsl.report.viewer.record import read
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
 
 _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
@@ -149,7 +150,7 @@ def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict
     messages = _messages(plan, compiled)
     recording = folder / RECORDING
     test = recorded.read(recording, messages) if recording.is_file() else RecordedTest()
-    record = judged.read(plan, folder / LOGS)
+    record = read(plan, folder / LOGS)
     return {
         "version": VERSION,
         "test": _facts(outcome),

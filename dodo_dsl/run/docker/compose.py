@@ -35,7 +35,7 @@ from dodo_dsl.run.application_files import (
     secrets_of,
 )
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
-from dodo_dsl.run.docker.pulls import PullError, Pulls, Say, hints
+from dodo_dsl.run.docker.pulls import PullError, Pulls, Say, image_hints
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.permission import known_ports
 
@@ -183,7 +183,7 @@ class Compose:
             if name in application and name not in built and image_variable(name) not in self._images
         }
         try:
-            notes = await pulls.provide(own, foreign, self._say, hints(self.plan))
+            notes = await pulls.provide(own, foreign, self._say, image_hints(self.plan))
         except PullError as error:
             raise BackendError(f"{error}{self._other_way(error.image)}") from error
         for note in notes:

@@ -194,7 +194,7 @@ class _Progress:
             self._say(f"pulling {self._image}: {done / 1e6:.0f} of {total / 1e6:.0f} MB")
 
 
-def hints(plan: Plan) -> dict[str, str]:
+def image_hints(plan: Plan) -> dict[str, str]:
     """How to get each image that has the prefix and the tag of DoDo's, by its reference."""
     prefix, _, last = plan.sandbox_image.rpartition("/")
     tag = last.rpartition(":")[2]

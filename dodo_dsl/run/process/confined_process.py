@@ -142,7 +142,7 @@ BUBBLEWRAP, NAMESPACES = "bubblewrap", "namespaces"
 _FOLDER = "/usr"
 
 
-def problem() -> str:
+def confinement_problem() -> str:
     """What goes wrong when a program that does nothing is confined as an application is; empty when nothing does.
 
     To be called by a sandbox with own mounts.
@@ -150,7 +150,9 @@ def problem() -> str:
     with tempfile.TemporaryFile() as output:
         try:
             confined = Confinement(_FOLDER, "network", 0, INTERPRETER)
-            true = ConfinedProcess(["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(places.own(0)))
+            true = ConfinedProcess(
+                ["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(places.own_user(0))
+            )
             code = true.wait()
         except (OSError, subprocess.SubprocessError, NoSeccomp) as error:
             return str(error)

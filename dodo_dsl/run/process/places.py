@@ -116,15 +116,15 @@ _MOST_TRIES = 100
 _FREE, _TAKEN = b"+", b"-"
 
 
-def own(cid: int) -> int | None:
+def own_user(cid: int) -> int | None:
     """Who the application of a test is where DoDo is root, as nobody else is; None without root: who runs DoDo.
 
     Raises as ``lease``.
     """
-    return lease(FIRST + cid) if os.getuid() == 0 else None
+    return lease_user(FIRST + cid) if os.getuid() == 0 else None
 
 
-def lease(preferred: int) -> int:
+def lease_user(preferred: int) -> int:
     """A user id that no process on the machine has, held by a child of this process until that is killed.
 
     The ``preferred`` one if it is free, else another. Raises OSError where none is, and where the kernel refuses.

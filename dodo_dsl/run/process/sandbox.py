@@ -153,11 +153,11 @@ class Sandbox:
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
         if confined.isolation == "network" and self.places is None:
-            self.places = Places(places.own(confined.cid))
+            self.places = Places(places.own_user(confined.cid))
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_probe(self, _descriptors: list[int]) -> None:
-        why = confined_process.problem()
+        why = confined_process.confinement_problem()
         self.send(probe=why, missing=confined_process.missing() if why else "")
 
     def _do_send(self, _descriptors: list[int], to: list[tuple[str, int]], data: str) -> None:

@@ -29,7 +29,7 @@ def board() -> cv2.aruco.CharucoBoard:
     return cv2.aruco.CharucoBoard((COLUMNS, ROWS), SQUARE / 1000, MARKER / 1000, dictionary)
 
 
-def picture(pixels: int = _PIXELS) -> Any:
+def board_picture(pixels: int = _PIXELS) -> Any:
     """The board alone in grey, with so many pixels to a mm."""
     return board().generateImage((round(COLUMNS * SQUARE * pixels), round(ROWS * SQUARE * pixels)))
 
@@ -39,7 +39,7 @@ def svg() -> str:
     left, top = (_PAPER[0] - COLUMNS * SQUARE) / 2, (_PAPER[1] - ROWS * SQUARE) / 2
     rectangles = "".join(
         f"M{left + x / _PIXELS:g} {top + y / _PIXELS:g}h{width / _PIXELS:g}v{height / _PIXELS:g}h{-width / _PIXELS:g}z"
-        for x, y, width, height in _black(picture())
+        for x, y, width, height in _black(board_picture())
     )
     width, height = _PAPER
     foot = height - 12

@@ -146,7 +146,7 @@ FOLDER_VARIABLE = "DODO_RIGS"
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
-def folder(is_hardware: bool = False) -> Path:
+def quarantine_folder(is_hardware: bool = False) -> Path:
     """Where quarantines are: the operator's folder, else ``DODO_RIGS``, else in this user's state; raises RigProblem.
 
     Variables do not count for hardware, as a job could set them.
@@ -165,7 +165,7 @@ def _files(rig: str, devices: Sequence[str]) -> list[Path]:
     if not _NAME.fullmatch(rig):
         raise RigProblem(f"'{rig}' is not a rig's name, expected lower-case letters, digits and hyphens")
     keys = sorted({device_key(device) for device in devices} - {""})
-    place = folder(any(map(is_hardware_device, devices)))
+    place = quarantine_folder(any(map(is_hardware_device, devices)))
     return [place / f"{key}.json" for key in (rig, *keys)]
 
 
@@ -177,9 +177,9 @@ def quarantined(rig: str, devices: Sequence[str] = ()) -> str:
 
 def all_quarantined() -> dict[str, str]:
     """The rigs in quarantine, each with its reason; raises RigProblem."""
-    places = {folder()}
+    places = {quarantine_folder()}
     with contextlib.suppress(RigProblem):
-        places.add(folder(is_hardware=True))
+        places.add(quarantine_folder(is_hardware=True))
     paths = (path for place in sorted(places) for path in sorted(place.glob("*.json")))
     return dict(_read(path) for path in paths if _NAME.fullmatch(path.stem))
 
@@ -195,7 +195,7 @@ def quarantine(rig: str, reason: str, devices: Sequence[str] = ()) -> None:
             raise RigProblem(f"its quarantine cannot be written to '{path}': {error.strerror} ({reason})") from error
 
 
-def clear(rig: str, devices: Sequence[str] = ()) -> bool:
+def clear_quarantine(rig: str, devices: Sequence[str] = ()) -> bool:
     """Ends a quarantine, under the name that the rig had then, too; whether there was one. Raises RigProblem."""
     found = [path for path in _files(rig, devices) if path.exists()]
     also = [path.with_stem(name) for path in found if _NAME.fullmatch(name := _read(path)[0])]

@@ -34,7 +34,7 @@ async def _chosen(job: Job, say: Say, tickets: contextlib.ExitStack) -> Job:
     usable = _usable([job, *job.others])
     by_rig = {one.plan.rig: _lease_names(one) for one in usable}
     names = [name for found in by_rig.values() for name in found]
-    place, since = leases.folder(), leases.arrival_time()
+    place, since = leases.lease_folder(), leases.arrival_time()
 
     def free() -> Job | None:
         return next((one for one in usable if _is_free(by_rig[one.plan.rig], place, since)), None)

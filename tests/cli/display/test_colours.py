@@ -42,14 +42,14 @@ def test_the_variables_that_decide(
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     made = stream()
-    display.write(made, [("ok", "passed")])
+    display.write_coloured(made, [("ok", "passed")])
     assert made.getvalue() == (f"{GREEN}ok\x1b[0m" if wanted else "ok")
 
 
 def test_a_harmless_stream_lets_colours_through_and_nothing_of_others() -> None:
     terminal = Terminal()
     stream = UninterruptedStream(harmless_stream(terminal))
-    display.write(stream, [("\x1b[2Jgone", "failed"), ("\n", ""), ("::error::x", "hint")])  # type: ignore[arg-type]
+    display.write_coloured(stream, [("\x1b[2Jgone", "failed"), ("\n", ""), ("::error::x", "hint")])  # type: ignore[arg-type]
     assert terminal.getvalue() == f"{RED}�[2Jgone\x1b[0m\n\x1b[36m: :error::x\x1b[0m"
 
 

@@ -15,7 +15,7 @@ import yaml
 
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.rig_truth import EXAMPLES
-from services.object_detection.boxes import load
+from services.object_detection.boxes import load_truth
 from tests.drive.applications import ROOT
 
 CONES = "cone_yellow=yellow,cone_blue=blue"
@@ -65,7 +65,7 @@ def test_the_scene_knows_the_shipped_truth(place: Path) -> None:
     for (label, box), (true_label, true) in zip(boxes(place / "board.json"), shipped, strict=True):
         assert label == true_label
         assert box == pytest.approx(true, abs=0.1)
-    assert load(place / "board.json", "one").labels() == ["blue", "yellow"]
+    assert load_truth(place / "board.json", "one").labels() == ["blue", "yellow"]
     picture, marked = (cv2.imread(str(place / name)) for name in ("board.png", "board-boxes.png"))
     assert picture.shape == (480, 640, 3)
     changed = (marked[::2, ::2] != picture).any(axis=2)

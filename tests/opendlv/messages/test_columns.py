@@ -51,7 +51,7 @@ def decoded(messages: MessageSet, payloads: list[bytes]) -> tuple[list[dict[str,
     starts = ends - np.array([len(payload) for payload in payloads], np.int64)
     layout = messages.layout("test.Every")
     decoded, good = message_columns.decode(layout, b"".join(payloads) + PADDING, starts, ends)
-    assert [(column.name, column.type) for column in decoded] == list(message_columns.names(layout))
+    assert [(column.name, column.type) for column in decoded] == list(message_columns.column_names(layout))
     rows = [{column.name: column.values[row] for column in decoded} for row in range(len(payloads))]
     return rows, good.tolist()
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.application.access.model import Look
-from dodo_dsl.plan.rewrite.service_copy import Project, ServiceCopy, Setting
+from dodo_dsl.plan.rewrite.service_copy import ComposeProject, ServiceCopy, Setting
 from dodo_dsl.plan.rewrite.volumes import FileCopies
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -36,6 +36,6 @@ def copy(
     return ServiceCopy("a", service, project(setting, ports, copies), [])
 
 
-def project(setting: Setting, ports: tuple[str, ...] = (), copies: FileCopies | None = None) -> Project:
+def project(setting: Setting, ports: tuple[str, ...] = (), copies: FileCopies | None = None) -> ComposeProject:
     look = Look(HostPaths(FOLDER, (FOLDER,)), containers={"camera": "eyes"}, ports=ports, limits=setting.limits)
-    return Project(setting, frozenset(["a", "eyes"]), look, {}, copies)
+    return ComposeProject(setting, frozenset(["a", "eyes"]), look, {}, copies)

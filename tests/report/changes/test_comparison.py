@@ -56,7 +56,7 @@ def test_checks_of_one_name_are_compared_in_their_order() -> None:
 
 
 def test_the_terminal_shows_what_changed() -> None:
-    assert list(comparison.lines(compared(BEFORE, AFTER))) == [
+    assert list(comparison.change_lines(compared(BEFORE, AFTER))) == [
         "compared with main/results.json: 1 newly failing, 1 still failing, 1 new, 1 gone, 1 fixed, 1 still passing",
         "  NEWLY FAILING  a  passed -> failed  hit wall",
         "  STILL FAILING  c  failed -> error  crashed",
@@ -133,12 +133,12 @@ def test_markdown_has_no_markup_of_others(hostile: str) -> None:
 
 def test_a_file_of_others_is_not_replaced(tmp_path: Path) -> None:
     found, file = compared(BEFORE, AFTER), tmp_path / "changes.md"
-    comparison.write(tmp_path, found)
+    comparison.write_markdown(tmp_path, found)
     assert file.read_text() == comparison.to_markdown(found)
-    comparison.write(tmp_path, None)
+    comparison.write_markdown(tmp_path, None)
     assert not file.exists()
     file.write_text("# My changes\n")
-    comparison.write(tmp_path, None)
+    comparison.write_markdown(tmp_path, None)
     with pytest.raises(atomic.NotReplaceable, match="not written by DoDo"):
-        comparison.write(tmp_path, found)
+        comparison.write_markdown(tmp_path, found)
     assert file.read_text() == "# My changes\n"

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.report.comparison import compare
-from dodo_dsl.report.join import join, read_document, write
+from dodo_dsl.report.join import join, read_document, write_other_ways
 from dodo_dsl.report.report_folder import write_summaries
 from dodo_dsl.report.results import read_given
 from dodo_dsl.report.viewer.encoded import script
@@ -65,7 +65,7 @@ def test_the_ways_of_two_reports_are_drawn_over_one_another(chromium: Chromium, 
     other = read_given(tmp_path / "old" / "report")
     comparison = compare(outcomes, other)
     address = (tmp_path / "report" / "test-0" / "drive.html").as_uri()
-    write(tmp_path / "report", comparison, other)
+    write_other_ways(tmp_path / "report", comparison, other)
     with chromium.page(address) as page:
         assert page.value("dodo.way.before.length") == 4001
         page.value("dodo.cursor.move(2)")
@@ -73,7 +73,7 @@ def test_the_ways_of_two_reports_are_drawn_over_one_another(chromium: Chromium, 
         assert caption.endswith("dashed: before (failed), 0.80 m apart")
         assert page.faults == []
         both = page.pixels()
-    write(tmp_path / "report", None, None)
+    write_other_ways(tmp_path / "report", None, None)
     with chromium.page(address) as page:
         page.value("dodo.cursor.move(2)")
         assert page.value("dodo.way.before.length") == 0

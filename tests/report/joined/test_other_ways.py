@@ -29,7 +29,7 @@ def compared(folder: Path, data: str) -> Path:
     write(folder / "old", [PASSED])
     (folder / "old" / "a" / "drive.js").write_text(data)
     given = read_given(folder / "old")
-    join.write(folder / "new", compare(read_given(folder / "new").outcomes, given), given)
+    join.write_other_ways(folder / "new", compare(read_given(folder / "new").outcomes, given), given)
     return folder / "new" / "a"
 
 
@@ -42,7 +42,7 @@ def test_the_way_is_beside_the_page_until_nothing_is_compared(tmp_path: Path) ->
     assert [field["name"] for field in document["fields"]] == list(join.FIELDS)
     assert 'src="before.js"' in (place / "drive.html").read_text()
     assert not (place.parent / "b" / "before.js").exists()
-    join.write(place.parent, None, None)
+    join.write_other_ways(place.parent, None, None)
     assert not (place / "before.js").exists()
     assert "before.js" not in (place / "drive.html").read_text()
 

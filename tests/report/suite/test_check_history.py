@@ -59,9 +59,9 @@ def test_the_page_shows_curves_until_another_run_has_none(tmp_path: Path) -> Non
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"a": ' * 3000])
 def test_a_damaged_file_is_no_history(tmp_path: Path, text: str) -> None:
     (tmp_path / overview.FILE_NAME).write_text(text)
-    assert overview.read(tmp_path) == {}
+    assert overview.read_history(tmp_path) == {}
 
 
 def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
-    overview.write(tmp_path, {"a": runs(0.1)})
-    assert overview.read(tmp_path) == json.loads(json.dumps({"a": runs(0.1)}))
+    overview.write_history(tmp_path, {"a": runs(0.1)})
+    assert overview.read_history(tmp_path) == json.loads(json.dumps({"a": runs(0.1)}))

@@ -108,7 +108,7 @@ def test_no_column_is_clipped(chromium: Chromium, tmp_path: Path) -> None:
         for test in new
     ]
     runs = [{"when": n, "outcome": "passed", "checks": {c["name"]: n for c in new[0].checks}} for n in range(3)]
-    overview.write(tmp_path, {new[0].slug: runs})
+    overview.write_history(tmp_path, {new[0].slug: runs})
     comparison = compare([*new, *grid], GivenReport(Path("main/results.json"), [*old, *grid]))
     for changes in (None, comparison):
         write_summaries(tmp_path, [*new, *grid], changes)

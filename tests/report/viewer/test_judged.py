@@ -10,7 +10,8 @@ import pytest
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import from_json
-from dodo_dsl.report.viewer import encoded, judged, page
+from dodo_dsl.report.viewer import encoded, page
+from dodo_dsl.report.viewer.record import JudgedRecord, read
 from services.base import Judged, JudgedBoxes
 from services.base import judged as recording
 from tests.report.viewer import drives, failures
@@ -21,14 +22,14 @@ def plan(slug: str) -> Plan:
     return from_json((GOLDEN / slug / "test.json").read_text())
 
 
-def recorded(folder: Path, fill: Callable[[Judged], object], *more: str) -> judged.Judged:
+def recorded(folder: Path, fill: Callable[[Judged], object], *more: str) -> JudgedRecord:
     """What the page gets of an evaluator's record, and of further lines in it."""
     record = Judged()
     fill(record)
     lines = [*record.lines({"largest-step": ("max-step",)}), *more]
     (folder / "evaluation.track.judged").write_text("\n".join(lines))
     assert max(map(len, lines)) < 60_000
-    return judged.read(plan("sil-closed-straight"), folder)
+    return read(plan("sil-closed-straight"), folder)
 
 
 def test_a_series_with_its_limits_and_its_target(tmp_path: Path) -> None:
@@ -101,14 +102,14 @@ def test_lines_that_are_none_cost_only_themselves(tmp_path: Path) -> None:
 
 def test_an_evaluator_without_a_record_is_named(tmp_path: Path) -> None:
     why = "'track' recorded nothing of what was judged over time: its limits and targets are not drawn."
-    assert judged.read(plan("sil-closed-straight"), tmp_path).why() == why
+    assert read(plan("sil-closed-straight"), tmp_path).why() == why
 
 
 def test_lines_of_the_map_have_roles(tmp_path: Path) -> None:
     (tmp_path / "files").symlink_to(ROOT / "tests_registry")
     whole = plan(failures.wall_hit().slug)
     drives.judge(tmp_path, whole, tmp_path, failures.wall_hit())
-    way = judged.read(whole, tmp_path).way
+    way = read(whole, tmp_path).way
     assert way is not None and way.goal == "finish"
     shown = page.scene(whole, tmp_path, way)
     assert {line["name"]: line["role"] for line in shown["lines"]} == {

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import shapely
 
-from services.collision.track import VehicleBox, VehiclePose, load, outline
+from services.collision.track import VehicleBox, VehiclePose, load_obstacles, outline
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
 from tests.report.viewer.hostile import HOSTILE
@@ -162,7 +162,7 @@ def test_the_log_follows_the_cursor(page: Page) -> None:
 @pytest.mark.parametrize("page", ["wall hit"], indirect=True)
 def test_the_margin_is_the_evaluators(page: Page) -> None:
     """The distances to the walls are those that were judged: none after the wall was hit, which alone is marked."""
-    walls = load(drives.ROOT / "tests_registry" / "maps" / "straight")
+    walls = load_obstacles(drives.ROOT / "tests_registry" / "maps" / "straight")
     signal = "dodo.signals.judged().find(s => s.title === 'Distance to the walls')"
     margins = page.value(f"(s => Array.from(s.values, (v, n) => [s.times[n], v, s.marked(n)]))({signal})")
     for at, margin, mark in margins:

@@ -73,7 +73,7 @@ def test_images_that_were_never_built() -> None:
         PlannedService("evaluation", "radar", "radar", "elsewhere/radar:1", ("radar",)),
         PlannedService("evaluation", "track", "collision", "team/collision:7", ("python", "-m", "services.collision")),
     )
-    hints = docker_pulls.hints(plan(services=services, sandbox_image="team/sandbox:7"))
+    hints = docker_pulls.image_hints(plan(services=services, sandbox_image="team/sandbox:7"))
     own = "build it from your own Dockerfile on team/base:7: dodo images build judge --prefix team --tag 7"
     shipped = "'dodo images build --prefix team --tag 7' makes it"
     assert hints == {"team/judge:7": own, "team/collision:7": shipped, "team/sandbox:7": shipped}

@@ -49,10 +49,10 @@ def test_without_images_of_dodo(
 
     monkeypatch.setattr("dodo_dsl.run.docker.client.connect", connect)
     monkeypatch.setattr("dodo_dsl.run.mixed.may_enter", lambda: root)
-    assert run.choose([plan(application=IMAGE, services=OWN)]) == backend
+    assert run.choose_backend([plan(application=IMAGE, services=OWN)]) == backend
 
 
 def test_on_rigs_unless_the_application_can_be_started() -> None:
-    assert run.choose([plan(application=IMAGE, rig="desk")]) == "mixed"
+    assert run.choose_backend([plan(application=IMAGE, rig="desk")]) == "mixed"
     started = Application(".", (ApplicationService("app", ("python", "a.py")),))
-    assert run.choose([replace(plan(application=started), rig="desk")]) == "process"
+    assert run.choose_backend([replace(plan(application=started), rig="desk")]) == "process"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.rigs.leases import all_quarantined, clear, quarantine, quarantined
+from dodo_dsl.run.rigs.leases import all_quarantined, clear_quarantine, quarantine, quarantined
 from dodo_dsl.run.rigs.problems import RigProblem
 
 
@@ -15,11 +15,11 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_it_lasts_until_it_is_cleared() -> None:
-    assert (quarantined("kiwi"), all_quarantined(), clear("kiwi")) == ("", {}, False)
+    assert (quarantined("kiwi"), all_quarantined(), clear_quarantine("kiwi")) == ("", {}, False)
     quarantine("kiwi", "it has lost steps")
     quarantine("other", "its camera is dark")
     assert all_quarantined() == {"kiwi": "it has lost steps", "other": "its camera is dark"}
-    assert (clear("kiwi"), quarantined("kiwi"), clear("kiwi")) == (True, "", False)
+    assert (clear_quarantine("kiwi"), quarantined("kiwi"), clear_quarantine("kiwi")) == (True, "", False)
     assert list(all_quarantined()) == ["other"]
 
 
@@ -28,12 +28,12 @@ def test_a_damaged_file_is_a_quarantine(state: Path, text: str) -> None:
     state.mkdir()
     (state / "kiwi.json").write_text(text)
     assert quarantined("kiwi") == "its quarantine file cannot be read"
-    assert clear("kiwi")
+    assert clear_quarantine("kiwi")
 
 
 @pytest.mark.parametrize("name", ["", "../kiwi", "Kiwi", "a.b", "-a", "a b"])
 def test_a_strange_name_reaches_no_file(state: Path, name: str) -> None:
-    for call in (quarantined, clear):
+    for call in (quarantined, clear_quarantine):
         with pytest.raises(RigProblem, match="is not a rig's name, expected lower-case letters, digits and hyphens"):
             call(name)
     with pytest.raises(RigProblem):

@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.assets.trajectory import Point, Trajectory, TrajectoryError, headings, straight, wrapped
+from dodo_dsl.opendlv.assets.trajectory import PathPoint, Trajectory, TrajectoryError, headings, straight, wrapped
 
 
-def points(*places: tuple[float, ...]) -> list[Point]:
+def points(*places: tuple[float, ...]) -> list[PathPoint]:
     """Points from (x, y), (x, y, yaw) or (x, y, yaw, time)."""
-    return [Point(f"t.csv:{n}", p[0], p[1], 0.0, *p[2:]) for n, p in enumerate(places, 2)]
+    return [PathPoint(f"t.csv:{n}", p[0], p[1], 0.0, *p[2:]) for n, p in enumerate(places, 2)]
 
 
 def test_a_speed_makes_the_times() -> None:
@@ -56,7 +56,7 @@ def test_half_a_turn_goes_to_the_left() -> None:
 
 def test_on_a_circle_it_looks_along_the_tangent() -> None:
     angles = [math.radians(10 * n) for n in range(10)]
-    found = headings([Point("", math.cos(a), math.sin(a)) for a in angles])
+    found = headings([PathPoint("", math.cos(a), math.sin(a)) for a in angles])
     for angle, heading in zip(angles[1:-1], found[1:-1], strict=True):
         assert heading == pytest.approx(angle + math.pi / 2)
 

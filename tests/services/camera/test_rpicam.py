@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from services.camera.picture import CameraError
-from services.camera.sources import RpiCamera, argv
+from services.camera.sources import RpiCamera, rpicam_command
 
 
 def test_pictures_come_whole_and_in_order(rpicam: Path) -> None:
@@ -14,11 +14,11 @@ def test_pictures_come_whole_and_in_order(rpicam: Path) -> None:
     assert all((p.i420[:48] == p.i420[0, 0]).all() and (p.i420[48:] == 128).all() for p in pictures)
     times = [p.time for p in pictures]
     assert None not in times and times == sorted(times, key=lambda t: t or 0)
-    assert rpicam.read_text().split("\n") == argv(64, 48, 50, 0.02)[1:]
+    assert rpicam.read_text().split("\n") == rpicam_command(64, 48, 50, 0.02)[1:]
 
 
 def test_the_command() -> None:
-    words = argv(640, 480, 10, 0.1)
+    words = rpicam_command(640, 480, 10, 0.1)
     assert words[0] == "rpicam-vid"
     for pair in (["--codec", "yuv420"], ["--framerate", "10"], ["--shutter", "100000"], ["--timeout", "0"]):
         assert any(words[i : i + 2] == pair for i in range(len(words)))

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from services.collision.track import ObstaclesError, load, pick
+from services.collision.track import ObstaclesError, load_obstacles, pick
 
 
 def write(folder: Path, document: Any) -> Path:
@@ -25,14 +25,14 @@ def test_lines_by_name_from_the_folder_or_the_file(tmp_path: Path) -> None:
             ],
         },
     )
-    obstacles = load(tmp_path)
+    obstacles = load_obstacles(tmp_path)
     assert obstacles["left"].wkt == "MULTILINESTRING ((0 0, 1 0), (1 0, 1 2), (5 5, 6 6))"
     assert obstacles["finish"].wkt == "MULTILINESTRING ((0 3, 1 3))"
-    assert load(tmp_path / "map.json").keys() == obstacles.keys()
+    assert load_obstacles(tmp_path / "map.json").keys() == obstacles.keys()
 
 
 def test_a_map_may_have_none(tmp_path: Path) -> None:
-    assert load(write(tmp_path, {"model": []})) == {}
+    assert load_obstacles(write(tmp_path, {"model": []})) == {}
 
 
 @pytest.mark.parametrize(
@@ -66,20 +66,20 @@ def test_a_map_may_have_none(tmp_path: Path) -> None:
 )
 def test_what_is_no_map_is_said_with_its_place(tmp_path: Path, document: Any, message: str) -> None:
     with pytest.raises(ObstaclesError) as caught:
-        load(write(tmp_path, document))
+        load_obstacles(write(tmp_path, document))
     assert str(caught.value) == f"{tmp_path / 'map.json'}{message}"
 
 
 def test_a_missing_map(tmp_path: Path) -> None:
     with pytest.raises(ObstaclesError) as caught:
-        load(tmp_path / "nowhere")
+        load_obstacles(tmp_path / "nowhere")
     assert str(caught.value) == f"there is no file '{tmp_path / 'nowhere' / 'map.json'}'"
 
 
 def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:
     names = ("left", "right", "finish")
     write(tmp_path, {"obstacles": [{"name": name, "lines": [0, 0, 1, 1]} for name in names]})
-    obstacles = load(tmp_path)
+    obstacles = load_obstacles(tmp_path)
     assert list(pick(obstacles, ["right", "left"], "walls", tmp_path)) == ["right", "left"]
     with pytest.raises(ObstaclesError) as caught:
         pick(obstacles, ["left", "rigth"], "walls", tmp_path)

@@ -195,4 +195,4 @@ def test_a_firmware_that_says_nothing_of_its_limits_is_an_error(
 ) -> None:
     monkeypatch.setattr(line[0], "_answer_limits", lambda: None)
     with pytest.raises(RigError, match="does not say its limits"):
-        memory.read(line[1])
+        memory.read_memory(line[1])

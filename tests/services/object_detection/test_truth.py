@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.object_detection.boxes import Box, FrameKey, LabelledBox, TruthFileError, load
+from services.object_detection.boxes import Box, FrameKey, LabelledBox, TruthFileError, load_truth
 from tests.services.process import ROOT
 
 COCO = {
@@ -36,7 +36,7 @@ def single() -> dict[str, Any]:
 
 
 def test_one_picture_holds_for_every_frame(tmp_path: Path) -> None:
-    truth = load(write(tmp_path, single()), "one")
+    truth = load_truth(write(tmp_path, single()), "one")
     boxes = truth.of(FrameKey(1, 2))
     assert boxes is not None and boxes == truth.of(FrameKey(3, 4))
     assert boxes[0].label == "yellow" and boxes[0].box == pytest.approx(YELLOW.box)
@@ -45,7 +45,7 @@ def test_one_picture_holds_for_every_frame(tmp_path: Path) -> None:
 
 def test_pictures_by_sample_time_and_by_number(tmp_path: Path) -> None:
     path = write(tmp_path, COCO)
-    by_time, by_number = load(path, "sample-time"), load(path, "number")
+    by_time, by_number = load_truth(path, "sample-time"), load_truth(path, "number")
     assert [len(by_time.of(FrameKey(time, 4)) or "") for time in (1_000_000, 1_100_000)] == [2, 0]
     assert by_time.of(FrameKey(1_100_000, 9)) == () and by_time.of(FrameKey(1_000_001, 4)) is None
     assert by_number.of(FrameKey(1, 5)) == () and by_number.of(FrameKey(1_000_000, 6)) is None
@@ -92,13 +92,13 @@ def test_what_is_refused(tmp_path: Path, path: tuple[Any, ...], value: Any, said
     change(path, value)(document)
     file = write(tmp_path, document)
     with pytest.raises(TruthFileError) as raised:
-        load(file, "sample-time")
+        load_truth(file, "sample-time")
     assert str(raised.value).startswith(f"{file}{said}")
 
 
 def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TruthFileError, match=r"has 2 images, expected one for all frames; see truth-frames$"):
-        load(write(tmp_path, COCO), "one")
+        load_truth(write(tmp_path, COCO), "one")
 
 
 @pytest.mark.parametrize(
@@ -112,11 +112,11 @@ def test_more_than_one_picture_for_every_frame_is_refused(tmp_path: Path) -> Non
 )
 def test_files_that_are_no_json(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(TruthFileError) as raised:
-        load(path := write(tmp_path, text), "one")
+        load_truth(path := write(tmp_path, text), "one")
     assert str(raised.value).startswith(f"{path}{said}")
     for other in (tmp_path / "absent.json", tmp_path):
         with pytest.raises(TruthFileError, match=r"cannot be read as COCO JSON: "):
-            load(other, "one")
+            load_truth(other, "one")
 
 
 KEYS = ["images", "annotations", "categories", "id", "name", "bbox", "width", "height", "image_id", "category_id"]
@@ -128,11 +128,11 @@ values = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_s
 def test_any_json_is_a_truth_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, document: Any) -> None:
     path = write(tmp_path_factory.getbasetemp(), document)
     with pytest.raises(TruthFileError, match=r"truth\.json(:1:1)?: "):
-        load(path, "number")
+        load_truth(path, "number")
 
 
 def test_the_registry_has_truths_that_can_be_used() -> None:
     paths = sorted((ROOT / "tests_registry" / "truths").glob("*.json"))
     assert paths
     for path in paths:
-        assert load(path, "one").labels() == ["blue", "yellow"]
+        assert load_truth(path, "one").labels() == ["blue", "yellow"]

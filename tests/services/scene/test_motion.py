@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from services.scene.camera import MOST, CameraMotion, CameraPose, Pinhole, between, still
+from services.scene.camera import MOST, CameraMotion, CameraPose, Pinhole, motion_between, still
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
 from services.virtual_camera.optics import Optics
@@ -12,7 +12,7 @@ BODY = CameraPose.at(0, 0, 0)
 
 
 def test_two_poses_tell_the_velocity_and_the_spin():
-    motion = between(CameraPose.at(0, 0, 0), CameraPose.at(0.1, 0.2, 0, yaw=0.05), 50_000)
+    motion = motion_between(CameraPose.at(0, 0, 0), CameraPose.at(0.1, 0.2, 0, yaw=0.05), 50_000)
     assert motion.velocity == pytest.approx([2, 4, 0])
     assert motion.spin == pytest.approx([0, 0, 1])
     later = motion.after(0.1)
@@ -22,7 +22,7 @@ def test_two_poses_tell_the_velocity_and_the_spin():
 
 @pytest.mark.parametrize(("far", "gap"), [(0.1, 0), (0.1, -5), (0.1, 2_000_000), (90.0, 100_000)])
 def test_gaps_and_jumps_are_no_motion(far, gap):
-    motion = between(CameraPose.at(0, 0, 0), CameraPose.at(far, 0, 0), gap)
+    motion = motion_between(CameraPose.at(0, 0, 0), CameraPose.at(far, 0, 0), gap)
     assert not motion.velocity.any()
     assert motion.after(1.0) is motion.pose
 

@@ -81,13 +81,13 @@ def test_an_id_of_the_machines_own_users_is_left_alone(monkeypatch: pytest.Monke
         return True
 
     monkeypatch.setattr(places, "_is_held", is_held)
-    assert places.lease(USER) == tried[0] == places.FIRST + 1
+    assert places.lease_user(USER) == tried[0] == places.FIRST + 1
 
 
 def test_where_none_is_free_the_reason_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(places, "_is_held", lambda _: False)
     with pytest.raises(OSError, match="no user id from 64000 to 64999 is free: other processes"):
-        places.lease(USER)
+        places.lease_user(USER)
 
 
 def drive(folder: Path) -> str:

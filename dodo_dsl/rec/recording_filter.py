@@ -63,7 +63,7 @@ def _microseconds(seconds: float | None, begin: int) -> int | None:
     return round(seconds * 1e6) + (0 if seconds >= ABSOLUTE_S else begin)
 
 
-def write(recording: Recording, rows: Numbers, path: Path, progress: Callable[[int], None]) -> None:
+def copy_rows(recording: Recording, rows: Numbers, path: Path, progress: Callable[[int], None]) -> None:
     """Writes rows unchanged into a new file; ``progress`` gets the number of rows done.
 
     Raises OSError and RecordingError.

@@ -36,7 +36,7 @@ class _Series:
 
 
 @dataclass
-class Judged:
+class JudgedRecord:
     """All records of a test; ``silent`` are its evaluators that left none.
 
     ``parameters`` set the limit of a check, by the service's name and the check's.
@@ -102,9 +102,9 @@ class Judged:
                     frame[kind].append([shown(label, 60), *map(_finite, numbers)])
 
 
-def read(plan: Plan, logs: Path) -> Judged:
+def read(plan: Plan, logs: Path) -> JudgedRecord:
     """The records of a test's evaluators in the folder of its logs; what cannot be read is left out."""
-    found = Judged()
+    found = JudgedRecord()
     for service in plan.services:
         if service.judge:
             lines = list(_lines(logs / f"{service.layer}.{service.name}{JUDGED_SUFFIX}"))
