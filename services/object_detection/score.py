@@ -4,6 +4,7 @@ Kinds of mistakes let a verdict say what is wrong. Silence is which frames the a
 for how long it said nothing.
 """
 
+import json
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -248,6 +249,11 @@ class Silence:
 
 MEASURES = ("precision", "recall", "f1")
 MOST_NAME = 100
+_ROOM, _ROOM_OF_CHECK = 10_000, 100
+"""Characters for checks of one measure of classes that only the application names, and what each takes but its name.
+
+The runner reads lines of at most 65,536 characters; three measures and a long reason fit.
+"""
 
 
 @dataclass(frozen=True)
@@ -365,7 +371,13 @@ class Score:
         )
 
     def _classes(self, limits: DetectionLimits) -> Iterator[Check]:
+        """Of all classes with true boxes, and of as many others as a line of a verdict can have."""
+        room = _ROOM
         for label, counts in self.counts:
+            if not counts.hits + counts.missed:
+                room -= len(json.dumps(class_name(label))) + _ROOM_OF_CHECK
+                if room < 0:
+                    continue
             for name in MEASURES:
                 limit = limits.of(name) if limits.each_class else None
                 yield _check(f"{name}-{class_name(label)}", getattr(counts, name), limit, (f"min-{name}",))
