@@ -57,13 +57,13 @@ realtime-tests:
 	$(AHEAD) $(PYTEST) -n $(RIGS) --dist loadgroup -m "realtime and not proof" --junitxml=$(JUNIT)/realtime.xml
 
 engine-tests:
-	$(PYTEST) -n 2 --dist loadgroup -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
+	$(PYTEST) -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
 
 fast-tests:
 	$(BEHIND) $(PYTEST) -n 2 -m "not slow" --junitxml=$(JUNIT)/fast.xml
 
 slow-tests:
-	$(PYTEST) -n $(WORKERS) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
+	$(PYTEST) -n $(shell nproc) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
 
 tools:
 	@scripts/install-test-tools

@@ -63,12 +63,10 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-@pytest.hookimpl(tryfirst=True)  # xdist asks for the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
-    A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs. Two
-    tests at a time share the engine: one that looks at all that DoDo has there, and one of which it sees nothing.
+    A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs.
     """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
@@ -78,9 +76,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(
                 pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S, rerun_except=[HANGS])
             )
-        if item.get_closest_marker("engine"):
-            is_apart = "crate" in getattr(item, "fixturenames", ()) or "images" in item.path.parts
-            item.add_marker(pytest.mark.xdist_group("marked" if is_apart else "drives"))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
         for mark in WORDS:

@@ -22,8 +22,6 @@ from tests.run.desk import ROOT
 from tests.run.helpers import READY, STARTED, WAIT, Bench, Recorded
 
 IMAGE = f"dodo/base:{__version__}"
-MARK = "fault"
-"""With what the names of these tests begin."""
 SUBNETS = [f"10.213.{third}.{fourth}/28" for third in range(240, 256) for fourth in range(0, 256, 16)]
 
 
@@ -128,7 +126,7 @@ class Crate:
 def new_crate(folder: Path) -> Crate:
     """One with a mark that is like no other."""
     folder.chmod(0o777)
-    return Crate(Bench(folder), f"{MARK}-{secrets.token_hex(3)}")
+    return Crate(Bench(folder), f"fault-{secrets.token_hex(3)}")
 
 
 _LISTS = (

@@ -1,10 +1,6 @@
 """All images, built once for all tests from the base image that needs no registry."""
 
-import contextlib
-import fcntl
 import functools
-import json
-import os
 import shutil
 import subprocess
 import sys
@@ -37,23 +33,12 @@ def engine_answers() -> bool:
         return False
 
 
-@contextlib.contextmanager
-def one_at_a_time(factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A file of this run of tests, which no other of its processes has now."""
-    own = factory.getbasetemp()
-    note = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "images.json"
-    with note.open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield note
-
-
 @pytest.fixture(scope="session")
-def base_image(tmp_path_factory: pytest.TempPathFactory) -> str:
+def base_image() -> str:
     """The base image; it is made where it is missing and can be."""
     if not engine_answers():
         pytest.skip("no Docker engine answers (scripts/start-engine starts one)")
-    with one_at_a_time(tmp_path_factory):
-        made = subprocess.run([ROOT / "scripts" / "test-base-image"], capture_output=True, text=True, check=False)
+    made = subprocess.run([ROOT / "scripts" / "test-base-image"], capture_output=True, text=True, check=False)
     if not docker("image", "ls", "--quiet", BASE):
         pytest.skip(f"there is no image {BASE}: {made.stdout or made.stderr}")
     return BASE
@@ -95,19 +80,20 @@ def _plugin(name: str) -> str | None:
     return next((str(folder / name) for folder in places if (folder / name).is_file()), None)
 
 
+@functools.cache
+def _all_images(base_image: str) -> dict[str, str]:
+    if shutil.which("avr-gcc"):
+        make("firmware", "emulator")
+    return build(base_image)
+
+
 @pytest.fixture(scope="session")
-def built(base_image: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def built(base_image: str) -> dict[str, str]:
     """All images under the names that compiled tests ask for; the gantry's holds the emulated rig where it can be.
 
-    They are built once, although this is another fixture in each folder that imports it, and in each process.
+    They are built once, although this is another fixture in each folder that imports it.
     """
-    with one_at_a_time(tmp_path_factory) as note:
-        base = with_programs(base_image)
-        if not note.read_text():
-            if shutil.which("avr-gcc"):
-                make("firmware", "emulator")
-            note.write_text(json.dumps(build(base)))
-        return dict(json.loads(note.read_text()))
+    return _all_images(with_programs(base_image))
 
 
 @pytest.fixture
