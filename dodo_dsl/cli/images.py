@@ -232,7 +232,7 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
 
 
 def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> None:
-    """Builds images of one platform."""
+    """Builds images of one platform, one of them alone at first, so that what all have in common is one layer."""
     packages = None
     whole = any(image.name == DODO for image in images)
     if options.offline_wheels:
@@ -245,7 +245,9 @@ def _build(options: argparse.Namespace, images: list[Image], stdout: TextIO) -> 
         build_context.define(folder, images, options.source, options.base_image, options.docker_image)
         progress = "auto" if stdout.isatty() else "plain"
         words = ("buildx", "bake", "--file", build_context.DEFINITION, "--progress", progress)
-        code, output = docker_command.show(words, stdout, folder)
+        code, output = docker_command.show((*words, images[0].name), stdout, folder)
+        if not code and len(images) > 1:
+            code, output = docker_command.show(words, stdout, folder)
     if code:
         hint = f"; {_INDEX_HINT}" if packages is None and (stdout.isatty() or "requirements/install" in output) else ""
         raise docker_command.DockerError(f"the images cannot be built; the output above says why{hint}")
