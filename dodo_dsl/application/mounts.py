@@ -111,7 +111,7 @@ def _places(source: str, paths: HostPaths) -> Iterator[Path]:
 
 
 def missing_folders(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Mounts of what is not there, and that the engine is told not to make; others are empty folders of the test."""
+    """Mounts of what is missing and must not be created; other missing folders are empty ones of the test."""
     for shown in _of_repository(application):
         if shown.is_required and not os.path.lexists(application.paths.whole(shown.source)):
             message = f"there is no file or folder '{shown.source}', and 'create_host_path: false' requires it"

@@ -74,7 +74,7 @@ def told(wiring: Wiring) -> tuple[End, ...]:
 
 
 def told_in_words(names: tuple[str, ...]) -> str:
-    """What an application is told that none is told on a road; ``names`` as in ``told``, empty for nothing."""
+    """What an application hears that none hears on a road, by ``names`` of ``told``; empty for none."""
     if not names:
         return ""
     listed = ", ".join(names)
