@@ -87,6 +87,7 @@ test:
 proof: dev tools
 	@rm -f $(JUNIT)/proof.xml; status=0; \
 		$(PYTEST) -m proof --session-timeout=$(PROOF_S) --junitxml=$(JUNIT)/proof.xml || status=$$?; \
+		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search || status=$$?; \
 		.venv/bin/python scripts/slowest-tests --held $(JUNIT)/proof.xml; exit $$status
 
 first: realtime-tests fast-tests
