@@ -87,7 +87,7 @@ test:
 proof: dev tools
 	@rm -f $(JUNIT)/proof.xml; status=0; \
 		$(PYTEST) -m proof --session-timeout=$(PROOF_S) --junitxml=$(JUNIT)/proof.xml || status=$$?; \
-		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search || status=$$?; \
+		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search --junitxml=$(JUNIT)/search.xml || status=$$?; \
 		.venv/bin/python scripts/slowest-tests --held $(JUNIT)/proof.xml; exit $$status
 
 first: realtime-tests fast-tests
