@@ -73,7 +73,9 @@ def pipeline_template(name: str) -> bytes:
 
 
 def _schemas(root: Path) -> list[New]:
-    paths = [package_data.schemas() / name for name in ("deployment.schema.json", _SPEC_SCHEMA)]
+    paths = [
+        package_data.schemas() / name for name in ("deployment.schema.json", "application.schema.json", _SPEC_SCHEMA)
+    ]
     return [New(root / _SCHEMAS / path.name, path.read_bytes()) for path in paths]
 
 
