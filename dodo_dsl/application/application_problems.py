@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application import host_access, opendlv_flags
+from dodo_dsl.application import host_access, opendlv_flags, stack
 from dodo_dsl.application.access.findings import service_findings
 from dodo_dsl.application.access.model import Look, diagnostic, place
 from dodo_dsl.application.compose_paths import is_local
@@ -52,11 +52,12 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         return
     volumes = plain(application.rest["volumes"]) if "volumes" in application.rest else {}
     found: list[Diagnostic] = []
-    for service in application.services.values():
-        found.extend(problems(Written.of(service, application, volumes or {})))
-        found.extend(_missing_files(service, application))
-        found.extend(_missing_folder(service, application))
-        found.extend(missing_program(service, application.folder))
+    of_stack = stack.parts(application)
+    for name, service in application.services.items():
+        own = [*problems(Written.of(service, application, volumes or {})), *_missing_files(service, application)]
+        own += [*_missing_folder(service, application), *missing_program(service, application.folder)]
+        part = of_stack.get(name)
+        found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(nested_mounts(application))
     found.extend(missing_folders(application))
     found.extend(_cycles(application))

@@ -73,7 +73,8 @@ class ApplicationSource:
     are relative to ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the
     services by their ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set
     the secret ones among them. ``known`` are all variables whose values are known, ``access`` is what the deployment
-    allows, ``limits`` are the highest that the services may set.
+    allows, ``limits`` are the highest that the services may set. ``named`` are the files as ``dodo.yml`` names them,
+    ``without`` the services that it leaves out.
     """
 
     path: Path
@@ -87,6 +88,8 @@ class ApplicationSource:
     access: Access = field(default_factory=Access)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     left_out: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
 
     @functools.cached_property
     def demanding(self) -> tuple[tuple[str, str, Scalar], ...]:

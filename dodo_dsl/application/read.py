@@ -17,7 +17,7 @@ from dodo_dsl.application.access.model import Access, Look, diagnostic
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
-from dodo_dsl.application.load import load, unread
+from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, env_files, plain
 from dodo_dsl.application.model import declared as declaration_of
 from dodo_dsl.application.slips import variable_problems
@@ -69,8 +69,10 @@ def read_application(
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
     application = _application(paths[0].resolve(), document, services, files, access, limits)
-    application = replace(application, dropped={**application.dropped, **gone})
-    found.extend(unread(paths, Path(access.roots[0]) if access.roots else None))
+    root = Path(access.roots[0]) if access.roots else None
+    named = tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths)
+    application = replace(application, dropped={**application.dropped, **gone}, named=named, without=tuple(gone))
+    found.extend(unread(paths, root))
     found.extend(_shared(document, application))
     found.extend(declared.depending(application, gone))
     found.extend(application_problems(application, _first(services, declarations)))
