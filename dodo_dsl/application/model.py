@@ -16,6 +16,7 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.application.host_access import is_true
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
+from dodo_dsl.application.printed_lines import PrintedLine, printed_lines
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -30,7 +31,10 @@ Word = tuple[str, Span]
 
 @dataclass(frozen=True)
 class Declared:
-    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp`` with its place. ``readers`` may be 0."""
+    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp`` with its place. ``readers`` may be 0.
+
+    ``outputs`` are also those of ``lines``.
+    """
 
     inputs: tuple[Word, ...]
     outputs: tuple[Word, ...]
@@ -38,6 +42,7 @@ class Declared:
     done: Word | None
     readers: int
     span: Span
+    lines: tuple[PrintedLine, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -167,7 +172,10 @@ def declared(service: source.Mapping) -> Declared | None:
     inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))
     readers = entry.value.get("readers")
     count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 0
-    return Declared(inputs, outputs, answers, done[0] if done else None, count, entry.key)
+    lines = printed_lines(entry.value.get("lines"))
+    sent = {name.removesuffix("/0") for name, _ in outputs}
+    printed = {line.port: (line.port, line.message_span) for line in lines if line.port not in sent}
+    return Declared(inputs, (*outputs, *printed.values()), answers, done[0] if done else None, count, entry.key, lines)
 
 
 def scalars(node: Node | None) -> list[Scalar]:

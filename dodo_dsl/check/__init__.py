@@ -71,7 +71,7 @@ def check(
 
 def forget_files() -> None:
     """What is kept of the files that tests name, which may have changed."""
-    for cache in (file_rules.entries, file_rules.problems, resolve.known_ids, resolve.holds):
+    for cache in (file_rules.entries, file_rules.problems, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()
 
 

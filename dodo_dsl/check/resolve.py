@@ -121,13 +121,19 @@ def holds(path: Path, number: int, stamp: int) -> bool:
 @functools.cache
 def known_ids(own: tuple[Path, ...]) -> Mapping[str, int]:
     """The numbers of these messages, by name."""
-    ids = {d.name: d.id for d in odvd.load(STANDARD)}
+    return {name: definition.id for name, definition in known_messages(own).items()}
+
+
+@functools.cache
+def known_messages(own: tuple[Path, ...]) -> Mapping[str, odvd.Definition]:
+    """The standard messages and those in a deployment's files, as far as these can be read, by name."""
+    found = {d.name: d for d in odvd.load(STANDARD)}
     for path in own:
         try:
-            ids.update((d.name, d.id) for d in odvd.load(path))
+            found.update((d.name, d) for d in odvd.load(path))
         except odvd.OdvdError:
             continue  # reported with the deployment
-    return ids
+    return found
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ Parameters fit the manifest: known, complete, of the right type and unit, within
 ``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
 ``missing-file``, ``path-escape``.
 ``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
+``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
 ``camera-source``: what a rig's computer can take pictures from, in which sizes, and how often.
 ``camera-size``: a camera's optics, as they were measured, are those of pictures of one size. ``out-of-range``: sizes
 are even.
@@ -16,7 +17,9 @@ import math
 from collections.abc import Collection, Iterator
 from pathlib import PurePath
 
+from dodo_dsl.application.printed_lines import line_problems
 from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.resolve import known_messages
 from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -149,6 +152,8 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
     for own in declared:
         for name, span in (*own.inputs, *own.outputs, *own.answers) if own else ():
             yield from _known(context, name.partition("/")[0], span)
+        for line in own.lines if own else ():
+            yield from line_problems(line, known_messages(context.deployment.messages))
 
 
 def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:
