@@ -29,13 +29,14 @@ from dodo_dsl.application.model import (
 )
 from dodo_dsl.application.mounts import missing_folders, nested_mounts
 from dodo_dsl.application.slips import cid_slips, missing_program
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
 
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 
 _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
+_GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
 _LONGEST_HOST = 64
 """Bytes of a host's name, and of its domain's (utsname(7))."""
 _LONGEST_TEXT = 131_072
@@ -63,6 +64,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     found.extend(_cycles(application))
     found.extend(_never_healthy(application))
     found.extend(_same_variable(application))
+    found.extend(_several_cids(application))
     yield from found
     if not has_errors(found):
         yield from _without_cid(application)
@@ -148,20 +150,31 @@ def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
             yield Diagnostic(application.services[name].span, "application-file", message, "rename one of them")
 
 
+def _several_cids(application: ApplicationSource) -> Iterator[Diagnostic]:
+    for cid in application.cids:
+        first = application.cids[0]
+        if cid.value != first.value:
+            place = f"{shown_path(first.span.file)}:{first.span.line}"
+            message = f"'cid' is {cid.text}, and {first.text} in {place}: a test has one bus"
+            yield Diagnostic(cid.span, "application-cid", message, "declare the same one, or none where it is a flag")
+
+
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Warnings of flags that give no CID, of services with messages that take none, and of none that does."""
     services = application.services.values()
     slips = {service.name: list(cid_slips(service, _takes_cid(service))) for service in services}
     yield from (slip for found in slips.values() for slip in found)
+    if application.cid is not None:
+        return
     without = [service for service in services if not slips[service.name] and not _takes_cid(service)]
     if len(without) == len(services):
         message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
-        yield Diagnostic(without[0].span, "application-cid", message, "add --cid=111 to its command", "warning")
+        yield Diagnostic(without[0].span, "application-cid", message, _GIVE_CID, "warning")
         return
     for service in without:
         if service.declared and (service.declared.inputs or service.declared.outputs):
             message = f"'{service.name}' has messages, but takes no CID (--cid=, CID or OD4SESSION_CID)"
-            yield Diagnostic(service.span, "application-cid", message, "add --cid=111 to its command", "warning")
+            yield Diagnostic(service.span, "application-cid", message, _GIVE_CID, "warning")
 
 
 def _takes_cid(service: ComposeService) -> bool:

@@ -35,6 +35,9 @@ def left_out(document: Mapping, declarations: Declarations) -> dict[str, str]:
 def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
     """The merged compose files without what is left out, and with what ``dodo.yml`` says of the other services."""
     gone = left_out(document, declarations)
+    if declarations.own:
+        about = next(iter(declarations.own.values()))
+        document = _with(document, _DECLARED, {**_entries(document.get(_DECLARED)), **declarations.own}, about.key)
     if not gone and not declarations.services:
         return document
     kept = {
@@ -44,29 +47,35 @@ def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
         for name, entry in _services(document).items()
         if name not in gone
     }
-    written = document.entries[_SERVICES]
-    services = Entry(written.key, Mapping(written.value.span, kept, written.value.tag))
-    return Mapping(document.span, {**document.entries, _SERVICES: services}, document.tag)
+    return _with(document, _SERVICES, kept, document.span)
+
+
+def _with(node: Mapping, key: str, entries: dict[str, Entry], span: Span) -> Mapping:
+    """The node with a mapping, which is at ``span`` where the node has none."""
+    old = node.entries.get(key)
+    place = old.key if old else span
+    value = Mapping(old.value.span if old else span, entries, old.value.tag if old else "")
+    return Mapping(node.span, {**node.entries, key: Entry(place, value)}, node.tag)
+
+
+def _entries(node: Node | None) -> dict[str, Entry]:
+    return dict(node.entries) if isinstance(node, Mapping) else {}
 
 
 def _services(document: Mapping) -> dict[str, Entry]:
-    node = document.get(_SERVICES)
-    return dict(node.entries) if isinstance(node, Mapping) else {}
+    return _entries(document.get(_SERVICES))
 
 
 def _declared(service: Node, about: Entry) -> Node:
     """A service of a compose file with the keys of ``dodo.yml`` in place of its own ones."""
     if not isinstance(service, Mapping) or not isinstance(about.value, Mapping):
         return service
-    entries = dict(service.entries)
     keys = {key: entry for key, entry in about.value.entries.items() if key != PROCESS}
     if keys:
-        own = service.get(_DECLARED)
-        mine = own.entries if isinstance(own, Mapping) else {}
-        entries[_DECLARED] = Entry(about.key, Mapping(about.value.span, {**mine, **keys}))
-    if PROCESS in about.value.entries:
-        entries[_OF_PROCESS] = about.value.entries[PROCESS]
-    return Mapping(service.span, entries, service.tag)
+        service = _with(service, _DECLARED, {**_entries(service.get(_DECLARED)), **keys}, about.key)
+    if PROCESS not in about.value.entries:
+        return service
+    return Mapping(service.span, {**service.entries, _OF_PROCESS: about.value.entries[PROCESS]}, service.tag)
 
 
 def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnostic]:
@@ -92,8 +101,7 @@ def _said_twice(name: str, service: Node, about: Node) -> Iterator[Diagnostic]:
     """Warnings of keys that the compose file has with another value."""
     if not isinstance(service, Mapping) or not isinstance(about, Mapping):
         return
-    own = service.get(_DECLARED)
-    mine = dict(own.entries) if isinstance(own, Mapping) else {}
+    mine = _entries(service.get(_DECLARED))
     if _OF_PROCESS in service.entries:
         mine[PROCESS] = service.entries[_OF_PROCESS]
     for key, entry in about.entries.items():

@@ -130,7 +130,17 @@ def _application(
         access=access,
         limits=limits,
         left_out=left_out,
+        cids=tuple(_declared_cids([document, *(service.node for service in kept.values())])),
     )
+
+
+def _declared_cids(nodes: Iterable[source.Mapping]) -> Iterator[source.Scalar]:
+    """What ``x-dodo`` of the document and of its services says to be built in."""
+    for node in nodes:
+        about = node.get("x-dodo")
+        cid = about.get("cid") if isinstance(about, source.Mapping) else None
+        if isinstance(cid, source.Scalar):
+            yield cid
 
 
 def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:

@@ -114,11 +114,13 @@ class Declarations:
     """What ``dodo.yml`` says of an application beside its compose ``files``, at its place there.
 
     ``without`` names services that no test starts. ``services`` have the keys of ``x-dodo``, and ``process``, by name.
+    ``own`` are the keys of ``x-dodo`` of the whole application.
     """
 
     files: tuple[Path, ...] = ()
     without: tuple[Scalar, ...] = ()
     services: dict[str, Entry] = field(default_factory=dict)
+    own: dict[str, Entry] = field(default_factory=dict)
 
     @classmethod
     def of(cls, entry: Entry | None, files: tuple[Path, ...]) -> "Declarations":
@@ -128,7 +130,8 @@ class Declarations:
             return cls(files)
         services = node.get("services")
         declared = services.entries if isinstance(services, Mapping) else {}
-        return cls(files, tuple(_texts(node.entries.get("without"))), dict(declared))
+        own = {key: entry for key, entry in node.entries.items() if key not in ("files", "without", "services")}
+        return cls(files, tuple(_texts(node.entries.get("without"))), dict(declared), own)
 
 
 @dataclass(frozen=True)
