@@ -162,11 +162,11 @@ def _several_cids(application: ApplicationSource) -> Iterator[Diagnostic]:
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Warnings of flags that give no CID, of services with messages that take none, and of none that does."""
     services = application.services.values()
-    slips = {service.name: list(cid_slips(service, _takes_cid(service))) for service in services}
+    slips = {service.name: list(cid_slips(service, takes_cid(service))) for service in services}
     yield from (slip for found in slips.values() for slip in found)
     if application.cid is not None:
         return
-    without = [service for service in services if not slips[service.name] and not _takes_cid(service)]
+    without = [service for service in services if not slips[service.name] and not takes_cid(service)]
     if len(without) == len(services):
         message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
         yield Diagnostic(without[0].span, "application-cid", message, _GIVE_CID, "warning")
@@ -177,7 +177,8 @@ def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
             yield Diagnostic(service.span, "application-cid", message, _GIVE_CID, "warning")
 
 
-def _takes_cid(service: ComposeService) -> bool:
+def takes_cid(service: ComposeService) -> bool:
+    """Whether the CID of a service can be set."""
     raw = plain(service.node)
     variables = environment(raw.get("environment"))
     words = [*_words(raw.get("entrypoint")), *_words(raw.get("command")), *(v for v in variables.values() if v)]

@@ -87,6 +87,17 @@ def read_application(
     return (None if has_errors(found) else application), found
 
 
+def as_written(path: Path) -> ApplicationSource | None:
+    """The application of a compose file with whatever else is wrong with it; None where it is no compose file."""
+    roots = repository(path.resolve().parent)
+    files = ComposeFiles(source.read, roots)
+    document = load(files, [path])
+    services = document.get("services") if document else None
+    if document is None or not isinstance(services, source.Mapping) or has_errors(validate(document, "application")):
+        return None
+    return _application(path.resolve(), document, services, files, Access(), SandboxLimits())
+
+
 def _first(services: source.Mapping, declarations: Declarations) -> Span:
     """The place of the first service, or of the first that is left out where all are."""
     entries = list(services.entries.values())
