@@ -26,6 +26,8 @@ FILES = "dodo-files"
 """The service that copies the files of the repository to which an application may write."""
 KEYS = ("x-dodo", "x-dodo-process")
 
+_ABOUT_NO_MESSAGES = {"tune", "cid"}
+
 Word = tuple[str, Span]
 
 
@@ -58,7 +60,7 @@ class EnvFile:
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo or with only ``tune`` there.
+    ``declared`` is None without x-dodo, or where that says nothing of messages.
     ``cid_variables`` are the CID variables that its ``env_files`` set.
     """
 
@@ -78,7 +80,8 @@ class ApplicationSource:
     are relative to ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the
     services by their ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set
     the secret ones among them. ``known`` are all variables whose values are known, ``access`` is what the deployment
-    allows, ``limits`` are the highest that the services may set.
+    allows, ``limits`` are the highest that the services may set. ``named`` are the files as ``dodo.yml`` names them,
+    ``without`` the services that it leaves out. ``cids`` are declared to be built in, all the same one.
     """
 
     path: Path
@@ -92,6 +95,9 @@ class ApplicationSource:
     access: Access = field(default_factory=Access)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     left_out: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    cids: tuple[Scalar, ...] = ()
 
     @functools.cached_property
     def demanding(self) -> tuple[tuple[str, str, Scalar], ...]:
@@ -104,6 +110,12 @@ class ApplicationSource:
             for part in source.walk(node)
             if isinstance(part, Scalar) and isinstance(part.value, str) and "?" in part.value and "${" in part.value
         )
+
+    @property
+    def cid(self) -> int | None:
+        """The CID that is built into the application, so that its tests use it."""
+        values = [cid.value for cid in self.cids if isinstance(cid.value, int)]
+        return values[0] if values else None
 
     @functools.cached_property
     def paths(self) -> HostPaths:
@@ -163,7 +175,7 @@ def declared(service: source.Mapping) -> Declared | None:
     entry = service.entries.get("x-dodo")
     if entry is None or not isinstance(entry.value, source.Mapping):
         return None
-    if set(entry.value.entries) == {"tune"}:
+    if entry.value.entries and entry.value.entries.keys() <= _ABOUT_NO_MESSAGES:
         return None
     words = {key: tuple((s.text, s.span) for s in scalars(e.value)) for key, e in entry.value.entries.items()}
     inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))

@@ -19,6 +19,7 @@ RULES: tuple[Rule, ...] = (
     spec_rules.check_clock_rates,
     spec_rules.check_pools,
     spec_rules.check_rigs,
+    spec_rules.check_built_in_cid,
     service_rules.check_camera_sources,
     service_rules.check_services,
     service_rules.check_layers,

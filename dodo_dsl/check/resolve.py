@@ -155,6 +155,11 @@ class ResolvedTest:
         return len(self.services) == len(self.spec.uses)
 
 
+def isolation(spec: Spec, rig: Rig | None) -> str:
+    """The isolation that the spec sets, else its rig's, else a network of its own."""
+    return spec.isolation or (rig.isolation if rig else "network")
+
+
 def resolve(
     specs: Iterable[Spec],
     manifests: Mapping[str, Manifest],

@@ -12,6 +12,7 @@ import numpy as np
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import wiring_rules
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
+from dodo_dsl.cli.existing_application import Pictures
 from dodo_dsl.cli.new_files import New, filled
 from dodo_dsl.cli.new_test import spec_files
 from dodo_dsl.cli.rec_actions import messages_for
@@ -138,7 +139,9 @@ def _values(
     return tuple(value for value in values if math.isfinite(value)) or (0.0,)
 
 
-def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path) -> tuple[list[New], str]:
+def files(
+    name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path, pictures: Pictures
+) -> tuple[list[New], str]:
     """The test's files, its spec first, with the recording where the registry has it not yet; and what was found."""
     place = path.resolve()
     copies = []
@@ -158,6 +161,7 @@ def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Pat
         timeout=math.ceil(drive.duration) + 2 * _START_UP_S,
         max_time=math.ceil(drive.duration) + _START_UP_S,
         cameras=drive.cameras,
+        memories=pictures.parameters("rec-replay"),
         max_gap=math.ceil(drive.gap) if drive.gap > DEFAULT_GAP_S else 0,
         without=drive.requests,
         message=message,
@@ -171,9 +175,10 @@ def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Pat
     return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)
 
 
-def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None) -> str:
+def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None, pictures: Pictures) -> str:
     """A warning where services of the application read pictures, of which the recording has none."""
-    readers = [] if drive.cameras or application is None else wiring_rules.readers(application, _MEMORIES)
+    names = (*_MEMORIES, *pictures.memories.values())
+    readers = [] if drive.cameras or application is None else wiring_rules.readers(application, names)
     if not readers:
         return ""
     named = " and ".join(f"'{name}'" for name in readers)

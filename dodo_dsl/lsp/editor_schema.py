@@ -17,6 +17,7 @@ from dodo_dsl.lsp.documents import Steps
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
+from dodo_dsl.spec.schema_errors import written_schema
 
 Schema = dict[str, Any]
 
@@ -148,8 +149,7 @@ def write(file: Path | None = None) -> None:
 
 @functools.cache
 def _document(name: str) -> Schema:
-    found: Schema = json.loads((package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
-    return found
+    return written_schema(name)
 
 
 def keys_at(name: str, steps: Steps) -> Schema | None:

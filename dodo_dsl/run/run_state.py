@@ -57,6 +57,10 @@ class Ended(Exception):
     """The test is over; what decided it is among the facts."""
 
 
+_SILENT = "; the test is on CID"
+"""What the reasons of services end with, before the number, where they heard nothing of the application."""
+
+
 @dataclass
 class RunState:
     """Takes the events of one test. Times in s; ``began`` and ``finished`` by ``clock``, which never goes back."""
@@ -83,6 +87,8 @@ class RunState:
     """Whether the test ended as a program could not be started."""
     shortage: Shortage = field(default_factory=Shortage)
     """What of the machine was used up when the test ended."""
+    buses: frozenset[int] = frozenset()
+    """The CIDs of all buses that programs have joined in the application's networks, where these are the test's own."""
     memory_kills: Callable[[], int] = lambda: 0
     """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
@@ -214,6 +220,14 @@ class RunState:
         """Whether the end of a service was that of the test."""
         return bool(self._ended_by)
 
+    def _elsewhere(self, finding: Finding) -> Finding:
+        """A failure for silence, which names the test's CID, with the bus that the application has joined instead."""
+        others = sorted(self.buses - {self.plan.cid})
+        if not others or finding.result != "failed" or not finding.reason.endswith(f"{_SILENT} {self.plan.cid}"):
+            return finding
+        told = f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}"
+        return replace(finding, reason=f"{finding.reason}; {told}")
+
     def _explained(self, finding: Finding) -> Finding:
         """An error in place of a failure that may be due to what others used up.
 
@@ -265,7 +279,8 @@ class RunState:
         answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
         use = judgement.judged_use(self.resources, plan.resources)
         considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
-        finding = self._with_told(self._with_printed(self._explained(self._timed(considered.finding))))
+        finding = self._elsewhere(self._timed(considered.finding))
+        finding = self._with_told(self._with_printed(self._explained(finding)))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(

@@ -9,6 +9,7 @@ import pytest
 
 from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Plan
+from dodo_dsl.run import listeners
 from dodo_dsl.run.engine import (
     BEGIN_PATIENCE_S,
     LAST_TIME_PATIENCE_S,
@@ -696,3 +697,29 @@ def test_a_lower_limit_of_the_shell_is_noted_at_an_early_end(monkeypatch: pytest
     found = begun((1.0, Exited("app", 1)))
     assert (found.outcome, text in found.notes) == ("failed", True)
     assert text not in begun((1.0, FAILED), (1.0, ENDED)).notes
+
+
+@pytest.mark.parametrize(
+    ("joined", "said", "told"),
+    [
+        (
+            {130, 111},
+            "nothing came; the test is on CID 130",
+            "; the application talks on CID 111; write x-dodo: {cid: 111}",
+        ),
+        ({130}, "nothing came; the test is on CID 130", ""),
+        ({130, 111}, "hit wall left", ""),
+    ],
+)
+def test_the_bus_of_an_application_that_is_silent_on_the_test_s(
+    joined: set[int], said: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(listeners, "buses", lambda processes: joined if list(processes) == [17] else set())
+    assert begun((3.0, VerdictEvent("track", False, said, ())), (3.1, ENDED)).reason == said + told
+
+
+def test_nobody_looks_for_buses_on_the_machine_s_own_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listeners, "buses", lambda _: {111})
+    said = "nothing came; the test is on CID 130"
+    events = {**READY, "begin": [(3.0, VerdictEvent("track", False, said, ())), (3.1, ENDED)]}
+    assert outcome(ScriptedBackend(plan(), events, is_on_host=True)).reason == said

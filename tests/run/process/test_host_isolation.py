@@ -197,3 +197,12 @@ def test_where_the_kernel_refuses_namespaces_they_are_to_be_allowed() -> None:
         pytest.skip(done.stderr)
     assert done.stdout.startswith("the kernel refuses namespaces: unshare: "), done
     assert "to make namespaces" in done.stdout
+
+
+def test_a_built_in_cid_of_real_cars_is_refused_on_the_host() -> None:
+    async def take() -> None:
+        async with host_slot(plan(cid=111), (130,), print, alone=True):
+            pass
+
+    with pytest.raises(BackendError, match="the application has the CID 111 built in, which real cars use"):
+        asyncio.run(take())
