@@ -237,7 +237,7 @@ def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
     entries, options = read_map(path), options or SceneOptions()
     triangles = _Budget(entries.path, MAX_TRIANGLES, "triangles of models")
     shapes: dict[Path, tuple[Shape, int]] = {}
-    models = tuple(_model(entry, triangles, shapes) for entry in entries.models)
+    models = tuple(_model(entry, triangles, shapes) for entry in entries.models if entry.instances)
     around = clutter(options.clutter, options.seed, models)
     shade = options.light.on(np.array([0.0, 0.0, 1.0]))
     return Scene(
