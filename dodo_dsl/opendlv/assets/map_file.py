@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+from dodo_dsl.opendlv.assets import mesh_text
 from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, read_bytes, unread
 
 MAX_INSTANCES = 100_000
@@ -19,6 +20,7 @@ MAX_FRAMES = 100
 MAX_STAMP = 2**32 - 1
 FRAME_TURN = math.pi / 2
 """A model at a frame is turned by the frame's yaw and this, in rad about z: it looks along its own -y."""
+NO_BODIES = "no model of the map has 'frames' of other sender stamps than the vehicle's"
 MAX_OVERLAYS = 50
 """Places of overlays, each of which takes the memory of a picture."""
 
@@ -44,6 +46,11 @@ class ModelEntry:
     paint: Paint
     instances: tuple[Instance, ...]
     frames: tuple[int, ...] = ()
+
+    def footprint(self) -> list[tuple[float, float]]:
+        """The model's convex outline from above, at a frame at the origin that looks along x; raises MapError."""
+        cos, sin = math.cos(FRAME_TURN), math.sin(FRAME_TURN)
+        return [(cos * x - sin * y, sin * x + cos * y) for x, y in mesh_text.outline(self.file)]
 
 
 @dataclass(frozen=True)
@@ -167,6 +174,16 @@ def read_map(path: Path) -> MapFile:
     """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
     file = find_map(path)
     return _collected(file, Node.load(file), _raised)
+
+
+def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, ModelEntry]]:
+    """Name and model at each frame but the vehicle's ``own``; the frame tells those of one name apart."""
+    found = {stamp: model for model in models for stamp in model.frames if stamp != own}
+    names = [model.name for model in found.values()]
+    return {
+        stamp: (model.name if names.count(model.name) == 1 else f"{model.name}/{stamp}", model)
+        for stamp, model in found.items()
+    }
 
 
 def read_frames(path: Path) -> tuple[int, ...]:
