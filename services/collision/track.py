@@ -137,7 +137,7 @@ class Track:
     """Walls must not be touched, and the goal be reached; ``gates`` have to be crossed before, in order.
 
     Obstacles by name in m, `max_time` in s. The vehicle keeps ``min_margin`` m away from walls; with 0 it only
-    must not touch them. ``max_speed`` in m/s, None for no limit.
+    must not touch them. ``min_body_margin`` is the same of other bodies. ``max_speed`` in m/s, None for no limit.
     """
 
     walls: Obstacles
@@ -146,6 +146,7 @@ class Track:
     gates: tuple[Gate, ...] = ()
     min_margin: float = 0.0
     max_speed: float | None = None
+    min_body_margin: float = 0.0
 
 
 def touched(obstacles: Obstacles, area: shapely.Geometry) -> str | None:

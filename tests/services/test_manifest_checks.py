@@ -33,7 +33,7 @@ def compare(service: str, checks: Iterable[Check]) -> None:
 def test_collision() -> None:
     measures = DriveMeasures()
     goals = (measures.goal_check(1.0), measures.rest_check(0.0), measures.gate_check(0, 1))
-    drive = (*goals, measures.wall_check(0.0), *measures.drive_checks())
+    drive = (*goals, measures.wall_check(0.0), measures.body_check(0.0), *measures.drive_checks())
     compare("collision", (*drive, *Requests(max_silence=2.0).checks()))
 
 

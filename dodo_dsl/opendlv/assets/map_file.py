@@ -4,17 +4,23 @@ Models and textures are not loaded yet.
 """
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, unread
+from dodo_dsl.opendlv.assets import mesh_text
+from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, read_bytes, unread
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
 _TURN = 6.3
 """rad"""
+MAX_FRAMES = 100
+MAX_STAMP = 2**32 - 1
+FRAME_TURN = math.pi / 2
+"""A model at a frame is turned by the frame's yaw and this, in rad about z: it looks along its own -y."""
+NO_BODIES = "no model of the map has 'frames' of other sender stamps than the vehicle's"
 MAX_OVERLAYS = 50
 """Places of overlays, each of which takes the memory of a picture."""
 
@@ -33,12 +39,18 @@ class Instance:
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """An OBJ file, its paint, and where copies of it stand."""
+    """An OBJ file, its paint, and where copies of it stand; one more is at the frame of each sender stamp."""
 
     name: str
     file: Path
     paint: Paint
     instances: tuple[Instance, ...]
+    frames: tuple[int, ...] = ()
+
+    def footprint(self) -> list[tuple[float, float]]:
+        """The model's convex outline from above, at a frame at the origin that looks along x; raises MapError."""
+        cos, sin = math.cos(FRAME_TURN), math.sin(FRAME_TURN)
+        return [(cos * x - sin * y, sin * x + cos * y) for x, y in mesh_text.outline(self.file)]
 
 
 @dataclass(frozen=True)
@@ -96,12 +108,23 @@ def _instances(node: Node) -> tuple[Instance, ...]:
     return tuple(Instance((x, y, z), angle) for x, y, z, angle in rows)
 
 
+def _frames(node: Node) -> tuple[int, ...]:
+    found: list[int] = []
+    for item in node.items("frames"):
+        if isinstance(item.value, bool) or not isinstance(item.value, int) or not 0 <= item.value <= MAX_STAMP:
+            item.fail(f"a sender stamp, a whole number from 0 to {MAX_STAMP}")
+        if item.value in found:
+            raise MapError(item.file, f"the sender stamp {item.value} appears twice", item.place, hint="remove one")
+        found.append(item.value)
+    return tuple(found)
+
+
 def _model(node: Node) -> ModelEntry | None:
-    instances = _instances(node)
-    if not instances:
+    instances, frames = _instances(node), _frames(node)
+    if not instances and not frames:
         return None
     file = node.required("file").resource()
-    return ModelEntry(node.required("name").text(), file, _paint(node), instances)
+    return ModelEntry(node.required("name").text(), file, _paint(node), instances, frames)
 
 
 def _positive(node: Node, names: str) -> tuple[float, ...]:
@@ -153,6 +176,28 @@ def read_map(path: Path) -> MapFile:
     return _collected(file, Node.load(file), _raised)
 
 
+def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, ModelEntry]]:
+    """Name and model at each frame but the vehicle's ``own``; the frame tells those of one name apart."""
+    found = {stamp: model for model in models for stamp in model.frames if stamp != own}
+    names = [model.name for model in found.values()]
+    return {
+        stamp: (model.name if names.count(model.name) == 1 else f"{model.name}/{stamp}", model)
+        for stamp, model in found.items()
+    }
+
+
+def read_frames(path: Path) -> tuple[int, ...]:
+    """The sender stamps at which a map has models, in order; none of what is no map, which is told elsewhere."""
+    file, found = find_map(path), set[int]()
+    try:
+        if b'"frames"' in read_bytes(file):
+            for model in Node.load(file).items("model"):
+                found.update(_frames(model))
+    except MapError:
+        return ()
+    return tuple(sorted(found))
+
+
 def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
     """What can be drawn of a map, None for what is no map, and all that is wrong with it."""
     file, found = find_map(path), list[MapError]()
@@ -177,13 +222,23 @@ def unread_keys(root: Node) -> Iterator[MapError]:
 def _without_effect(root: Node) -> Iterator[MapError]:
     """Keys of the format that change nothing in a picture, each once."""
     models, blocks = list(_listed(root, "model")), list(_listed(root, "block"))
-    if moving := [model for model in models if _has(model, "frames")]:
-        yield of_keys(moving, "frames", "a model at the frame of a vehicle is not drawn yet", _NOT_YET)
+    yield from _stamps_twice(models)
     for entries in (models, blocks):
         if both := [entry for entry in entries if _has(entry, "color") and _has(entry, "textureFile")]:
             yield of_keys(both, "color", "'color' is not used beside 'textureFile'", "remove one of them")
     if sizes := [block for block in blocks if _has(block, "textureSize") and not _has(block, "textureFile")]:
         yield of_keys(sizes, "textureSize", "'textureSize' is not used without 'textureFile'", "remove it")
+
+
+def _stamps_twice(models: Sequence[Node]) -> Iterator[MapError]:
+    """Models at the frame of a later model: OpenDLV draws the last one."""
+    later: dict[object, Node] = {}
+    for model in reversed(models):
+        stamps = model.value.get("frames") if isinstance(model.value, dict) else None
+        for stamp in stamps if isinstance(stamps, list) else ():
+            if isinstance(stamp, int) and (other := later.setdefault(stamp, model)) is not model:
+                what = f"{other.place} has the frame {stamp}, too: only the last of them is drawn"
+                yield MapError(model.file, what, f"{model.place}.frames", hint="remove one", is_slip=True)
 
 
 def _listed(root: Node, key: str) -> Iterator[Node]:
@@ -218,7 +273,6 @@ _KEYS = {
     "obstacles": ("name", "lines"),
 }
 """What OpenDLV's maps have in each list."""
-_NOT_YET = "give it 'instances', where it stands still"
 Entry = TypeVar("Entry")
 Report = Callable[[MapError], None]
 
@@ -229,17 +283,27 @@ def _raised(error: MapError) -> None:
 
 def _collected(file: Path, root: Node, report: Report) -> MapFile:
     root.member("model")
-    models = _entries(root, "model", _model, report)
+    models = _last_of_each_frame(_entries(root, "model", _model, report))
     blocks = _entries(root, "block", _block, report)
     overlays = _entries(root, "overlay", _overlay, report)
-    for key, count, limit in (
-        ("model", sum(len(m.instances) for m in models), MAX_INSTANCES),
-        ("block", sum(len(b.instances) for b in blocks), MAX_BLOCKS),
-        ("overlay", sum(len(o.places) for o in overlays), MAX_OVERLAYS),
+    for key, what, count, limit in (
+        ("model", "instances", sum(len(m.instances) for m in models), MAX_INSTANCES),
+        ("model", "frames", sum(len(m.frames) for m in models), MAX_FRAMES),
+        ("block", "instances", sum(len(b.instances) for b in blocks), MAX_BLOCKS),
+        ("overlay", "instances", sum(len(o.places) for o in overlays), MAX_OVERLAYS),
     ):
         if count > limit:
-            report(MapError(file, f"{count} instances of {key}s, expected at most {limit}", f"$.{key}"))
+            report(MapError(file, f"{count} {what} of {key}s, expected at most {limit}", f"$.{key}"))
     return MapFile(file, models, blocks, overlays)
+
+
+def _last_of_each_frame(models: tuple[ModelEntry, ...]) -> tuple[ModelEntry, ...]:
+    last = {frame: index for index, model in enumerate(models) for frame in model.frames}
+    kept = (
+        replace(model, frames=tuple(frame for frame in model.frames if last[frame] == index)) if model.frames else model
+        for index, model in enumerate(models)
+    )
+    return tuple(model for model in kept if model.instances or model.frames)
 
 
 def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report: Report) -> tuple[Entry, ...]:

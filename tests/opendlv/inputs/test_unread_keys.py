@@ -91,7 +91,6 @@ def test_a_key_of_many_objects_is_told_once(told: Callable[[str, Any], list[Inpu
 @pytest.mark.parametrize(
     ("kind", "more", "said"),
     [
-        ("model", {"frames": [0, 1]}, "frames: a model at the frame of a vehicle is not drawn yet"),
         ("model", {"textureFile": "floor.png"}, "color: 'color' is not used beside 'textureFile'"),
         ("block", {"textureFile": "floor.png"}, "color: 'color' is not used beside 'textureFile'"),
         ("block", {"textureSize": [1, 1]}, "textureSize: 'textureSize' is not used without 'textureFile'"),
@@ -102,6 +101,14 @@ def test_keys_of_the_format_without_effect_are_told(
 ) -> None:
     found = [e.what for e in told("map", {**MAP, kind: [{**MAP[kind][0], **more}]}) if e.is_slip]
     assert found == [f"$.{kind}[0].{said}"]
+
+
+def test_a_model_at_the_frame_of_another_is_told(told: Callable[[str, Any], list[InputError]]) -> None:
+    first, second = ({**MAP["model"][0], "frames": frames} for frames in ([0, 1], [2, 1]))
+    (found,) = told("map", {**MAP, "model": [first, second]})
+    assert (found.is_slip, found.what) == (
+        True, "$.model[0].frames: $.model[1] has the frame 1, too: only the last of them is drawn",
+    )  # fmt: skip
 
 
 def test_the_other_keys_of_a_truth_are_told_together(told: Callable[[str, Any], list[InputError]]) -> None:
@@ -126,3 +133,12 @@ def test_an_unknown_parameter_of_a_car_is_told(tmp_path: Path) -> None:
     (found,) = formats.problems("car", tmp_path / "car.yml", {}, {})
     assert found.position()[0] == 2
     assert "zzq" in found.what
+
+
+def test_bodies_that_a_map_does_not_have_are_told(tmp_path: Path) -> None:
+    (tmp_path / "map.json").write_text(json.dumps({"model": [{"frames": [0]}], "obstacles": []}))
+    given = {"bodies": "true", "frame-id": "0"}
+    (found,) = formats.problems("obstacles", tmp_path, given, {})
+    assert found.what == "no model of the map has 'frames' of other sender stamps than the vehicle's"
+    assert list(formats.problems("obstacles", tmp_path, {**given, "frame-id": "1"}, {})) == []
+    assert list(formats.problems("obstacles", tmp_path, {**given, "bodies": ""}, {})) == []

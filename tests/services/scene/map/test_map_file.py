@@ -29,17 +29,28 @@ def test_a_map_is_read_from_its_folder_or_its_file(write_map):
 
 
 def test_what_stands_nowhere_is_left_out_with_its_files(write_map):
-    ghost = {"name": "kiwi", "file": "absent.obj", "textureFile": "absent.png", "frames": [0]}
+    ghost = {"name": "kiwi", "file": "absent.obj", "textureFile": "absent.png", "frames": []}
     assert read_map(write_map({"model": [ghost, changed(GOOD_MODEL, instances=[])]})).models == ()
+
+
+def test_a_model_stands_at_frames_and_instances(write_map):
+    """As OpenDLV has it: both count, and of two models at one frame the last."""
+    car = changed(GOOD_MODEL, name="car", instances=..., frames=[1, 4294967295])
+    other = changed(GOOD_MODEL, name="other", frames=[2, 1])
+    found = read_map(write_map({"model": [GOOD_MODEL, car, other]})).models
+    assert [(m.name, len(m.instances), m.frames) for m in found] == [
+        ("cube", 1, ()), ("car", 0, (4294967295,)), ("other", 1, (2, 1)),
+    ]  # fmt: skip
+    assert [m.name for m in read_map(write_map({"model": [changed(car, frames=[1]), other]})).models] == ["other"]
 
 
 def test_a_real_map_is_read(shared_data, tmp_path):
     content = json.loads(shared_data("map.json").read_text())
     (tmp_path / "map.json").write_text(json.dumps(content))
-    for name in ("cone.obj", "floor.jpg", "ceiling.jpg", "wall.jpg"):
+    for name in ("cone.obj", "kiwi.obj", "kiwi.png", "floor.jpg", "ceiling.jpg", "wall.jpg"):
         (tmp_path / name).touch()
     read = read_map(tmp_path)
-    assert [len(m.instances) for m in read.models] == [46, 42, 2]
+    assert [(len(m.instances), m.frames) for m in read.models] == [(46, ()), (42, ()), (2, ()), (0, (0, 1))]
     assert [(b.name, b.tile, len(b.instances)) for b in read.blocks] == [
         ("floor", (1.0, 1.0), 1),
         ("ceiling", (1.0, 1.0), 1),
@@ -64,6 +75,16 @@ BAD_MODELS = [
     ({"file": "a\0b"}, "$.model[0].file: expected "),
     ({"textureFile": "no.png"}, "$.model[0].textureFile: expected a file in "),
     ({"name": ...}, "$.model[0]: 'name' is missing"),
+    ({"frames": 1}, "$.model[0].frames: expected a list, found 1"),
+    (
+        {"frames": [1.0]},
+        "$.model[0].frames[0]: expected a sender stamp, a whole number from 0 to 4294967295, found 1.0",
+    ),
+    ({"frames": [0, True]}, "$.model[0].frames[1]: expected a sender stamp"),
+    ({"frames": [2**32]}, "$.model[0].frames[0]: expected a sender stamp"),
+    ({"frames": [-1]}, "$.model[0].frames[0]: expected a sender stamp"),
+    ({"frames": [3, 3]}, "$.model[0].frames[1]: the sender stamp 3 appears twice"),
+    ({"frames": list(range(101))}, "$.model: 101 frames of models, expected at most 100"),
 ]
 
 
