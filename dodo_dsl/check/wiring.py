@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Literal
 
 from dodo_dsl.application.model import Declared
@@ -119,11 +120,12 @@ def _ports(kind: Kind, written: Sequence[str], values: Mapping[str, str], stamp:
             continue  # an optional parameter without a value: no such port
         truth = text.endswith("!")
         optional = text.removesuffix("!").endswith("?")
-        filled = _PARAMETER.sub(lambda m: values[m["name"]], text.rstrip("?!"))
+        filled = (_PARAMETER.sub(lambda m: values[m["name"]], part) for part in text.rstrip("?!").split("/", 1))
         if kind == "memory":
-            yield Port(kind, filled.removeprefix("/"), None, optional)
+            yield Port(kind, "/".join(filled).removeprefix("/"), None, optional)
         else:  # a list has commas
-            yield from (message(each, stamp, optional, truth) for each in filled.split(",") if each)
+            parts = ("/".join(pair) for pair in product(*(part.split(",") for part in filled)))
+            yield from (message(each, stamp, optional, truth) for each in parts if each)
 
 
 def message(text: str, stamp: int | None, optional: bool = False, truth: bool = False) -> Port:
