@@ -105,22 +105,22 @@ def wire(services: Iterable[ResolvedService], declared: Mapping[str, Declared | 
     produced: list[End] = []
     consumed: list[End] = []
     for service in services:
-        use, manifest, values = service.use, service.manifest, service.texts
+        use, manifest = service.use, service.manifest
         kinds: tuple[tuple[Kind, Ports], ...] = (("message", manifest.messages), ("memory", manifest.memory))
         for kind, ports in kinds:
-            produced += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, values, 0)]
-            consumed += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.inputs, values, None)]
+            produced += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, service, 0)]
+            consumed += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.inputs, service, None)]
     return _with_application(Wiring(tuple(produced), tuple(consumed)), declared)
 
 
-def _ports(kind: Kind, written: Sequence[str], values: Mapping[str, str], stamp: int | None) -> Iterator[Port]:
+def _ports(kind: Kind, written: Sequence[str], service: ResolvedService, stamp: int | None) -> Iterator[Port]:
     for text in written:
-        names = {m["name"] for m in _PARAMETER.finditer(text)}
-        if not names <= values.keys():
+        values = {m["name"]: service.filling(m["name"]) for m in _PARAMETER.finditer(text)}
+        if None in values.values():
             continue  # an optional parameter without a value: no such port
         truth = text.endswith("!")
         optional = text.removesuffix("!").endswith("?")
-        filled = (_PARAMETER.sub(lambda m: values[m["name"]], part) for part in text.rstrip("?!").split("/", 1))
+        filled = [_PARAMETER.sub(lambda m: values[m["name"]] or "", part) for part in text.rstrip("?!").split("/", 1)]
         if kind == "memory":
             yield Port(kind, "/".join(filled).removeprefix("/"), None, optional)
         else:  # a list has commas

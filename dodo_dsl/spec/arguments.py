@@ -5,11 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.source import Entry
-from dodo_dsl.spec.manifest import Manifest, Parameter
+from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
+
+FRAME = "opendlv.sim.Frame"
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,21 @@ class ResolvedService:
     def texts(self) -> Mapping[str, str]:
         """The values as strings; parameters without a fitting value are missing."""
         return {name: a.value.text for name, a in self.arguments.items() if a.value is not None}
+
+    def filling(self, placeholder: str) -> str | None:
+        """What stands for a placeholder of the manifest's ports; None where its parameter has no fitting value.
+
+        Of the frames at which a map has models, that of ``frame-id`` is the service's own vehicle.
+        """
+        frames = FRAMES.fullmatch(placeholder)
+        if placeholder in self.arguments or frames is None:
+            return self.texts.get(placeholder)
+        argument = self.arguments.get(frames["map"])
+        path = argument.value.path if argument and argument.value else None
+        if path is None or (frames["condition"] and self.texts.get(frames["condition"]) != "true"):
+            return None
+        stamps = map(str, map_file.read_frames(path))
+        return ",".join(f"{FRAME}/{stamp}" for stamp in stamps if stamp != self.texts.get("frame-id")) or None
 
 
 def written(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Entry | None:

@@ -20,6 +20,8 @@ RULE = "wrong-manifest"
 RESERVED = ("cid", "help")
 
 _PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
+FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames(?: if (?P<condition>[a-z0-9.-]+))?")
+"""A placeholder for the frames at which a map has models, as in ``{map-path.frames if bodies}``."""
 _NUMBERS = ("number", "integer")
 _TEXTS = ("string", "memory", "message", "output")
 _DEFAULTS: dict[str, tuple[type, ...]] = {
@@ -67,9 +69,11 @@ def _all_ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:
         if not isinstance(scalar, Scalar):
             continue
         for match in _PLACEHOLDER.finditer(scalar.text):
-            if match["name"] not in types:
-                message = f"'{scalar.text}' names the unknown parameter '{match['name']}'"
-                yield Diagnostic(scalar.span, RULE, message, did_you_mean(match["name"], types))
+            frames = None if match["name"] in types else FRAMES.fullmatch(match["name"])
+            for name in [match["name"]] if frames is None else filter(None, frames.groups()):
+                if name not in types:
+                    message = f"'{scalar.text}' names the unknown parameter '{name}'"
+                    yield Diagnostic(scalar.span, RULE, message, did_you_mean(name, types))
 
 
 def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diagnostic]:

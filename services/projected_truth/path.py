@@ -28,6 +28,11 @@ class MeasuredPath:
         if not self._poses or time > self._poses[-1][0]:
             self._poses.append((time, pose))
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether any pose is known."""
+        return bool(self._poses)
+
     def reaches(self, time: int) -> bool:
         """Whether a pose of this time or a later one is known."""
         return bool(self._poses) and self._poses[-1][0] >= time

@@ -4,6 +4,7 @@ import logging
 import math
 from collections import deque
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -13,7 +14,7 @@ from services.projected_truth.path import MICROSECONDS, FollowedMemory, Measured
 from services.scene.camera import CameraFrame, CameraPose, Pinhole, body_pose, mount
 from services.scene.lens import Alignment, Distortion, Lens, lens_of
 from services.scene.render import Renderer
-from services.scene.scene import load_scene
+from services.scene.scene import SceneOptions, load_scene
 from services.scene.truth import TruthSender, truth_sender
 
 PATIENCE = 250_000
@@ -35,9 +36,11 @@ class ProjectedTruth(Service):
         self, sender: TruthSender, mounted: CameraPose, followed: Followed, frame_id: int | None, latency: int = 0
     ) -> None:
         """``mounted`` is the camera on the vehicle, or in the world without ``frame_id``; ``latency`` in us."""
-        self.inputs = {} if frame_id is None else {("opendlv.sim.Frame", frame_id): self.take_frame}
         self._sender, self._mounted, self._followed, self._latency = sender, mounted, followed, latency
         self._path = None if frame_id is None else MeasuredPath()
+        self._bodies = {stamp: MeasuredPath() for stamp in sender.renderer.bodies.stamps}
+        paths = {**self._bodies, **({frame_id: self._path} if frame_id is not None and self._path else {})}
+        self.inputs = {("opendlv.sim.Frame", stamp): partial(self._take, path) for stamp, path in paths.items()}
         self._waiting: deque[int] = deque(maxlen=_MOST)
         self._has_begun = False
         self.projected, self.missed, self.refused = 0, 0, 0
@@ -45,11 +48,10 @@ class ProjectedTruth(Service):
     def begin(self, now: int) -> None:
         self._has_begun = True
 
-    def take_frame(self, frame: CameraFrame, sample_time: int) -> None:
-        """Where the vehicle is, as measured; ``sample_time`` in us of test time."""
-        assert self._path is not None
+    def _take(self, path: MeasuredPath, frame: CameraFrame, sample_time: int) -> None:
+        """Where the vehicle or another body is, as measured; ``sample_time`` in us of test time."""
         try:
-            self._path.add(sample_time, body_pose(frame))
+            path.add(sample_time, body_pose(frame))
         except ValueError as error:
             if not self.refused:
                 _log.warning("refused the frame of %d us, and will refuse all such: %s", sample_time, error)
@@ -65,11 +67,21 @@ class ProjectedTruth(Service):
             if pose is None:
                 self.missed += self._has_begun
                 continue
+            self._place_bodies(picture - self._latency)
             self.projected += 1
             yield from self._sender.outputs(pose, picture)
 
     def _is_known(self, picture: int, now: int) -> bool:
-        return self._path is None or self._path.reaches(picture - self._latency) or now - picture > PATIENCE
+        paths = [path for path in (self._path, *self._bodies.values()) if path is not None]
+        known = all(path.reaches(picture - self._latency) for path in paths if path is self._path or path.has_begun)
+        return known or now - picture > PATIENCE
+
+    def _place_bodies(self, time: int) -> None:
+        """What moves is where it was at a time; where that is not known it stays."""
+        for stamp, path in self._bodies.items():
+            pose = path.at(time)
+            if pose is not None:
+                self._sender.renderer.place(stamp, pose)
 
     def _pose(self, time: int) -> CameraPose | None:
         """The camera's in the world."""
@@ -109,4 +121,5 @@ def _open(flags: Flags) -> tuple[Renderer, Lens | None]:
     alignment = Alignment(*(flags[name] for name in ("focal-x", "centre-x", "centre-y")))
     lens = lens_of(camera, distortion, alignment)
     wide = lens.wide if lens else camera
-    return Renderer(load_scene(Path(flags["map-path"])), wide.width, wide.height, wide.fovy), lens
+    scene = load_scene(Path(flags["map-path"]), SceneOptions(own=flags["frame-id"]))
+    return Renderer(scene, wide.width, wide.height, wide.fovy), lens

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dodo_dsl.opendlv.assets.map_file import FRAME_TURN
 from services.scene.bsp import Tree
 from services.scene.camera import NEAR, Array, View
 from services.scene.raster import OVERLAPPING, fixed, inset
@@ -23,7 +24,8 @@ from services.scene.surfaces import Face
 class Copies:
     """Copies of one shape: ``positions`` (n, 3) in m, ``turns`` (n,) in rad counter-clockwise about z.
 
-    ``name`` is the model's in the map; scenery has none, and no boxes.
+    ``name`` is the model's in the map; scenery has none, and no boxes. Copies with ``stamps`` (n,) move: they are where
+    ``Bodies.place`` puts them, and nowhere before.
     """
 
     shape: Shape
@@ -32,6 +34,7 @@ class Copies:
     positions: Array
     turns: Array
     name: str = ""
+    stamps: tuple[int, ...] = ()
 
 
 MAX_FACES = 300
@@ -150,10 +153,13 @@ _DRAWINGS: list[Callable[[Group], list[list[Piece]]]] = [silhouettes, whole, cut
 
 
 class Bodies:
-    """All copies of all models, in fixed order; ``tree`` divides the space in which they stand."""
+    """All copies of all models, in fixed order; ``tree`` divides the space in which they stand.
+
+    Those that move come last, and are never cut up: where they stick into something, the nearer hides the farther.
+    """
 
     def __init__(self, models: tuple[Copies, ...], tree: Tree, light: Light, faces: Sequence[Face] = ()) -> None:
-        self._models, self._light = models, light
+        self._models, self._light, self._tree = models, light, tree
         counts = [len(copies.turns) for copies in models]
         self._model = np.repeat(np.arange(len(models)), counts)
         self._member = np.concatenate([np.arange(0), *(np.arange(count) for count in counts)])
@@ -164,7 +170,11 @@ class Bodies:
         self._leaf = tree.locate(self._middle)
         self.names = [copies.name for copies in models for _ in copies.turns]
         """The model's name of each body."""
-        self._solids = list(self._cut_up(tree, faces))
+        stamps = [copies.stamps for copies in models if copies.stamps]
+        first = len(self.names) - sum(map(len, stamps))
+        self._moving = {stamp: first + n for n, stamp in enumerate(stamp for each in stamps for stamp in each)}
+        self._radius[first:] = 0.0
+        self._solids = list(self._cut_up(tree, faces, first))
         self._append(self._solids)
 
     @property
@@ -172,14 +182,29 @@ class Bodies:
         """How many solids stand in for bodies that intersect."""
         return len(self._solids)
 
-    def _cut_up(self, tree: Tree, faces: Sequence[Face]) -> Iterator[Solid]:
-        """Solids in place of the bodies that intersect; those bodies are not drawn any more."""
+    @property
+    def stamps(self) -> tuple[int, ...]:
+        """The sender stamps of what moves."""
+        return tuple(self._moving)
+
+    def place(self, stamp: int, position: Array, yaw: float) -> None:
+        """What moves with the frames of a sender is at ``position`` (3,) in m, and looks along ``yaw`` in rad."""
+        body = self._moving[stamp]
+        copies, member = self._models[self._model[body]], self._member[body]
+        copies.positions[member], copies.turns[member] = position, yaw + FRAME_TURN
+        self._radius[body] = copies.shape.radius
+        self._middle[body] = self.middles[body] = _middles(copies)[member]
+        self._leaf[body] = self._tree.locate(self._middle[body : body + 1])[0]
+
+    def _cut_up(self, tree: Tree, faces: Sequence[Face], count: int) -> Iterator[Solid]:
+        """Solids in place of those of the first bodies that intersect; those are not drawn any more."""
 
         def corners(body: int) -> Array:
             return self.outline(body)[0]
 
-        bodies = pierced(faces, corners, self._middle, self._radius)
-        for group in groups(bodies, overlapping(corners, self._middle, self._radius)):
+        middles, radii = self._middle[:count], self._radius[:count]
+        bodies = pierced(faces, corners, middles, radii)
+        for group in groups(bodies, overlapping(corners, middles, radii)):
             parts = [face for body in group for face in self._faces(body)]
             if not too_large(group, len(parts)):
                 self._radius[group] = 0.0

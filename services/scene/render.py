@@ -5,6 +5,7 @@ and the scale of the middle of each. While a shutter is open that cannot be told
 shading and sorting once more.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
@@ -56,7 +57,7 @@ Labels = npt.NDArray[np.int32]
 
 
 class Renderer:
-    """Draws a scene; the same pose gives the same bytes, whatever was drawn before."""
+    """Draws a scene; the same pose, and places of what moves, give the same bytes, whatever was drawn before."""
 
     def __init__(self, scene: Scene, width: int, height: int, fovy: float) -> None:
         """The picture's size in pixels, the vertical field of view in rad; ValueError where they make no sense."""
@@ -66,6 +67,12 @@ class Renderer:
         self.bodies = Bodies(scene.models, self._tree, scene.light, scene.faces)
         self._latest: tuple[bytes, list[Face | Drawn]] = b"", []
         """What was drawn last, from back to front, and the pose that it was drawn from."""
+
+    def place(self, stamp: int, pose: CameraPose) -> None:
+        """A body moves: what the map has at the frames of a sender stands upright there, by the yaw of its ``pose``."""
+        yaw = math.atan2(pose.rotation[1, 0], pose.rotation[0, 0])
+        self.bodies.place(stamp, pose.position, yaw)
+        self._latest = b"", []
 
     def render(self, pose: CameraPose, out: Image | None = None) -> Image:
         """What a camera sees: (height, width, 4) in the order B, G, R, A.

@@ -151,6 +151,8 @@ class SceneOptions:
     clutter: int = 0
     displaced: float = 0.0
     seed: int = 0
+    own: int | None = None
+    """Sender stamp of the vehicle itself, which sees no model of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,15 +186,26 @@ class _Budget:
             raise MapError(self.path, f"more than {self.most} {self.what} in all")
 
 
-def _model(entry: ModelEntry, triangles: _Budget, shapes: dict[Path, tuple[Shape, int]]) -> Copies:
-    """``shapes`` are those of the files that were read; several models of a map have one in different colours."""
+def _models(
+    entry: ModelEntry, own: int | None, triangles: _Budget, shapes: dict[Path, tuple[Shape, int]]
+) -> Iterator[Copies]:
+    """The copies that stand and those that move, without that of the vehicle itself, whose frames come under ``own``.
+
+    ``shapes`` are those of the files that were read; several models of a map have one in different colours.
+    """
+    stamps = tuple(stamp for stamp in entry.frames if stamp != own)
+    if not entry.instances and not stamps:
+        return
     paint = entry.paint
     colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
-    positions = np.array([instance.position for instance in entry.instances])
-    turns = np.array([math.pi - instance.angle for instance in entry.instances])
     shape, count = shapes[entry.file] = shapes.get(entry.file) or _shape(entry.file)
     triangles.take(count)
-    return Copies(shape, colour, positions, turns, entry.name)
+    if entry.instances:
+        positions = np.array([instance.position for instance in entry.instances])
+        turns = np.array([math.pi - instance.angle for instance in entry.instances])
+        yield Copies(shape, colour, positions, turns, entry.name)
+    if stamps:
+        yield Copies(shape, colour, np.zeros((len(stamps), 3)), np.zeros(len(stamps)), entry.name, stamps)
 
 
 def _shape(file: Path) -> tuple[Shape, int]:
@@ -237,11 +250,13 @@ def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
     entries, options = read_map(path), options or SceneOptions()
     triangles = _Budget(entries.path, MAX_TRIANGLES, "triangles of models")
     shapes: dict[Path, tuple[Shape, int]] = {}
-    models = tuple(_model(entry, triangles, shapes) for entry in entries.models if entry.instances)
+    everything = [copies for e in entries.models for copies in _models(e, options.own, triangles, shapes)]
+    models = tuple(copies for copies in everything if not copies.stamps)
+    moving = tuple(copies for copies in everything if copies.stamps)
     around = clutter(options.clutter, options.seed, models)
     shade = options.light.on(np.array([0.0, 0.0, 1.0]))
     return Scene(
-        models=displaced(models, options.displaced, options.seed) + around,
+        models=displaced(models, options.displaced, options.seed) + around + moving,
         faces=tuple(_faces(entries, options)),
         ground=(*(min(part * shade, 255.0) for part in GROUND[:3]), 255.0),
         light=options.light,

@@ -63,15 +63,15 @@ class SceneTruth:
     def __init__(
         self, renderer: Renderer, classes: Mapping[str, str], limits: TruthLimits, lens: Lens | None = None
     ) -> None:
-        self._renderer, self._classes, self._limits, self._lens = renderer, classes, limits, lens
+        self.renderer, self._classes, self._limits, self._lens = renderer, classes, limits, lens
 
     def boxes(self, pose: CameraPose) -> list[TrueBox]:
         """All boxes that keep within the limits, by number; ``pose`` is the camera's in the world."""
-        labels, drawn = self._renderer.labels(pose)
-        seen = np.bincount(labels[labels >= 0], minlength=len(self._renderer.bodies.names))
-        view = self._renderer.camera.view(pose)
+        labels, drawn = self.renderer.labels(pose)
+        seen = np.bincount(labels[labels >= 0], minlength=len(self.renderer.bodies.names))
+        view = self.renderer.camera.view(pose)
         mask = np.zeros(labels.shape, np.uint8)
-        names = self._renderer.bodies.names
+        names = self.renderer.bodies.names
         found = [
             self._box(view, body, self._classes[names[body]], drawn[body], int(seen[body]), mask)
             for body in sorted(drawn)
@@ -94,12 +94,12 @@ class SceneTruth:
 
     def _corners(self, view: View, body: int) -> Array:
         """Where (n, 2) the renderer's picture has what of a body lies before the camera, in pixels from its corner."""
-        vertices, faces = self._renderer.bodies.outline(body)
+        vertices, faces = self.renderer.bodies.outline(body)
         points = view.to_camera(vertices)
         if float(points[:, 2].min()) <= NEAR:
             parts = [clip(points[face], np.array([0.0, 0.0, 1.0]), -NEAR) for face in faces]
             points = np.concatenate(parts)
-        return self._renderer.camera.project(points) + 0.5
+        return self.renderer.camera.project(points) + 0.5
 
 
 def _cut(points: Array, camera: Pinhole) -> tuple[Array, float]:
@@ -129,6 +129,7 @@ class TruthSender:
         self, truth: SceneTruth, classes: Iterable[str], camera: Pinhole, messages: MessageSet, stamp: int
     ) -> None:
         self._truth, self._camera, self._stamp = truth, camera, stamp
+        self.renderer = truth.renderer
         self._types = {name: number for number, name in enumerate(dict.fromkeys(classes), start=1)}
         names = ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
         self._kinds = [messages.type(f"opendlv.logic.perception.{name}") for name in names]

@@ -53,18 +53,35 @@ class VirtualCamera:
 
     def take_frame(self, frame: CameraFrame, sample_time: int) -> None:
         """The vehicle is where the frame says; ``sample_time`` in us of test time."""
-        try:
-            pose = body_pose(frame)
-        except ValueError as error:
-            if not self.refused:
-                self._log.warning("refused the frame of %d us, and will refuse all such: %s", sample_time, error)
-            self.refused += 1
+        pose = self._pose(frame, sample_time)
+        if pose is None:
             return
         if self._motion is None or self._framed is None:
             self._motion = still(pose)
         else:
             self._motion = motion_between(self._motion.pose, pose, sample_time - self._framed)
         self._framed = sample_time
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """The sender stamps of all other bodies that move."""
+        return self._renderer.bodies.stamps
+
+    def take_body(self, stamp: int, frame: CameraFrame, sample_time: int) -> None:
+        """Another body, of these frames, is where this one says; what moves stands still while the shutter is open."""
+        pose = self._pose(frame, sample_time)
+        if pose is not None:
+            self._renderer.place(stamp, pose)
+
+    def _pose(self, frame: CameraFrame, sample_time: int) -> CameraPose | None:
+        """The pose in a frame; None for one without, which is counted, and logged once."""
+        try:
+            return body_pose(frame)
+        except ValueError as error:
+            if not self.refused:
+                self._log.warning("refused the frame of %d us, and will refuse all such: %s", sample_time, error)
+            self.refused += 1
+            return None
 
     def update(self, now: int) -> CameraPose | None:
         """Draws and publishes one picture, sampled at ``now`` (us of test time); the camera's pose in the world."""

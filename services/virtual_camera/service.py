@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -28,7 +29,8 @@ class VirtualCameraService(Service):
 
     def __init__(self, camera: VirtualCamera, freq: float, frame_id: int, truth_sender: TruthSender | None) -> None:
         self.period = period_of(freq)
-        self.inputs = {("opendlv.sim.Frame", frame_id): camera.take_frame}
+        self.inputs = {("opendlv.sim.Frame", stamp): partial(camera.take_body, stamp) for stamp in camera.bodies}
+        self.inputs["opendlv.sim.Frame", frame_id] = camera.take_frame
         self._camera, self._truth_sender = camera, truth_sender
 
     def update(self, now: int) -> Iterable[Output]:
@@ -69,7 +71,7 @@ def mounted_camera(flags: Flags, renderer: Renderer, optics: Optics, publish: Pu
 def _scene(flags: Flags) -> Scene:
     light = Light.of_flags(flags["light.azimuth"], flags["light.elevation"], flags["light.ambient"])
     numbers = {name: flags[name] for name in ("clutter", "displaced", "seed")}
-    options = SceneOptions(light, tuple(flags["lines"]), flags["line-width"], **numbers)
+    options = SceneOptions(light, tuple(flags["lines"]), flags["line-width"], **numbers, own=flags["frame-id"])
     return load_scene(Path(flags["map-path"]), options)
 
 

@@ -59,6 +59,33 @@ def test_a_test_without_application(tmp_path: Path) -> None:
     assert wiring.application_may_produce(message("opendlv.proxy.Anything", None))
 
 
+TWO_CARS = """\
+action:
+  vehicle: {uses: dynamic-model}
+  pose: {uses: integrator}
+  rival: {uses: beacon, with: {frame-id: 7, hold: true}}
+# tests/maps/plain/map.json
+{"model": [{"name": "car", "file": "car.obj", "color": [1, 0, 0], "frames": [7, 0]}, {"frames": "x"}, {"frames": [9]}],
+ "obstacles": [{"name": "finish", "lines": [[-1, 3, 1, 3]]}]}
+"""
+
+
+def test_frames_at_which_a_map_has_models_are_consumed(tmp_path: Path) -> None:
+    """But for the own one, and whoever sends them, as a map may have more cars than a test."""
+    services = resolved(TWO_CARS.replace(', {"frames": "x"}', ""), tmp_path).services
+    consumed = [(str(end.port), end.port.optional) for end in wire(services, None).consumed if end.service == "camera"]
+    assert consumed == [("opendlv.sim.Frame/0", False), ("opendlv.sim.Frame/7", True), ("opendlv.sim.Frame/9", True)]
+    wiring = wire(services, None)
+    assert [end.service for end in wiring.producers(message("opendlv.sim.Frame/7", None))] == ["rival"]
+    assert [end.service for end in wiring.producers(message("opendlv.sim.Frame/0", None))] == ["pose"]
+
+
+def test_a_wrong_map_has_no_models_at_frames(tmp_path: Path) -> None:
+    services = resolved(TWO_CARS, tmp_path).services
+    consumed = [str(end.port) for end in wire(services, None).consumed if end.service == "camera"]
+    assert consumed == ["opendlv.sim.Frame/0"]
+
+
 def test_a_test_with_declarations(tmp_path: Path) -> None:
     own = Declared((("a.In", HERE),), (("a.Out/2", HERE),), (("a.Out", HERE),), ("a.Done", HERE), 0, HERE)
     wiring = wire(resolved("", tmp_path).services, {"driver": own})

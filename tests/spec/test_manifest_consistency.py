@@ -61,3 +61,12 @@ def test_ports_of_unknown_parameters() -> None:
         "'a.B/{ids}' names the unknown parameter 'ids'",
         "'{name}' names the unknown parameter 'name'",
     ]
+
+
+def test_ports_of_frames_of_a_map() -> None:
+    text = "parameters: {map-path: {type: path}, bodies: {type: boolean}}\nmessages: {in: ['{%s.frames if %s}?']}\n"
+    assert messages(text % ("map-path", "bodies")) == []
+    assert messages(text % ("map", "body")) == [
+        "'{map.frames if body}?' names the unknown parameter 'map'",
+        "'{map.frames if body}?' names the unknown parameter 'body'",
+    ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, unread
+from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, read_bytes, unread
 
 MAX_INSTANCES = 100_000
 MAX_BLOCKS = 500
@@ -167,6 +167,18 @@ def read_map(path: Path) -> MapFile:
     """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
     file = find_map(path)
     return _collected(file, Node.load(file), _raised)
+
+
+def read_frames(path: Path) -> tuple[int, ...]:
+    """The sender stamps at which a map has models, in order; none of what is no map, which is told elsewhere."""
+    file, found = find_map(path), set[int]()
+    try:
+        if b'"frames"' in read_bytes(file):
+            for model in Node.load(file).items("model"):
+                found.update(_frames(model))
+    except MapError:
+        return ()
+    return tuple(sorted(found))
 
 
 def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:

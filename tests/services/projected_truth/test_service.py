@@ -2,8 +2,9 @@
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,7 +17,10 @@ from services.base.clock import RealTimeClock
 from services.base.flags import load_manifest, parse
 from services.projected_truth.service import PATIENCE, ProjectedTruth, build
 from services.virtual_camera import service as virtual_camera
+from tests.services.map_folders import write_map
 from tests.services.process import ROOT
+
+__all__ = ["write_map"]
 
 MESSAGES = MessageSet.standard()
 SERVICES = package_data.services()
@@ -30,10 +34,10 @@ SENSOR = ("--focal-x=240", "--centre-x=170", "--centre-y=112.5")
 class Projection:
     """The service beside a memory that a camera would write."""
 
-    def __init__(self, resources: ExitStack, *flags: str) -> None:
+    def __init__(self, resources: ExitStack, *flags: str, where: str = MAP) -> None:
         name = f"dodo-test-{os.getpid()}.followed"
         self.memory = resources.enter_context(SharedMemory.create(name, 320 * 240 * 3 // 2))
-        words = ["--cid=111", MAP, *SIZE, f"--follow={name}", "--truth-sender=9", *flags]
+        words = ["--cid=111", where, *SIZE, f"--follow={name}", "--truth-sender=9", *flags]
         parsed = parse(load_manifest(SERVICES / "projected_truth"), words)
         self.service = build(Context("projected-truth", parsed, MESSAGES, resources))
         self.picture(BEGIN - PICTURE)
@@ -44,9 +48,9 @@ class Projection:
         with self.memory.lock():
             self.memory.stamp(time)
 
-    def frame(self, time: int, x: float, y: float = 0.0, yaw: float = 0.0) -> None:
+    def frame(self, time: int, x: float, y: float = 0.0, yaw: float = 0.0, stamp: int = 4) -> None:
         frame = MESSAGES.type("opendlv.sim.Frame")(x=x, y=y, qz=math.sin(yaw / 2), qw=math.cos(yaw / 2))
-        self.service.inputs["opendlv.sim.Frame", 4](frame, time)
+        self.service.inputs["opendlv.sim.Frame", stamp](frame, time)
 
     def update(self, now: int) -> list[Output]:
         return list(self.service.update(now))  # type: ignore[arg-type]
@@ -113,6 +117,25 @@ def test_pictures_without_a_pose_are_counted(resources: ExitStack, caplog: pytes
     resources.close()
     assert "1 pictures have no truth: no pose was measured near them" in caplog.text
     assert "refused the frame" in caplog.text
+
+
+def test_other_bodies_are_where_they_were_at_the_picture(resources: ExitStack, write_map: Callable[..., Path]) -> None:
+    """Each is waited for once it has begun to send."""
+    car = {"name": "car", "file": "cube.obj", "color": [1, 0, 0], "frames": [2, 4, 5]}
+    projection = Projection(resources, "--frame-id=4", where=f"--map-path={write_map({'model': [car]})}")
+    boxes = []
+    for turn in range(2):
+        begin = BEGIN + turn * 100_000
+        for time, y in ((begin, 0.0), (begin + 40_000, 1.0)):
+            projection.frame(time, 0.0)
+            if time == begin:
+                projection.frame(time, 4.0, y, stamp=5)
+        projection.picture(begin + 10_000 + 10_000 * turn)
+        assert projection.update(begin + 45_000) == []
+        projection.frame(begin + 40_000, 4.0, 1.0, stamp=5)
+        boxes.append([each.message for each in projection.update(begin + 46_000)])
+    assert [message.property for message, *_ in (each[1:] for each in boxes)] == ["car", "car"]
+    assert boxes[0][2].x - boxes[1][2].x == pytest.approx(boxes[0][2].width / 4, rel=0.2), "0.25 m to the left"
 
 
 def test_a_camera_that_comes_later_is_found_and_one_that_goes_is_no_error(resources: ExitStack) -> None:

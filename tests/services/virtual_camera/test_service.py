@@ -4,6 +4,7 @@ import math
 import os
 from contextlib import ExitStack
 from itertools import count
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import cv2
@@ -79,10 +80,10 @@ class Shot(NamedTuple):
 class Camera:
     """The service on memories of its own; frames are (x, y, yaw) 50 ms apart."""
 
-    def __init__(self, *flags: str, size: tuple[int, int] = (160, 120)) -> None:
+    def __init__(self, *flags: str, size: tuple[int, int] = (160, 120), map_path: Path = STRAIGHT) -> None:
         written = {word.partition("=")[0]: word for word in (*PLACE, *flags)}
         names = {kind: f"dodo-test-{os.getpid()}-{next(NUMBERS)}.{kind}" for kind in ("argb", "i420", "bgr")}
-        own = [f"--cid=111 --map-path={STRAIGHT} --width={size[0]} --height={size[1]}".split()]
+        own = [f"--cid=111 --map-path={map_path} --width={size[0]} --height={size[1]}".split()]
         own.append([f"--name.{kind}={name}" for kind, name in names.items()])
         self.resources = ExitStack()
         self._size = size
@@ -153,6 +154,26 @@ def test_frames_of_its_vehicle_count_and_the_rate_is_the_period(camera):
     assert made.service.period == 80_000
     there, elsewhere = (made.shoot((0.0, y, 0.0), frame_id=4).argb for y in (0.0, 0.3))
     assert not np.array_equal(there, elsewhere)
+
+
+def test_models_at_frames_move_with_them_but_for_the_own_one(camera, write_map):
+    """A frame that is no place leaves them where they are."""
+    folder = write_map({"model": [{"name": "car", "file": "cube.obj", "color": [1, 0, 0], "frames": [4, 0, 5]}]})
+    made = camera("--frame-id=4", "--truth-sender=9", map_path=folder)
+    assert set(made.service.inputs) == {("opendlv.sim.Frame", stamp) for stamp in (0, 4, 5)}
+    alone = made.shoot((0.0, 0.0, 0.0), frame_id=4)
+    assert alone.outputs == []
+    frame = MESSAGES.type("opendlv.sim.Frame")
+    made.service.inputs["opendlv.sim.Frame", 5](frame(y=3.0, qw=1.0), START)
+    shots = [made.shoot((0.0, 0.0, 0.0), frame_id=4)]
+    made.service.inputs["opendlv.sim.Frame", 5](frame(y=9.0), START)
+    shots += [made.shoot((0.0, 0.0, 0.0), frame_id=4), made.shoot((0.0, 1.0, 0.0), frame_id=4)]
+    assert np.array_equal(shots[0].argb, shots[1].argb)
+    assert not np.array_equal(shots[0].argb, alone.argb)
+    properties = [[o.message.property for o in shot.outputs if hasattr(o.message, "property")] for shot in shots]
+    widths = [o.message.width for shot in shots for o in shot.outputs if hasattr(o.message, "width")]
+    assert properties == [["car"]] * 3
+    assert widths[0] == widths[1] < widths[2]
 
 
 EVERYTHING = [
