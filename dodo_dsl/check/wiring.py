@@ -120,12 +120,16 @@ def _ports(kind: Kind, written: Sequence[str], service: ResolvedService, stamp: 
             continue  # an optional parameter without a value: no such port
         truth = text.endswith("!")
         optional = text.removesuffix("!").endswith("?")
-        filled = [_PARAMETER.sub(lambda m: values[m["name"]] or "", part) for part in text.rstrip("?!").split("/", 1)]
+        filled = [_filled(part, values) for part in text.rstrip("?!").split("/", 1)]
         if kind == "memory":
             yield Port(kind, "/".join(filled).removeprefix("/"), None, optional)
         else:  # a list has commas
             parts = ("/".join(pair) for pair in product(*(part.split(",") for part in filled)))
             yield from (message(each, stamp, optional, truth) for each in parts if each)
+
+
+def _filled(text: str, values: Mapping[str, str | None]) -> str:
+    return _PARAMETER.sub(lambda match: values[match["name"]] or "", text)
 
 
 def message(text: str, stamp: int | None, optional: bool = False, truth: bool = False) -> Port:
