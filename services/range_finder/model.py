@@ -70,14 +70,15 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Device:
-    """What sensors of one kind have in common: opening angle (rad), rays in it, range (m) and errors.
+    """What sensors of one kind have in common: opening angle (rad, up to pi), range (m) and errors.
 
+    ``rays`` are those that fill the opening angle; with None the whole of it is looked at.
     ``curve`` is that of infrared sensors; ``in_volts`` whether they give voltages. ``noise`` is the standard deviation
     of the distance in m, ``outliers`` the share of wrong readings.
     """
 
     cone: float = 0.0
-    rays: int = 1
+    rays: int | None = None
     near: float = 0.03
     far: float = 6.0
     beyond: Beyond = "maximum"
@@ -87,8 +88,8 @@ class Device:
     outliers: float = 0.0
 
     def angles(self) -> Array:
-        """The directions of its rays from its own, in rad."""
-        return np.linspace(-self.cone / 2, self.cone / 2, self.rays) if self.rays > 1 else np.zeros(1)
+        """The directions of its rays from its own, in rad; its own alone where the whole cone is looked at."""
+        return np.linspace(-self.cone / 2, self.cone / 2, self.rays) if self.rays and self.rays > 1 else np.zeros(1)
 
     def reading(self, distance: float, errors: tuple[float, float, float]) -> float | None:
         """What it gives at a true distance (inf for nothing there), in m or V; None when it says nothing.
@@ -148,9 +149,12 @@ class RangeFinder:
         return [self._outlines.at(height), *self._outlines.bodies_at(height, bodies)]
 
     def _nearest(self, cuts: Sequence[Cut], places: Array, rays: Array) -> Array:
-        origins, directions = np.repeat(places, self.device.rays, axis=0), rays.reshape(-1, 2)
-        nearest = np.full(len(places), np.inf)
+        device, nearest = self.device, np.full(len(places), np.inf)
+        origins, directions = np.repeat(places, rays.shape[1], axis=0), rays.reshape(-1, 2)
         for cut in cuts:
-            found = cut.distances(origins, directions, self.device.far).reshape(len(places), -1).min(axis=1)
+            if device.cone and device.rays is None:
+                found = cut.nearest(origins, directions, device.cone / 2, device.far)
+            else:
+                found = cut.distances(origins, directions, device.far).reshape(len(places), -1).min(axis=1)
             nearest = np.minimum(nearest, np.where(cut.contains(places), 0.0, found))
         return nearest

@@ -52,8 +52,9 @@ class Cut:
 
     @classmethod
     def of(cls, bodies: Iterable[tuple[Array, bool]]) -> Self:
-        """From the segments (n, 2, 2) of each body, and whether it is solid; bodies without segments are left out."""
-        kept = [(segments, solid) for segments, solid in bodies if len(segments)]
+        """From the segments (n, 2, 2) of each body, and whether it is solid; what has no length is left out."""
+        long = [(segments[(segments[:, 0] != segments[:, 1]).any(axis=1)], solid) for segments, solid in bodies]
+        kept = [(segments, solid) for segments, solid in long if len(segments)]
         every = np.concatenate([np.zeros((0, 2, 2)), *(segments for segments, _ in kept)])
         counts = np.array([len(segments) for segments, _ in kept], np.intp)
         corners = [segments.reshape(-1, 2) for segments, _ in kept]
@@ -83,6 +84,34 @@ class Cut:
             hit = (place >= -_SLACK) & (place <= 1 + _SLACK) & (along >= 0.0) & (along <= reach)
         nearest: Array = np.where(hit, along, np.inf).min(axis=1)
         return nearest
+
+    def nearest(self, origins: Array, directions: Array, half: float, reach: float) -> Array:
+        """How far (P,) it is from origins (P, 2) to what is within an angle (rad, up to pi/2) on both sides of them.
+
+        Nothing hides the nearest point of a sector, so that no rays are needed.
+        """
+        (ox, oy), (ux, uy) = origins.T[:, :, None], directions.T[:, :, None]
+        c, s = math.cos(half), math.sin(half)
+        sides = [(s * ux + turn * c * uy, s * uy - turn * c * ux) for turn in (1.0, -1.0)]  # they point inwards
+        (cx, cy), r = self.centres.T, self.radii
+        wx, wy = cx - ox, cy - oy
+        inside = np.logical_and.reduce([wx * nx + wy * ny >= -r for nx, ny in sides])
+        segments = self._segments(np.flatnonzero((inside & (np.hypot(wx, wy) - r <= reach)).any(axis=0)))
+        if not len(segments):
+            return np.full(len(origins), np.inf)
+        (ax, ay), (ex, ey) = self.starts[segments].T, self.edges[segments].T
+        ax, ay = ax - ox, ay - oy
+        first, last = np.zeros_like(ax), np.ones_like(ax)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for nx, ny in sides:
+                from_side, along = ax * nx + ay * ny, ex * nx + ey * ny
+                crossing = -from_side / along
+                first = np.where(along > 0.0, np.maximum(first, crossing), first)
+                last = np.where(along < 0.0, np.minimum(last, crossing), last)
+                last = np.where((along == 0.0) & (from_side < 0.0), -1.0, last)
+            share = np.minimum(np.maximum(-(ax * ex + ay * ey) / (ex * ex + ey * ey), first), last)
+        found = np.where(first <= last, np.hypot(ax + share * ex, ay + share * ey), np.inf).min(axis=1)
+        return np.where(found <= reach, found, np.inf)
 
     def contains(self, points: Array) -> npt.NDArray[np.bool_]:
         """Whether each point (P, 2) is inside a solid body."""

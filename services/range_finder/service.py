@@ -79,10 +79,10 @@ def device_of(flags: Flags) -> Device:
     if in_volts and not infrared:
         raise ValueError(f"--message={VOLTAGE} is of infrared sensors: an ultrasonic one measures a distance")
     curve = Curve.parse(flags["curve"]) if infrared else None
-    default = (0.0, 1, curve.distances[0], curve.distances[-1]) if curve else (55.0, 9, 0.03, 6.0)
-    written = (flags[name] for name in ("cone", "rays", "min-range", "max-range"))
-    cone, rays, near, far = (d if value is None else value for value, d in zip(written, default, strict=True))
+    default = (0.0, curve.distances[0], curve.distances[-1]) if curve else (55.0, 0.03, 6.0)
+    written = (flags[name] for name in ("cone", "min-range", "max-range"))
+    cone, near, far = (d if value is None else value for value, d in zip(written, default, strict=True))
     if near >= far:
         raise ValueError(f"the range from {near:g} to {far:g} m is empty: --min-range has to be below --max-range")
     errors = (flags["noise"], flags["outliers"])
-    return Device(math.radians(cone), int(rays), near, far, flags["beyond"], curve, in_volts, *errors)
+    return Device(math.radians(cone), flags["rays"], near, far, flags["beyond"], curve, in_volts, *errors)

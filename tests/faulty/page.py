@@ -107,7 +107,7 @@ def of_ranges() -> str:
     head = [
         "## Faults of ranges",
         "",
-        "Those of [examples/ranges](../../examples/ranges/README.md), each of which the test of that application catches:",
+        "Those of [examples/ranges](../../examples/ranges/README.md); the test of that application catches each:",
         "",
     ]
     return "\n".join([*head, "| fault | what it does | test |", "|---|---|---|", *rows, ""])

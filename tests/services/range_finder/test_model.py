@@ -35,7 +35,11 @@ def test_a_cone_hears_what_a_ray_passes_by(room):
     assert seen(room, ray, yaw=math.atan2(0.3, 1.0)) == pytest.approx(0.95 * math.hypot(1, 0.3))
     wide = seen(room, Device(cone=math.radians(55), rays=201))
     assert wide == pytest.approx(math.hypot(0.95, 0.25), rel=2e-3), "the post's nearest corner"
-    assert seen(room, Device(cone=math.radians(20), rays=201)) == pytest.approx(2.0), "the post is outside the cone"
+    whole = seen(room, Device(cone=math.radians(55)))
+    assert whole == pytest.approx(math.hypot(0.95, 0.25)), "and so without rays"
+    for rays in (None, 201):
+        assert seen(room, Device(cone=math.radians(20), rays=rays)) == pytest.approx(2.0), "it is outside the cone"
+    assert seen(room, Device(cone=math.radians(55), rays=2)) > 1.0, "it is between the rays"
 
 
 @given(st.floats(-1.5, 0.5), st.floats(-2.5, -0.5), st.floats(-math.pi, math.pi), st.sampled_from([0, 90, 180, 270]))

@@ -40,6 +40,21 @@ def test_rays_meet_what_shapely_says(bodies, angle, reach):
         assert found == pytest.approx(expected, abs=1e-7)
 
 
+@given(
+    st.lists(arrays(np.float64, (3, 2, 2), elements=COORDINATES), min_size=1, max_size=6), ANGLES, st.floats(0.02, 1.57)
+)
+def test_a_sector_has_the_nearest_point_that_shapely_finds(bodies, angle, half):
+    origin, axis = np.array([0.003, -0.007]), directions(np.array([angle]))
+    rim = origin + 30 * directions(np.linspace(angle - half, angle + half, 9))
+    part = shapely.MultiLineString(list(np.concatenate(bodies))).intersection(shapely.Polygon([origin, *rim]))
+    expected = math.inf if part.is_empty else float(shapely.Point(origin).distance(part))
+    (found,) = Cut.of([(body, False) for body in bodies]).nearest(np.array([origin]), axis, half, 20.0)
+    (less,) = Cut.of([(body, False) for body in bodies]).nearest(np.array([origin]), axis, half - 1e-6, 20.0)
+    (more,) = Cut.of([(body, False) for body in bodies]).nearest(np.array([origin]), axis, half + 1e-6, 20.0)
+    if less == pytest.approx(more, abs=1e-3):  # nothing begins just at the edge
+        assert found == pytest.approx(expected, abs=1e-6)
+
+
 @given(st.integers(3, 12), st.floats(0.1, 2), ANGLES, COORDINATES, COORDINATES)
 def test_what_is_inside_is_what_shapely_says(corners, radius, turn, x, y):
     around = turn + np.arange(corners) * 2 * math.pi / corners
@@ -102,6 +117,14 @@ def test_what_moves_stands_at_its_frame_and_the_vehicle_is_not_seen(write_map, c
     assert not list(outlines.bodies_at(0.5, {}))
     (gone,) = outlines.bodies_at(0.5, {4: Place(5.0, 0.0, 3.0, 0.0)})
     assert not len(gone.starts), "it flies above"
+
+
+def test_what_has_no_length_is_not_there():
+    point, wall = np.ones((1, 2, 2)), np.array([[[2.0, -1.0], [2.0, 1.0]]])
+    cut = Cut.of([(point, False), (np.concatenate([point, wall]), False)])
+    look = (np.zeros((1, 2)), np.array([[1.0, 0.0]]))
+    assert (len(cut.first), len(cut.starts)) == (1, 1)
+    assert cut.distances(*look, 6.0).tolist() == cut.nearest(*look, 0.4, 6.0).tolist() == [2.0]
 
 
 def test_no_ray_slips_through_a_corner(write_map):
