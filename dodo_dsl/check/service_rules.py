@@ -70,6 +70,17 @@ def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
         yield from _written(service)
         yield from _from_elsewhere(service)
         yield from _missing(context, service)
+        yield from _counts(service)
+
+
+def _counts(service: ResolvedService) -> Iterator[Diagnostic]:
+    """Lists that have neither one item nor one for each item of the list that they belong to."""
+    counts = {name: len(text.split(",")) for name, text in service.texts.items()}
+    for name, argument in service.arguments.items():
+        per = argument.parameter.per
+        if argument.entry and per in counts and counts.get(name, 1) not in (1, counts[per]):
+            message = f"parameter '{name}' has {counts[name]} items, expected one, or {counts[per]} as '{per}' has"
+            yield Diagnostic(argument.entry.value.span, "wrong-value", message)
 
 
 def _written(service: ResolvedService) -> Iterator[Diagnostic]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Literal
 
 from dodo_dsl.application.model import Declared
@@ -120,13 +121,16 @@ def _ports(kind: Kind, written: Sequence[str], service: ResolvedService, stamp: 
             continue  # an optional parameter without a value: no such port
         truth = text.endswith("!")
         optional = text.removesuffix("!").endswith("?")
-        filled = text.rstrip("?!")
-        for name, value in values.items():
-            filled = filled.replace(f"{{{name}}}", value or "")
+        filled = [_filled(part, values) for part in text.rstrip("?!").split("/", 1)]
         if kind == "memory":
-            yield Port(kind, filled.removeprefix("/"), None, optional)
+            yield Port(kind, "/".join(filled).removeprefix("/"), None, optional)
         else:  # a list has commas
-            yield from (message(each, stamp, optional, truth) for each in filled.split(",") if each)
+            parts = ("/".join(pair) for pair in product(*(part.split(",") for part in filled)))
+            yield from (message(each, stamp, optional, truth) for each in parts if each)
+
+
+def _filled(text: str, values: Mapping[str, str | None]) -> str:
+    return _PARAMETER.sub(lambda match: values[match["name"]] or "", text)
 
 
 def message(text: str, stamp: int | None, optional: bool = False, truth: bool = False) -> Port:

@@ -24,10 +24,13 @@ from dodo_dsl.application.variables import owner, split_by
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import IMAGE, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
-from dodo_dsl.check.wiring import ANYTHING, End, Wiring
+from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.manifest import Manifest
+
+SENSORS = "opendlv.proxy."
+"""Prefix of the messages that a car's devices send."""
 
 
 def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
@@ -47,7 +50,7 @@ def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
     yield from _judged(wiring)
-    yield from _unsatisfied_application(wiring)
+    yield from _unsatisfied_application(context, wiring)
 
 
 def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
@@ -90,7 +93,34 @@ def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
 
 
 def _sends(manifest: Manifest, name: str) -> bool:
-    return any(port.partition("/")[0] == name for port in manifest.messages.outputs)
+    return any(name in _names_of(manifest, port) for port in manifest.messages.outputs)
+
+
+def _names_of(manifest: Manifest, port: str) -> tuple[str, ...]:
+    """The messages that a port may be: one, or those that its parameter may choose."""
+    name = port.partition("/")[0]
+    parameter = manifest.parameters.get(name.strip("{}")) if name.startswith("{") else None
+    return parameter.choices if parameter else (name,)
+
+
+def _sensor_line(context: RuleContext, port: Port) -> str:
+    """A hint for a reading of the car's sensors: the line of a service that sends it; empty without one."""
+    sensors = [m for _, m in sorted(context.manifests.items()) if "environment" in m.layers and _sends(m, port.name)]
+    if not port.name.startswith(SENSORS) or not sensors:
+        return ""
+    manifest = sensors[0]
+    given = {name for use in context.spec.uses for name in use.parameters}
+    needed = [p for p in manifest.parameters.values() if p.required and not (p.shared and p.name in given)]
+    written = {p.name: "..." if p.example is None else str(p.example) for p in needed}
+    for output in manifest.messages.outputs:
+        name, _, stamp = output.partition("/")
+        if port.name in _names_of(manifest, output):
+            for each, value in ((name, port.name), (stamp, "" if port.stamp is None else str(port.stamp))):
+                parameter = manifest.parameters.get(each.strip("{}")) if each.startswith("{") else None
+                if parameter and value and value != str(parameter.default):
+                    written[parameter.name] = f"[{value}]" if parameter.type == "list" else value
+    values = ", ".join(f"{name}: {value}" for name, value in written.items())
+    return f"add under 'environment': {manifest.name}: {{uses: {manifest.name}, with: {{{values}}}}}"
 
 
 def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
@@ -117,12 +147,13 @@ def _judged(wiring: Wiring) -> Iterator[Diagnostic]:
             yield Diagnostic(end.span, "two-producers", message, "name another message, or another sender")
 
 
-def _unsatisfied_application(wiring: Wiring) -> Iterator[Diagnostic]:
+def _unsatisfied_application(context: RuleContext, wiring: Wiring) -> Iterator[Diagnostic]:
     for end in wiring.application_consumes:
         own = any(end.port.consumes(other.port) for other in wiring.application_produces)
         if not own and not wiring.producers(end.port) and not wiring.undeclared:
             message = f"the application's '{end.service}' consumes {end.port}, which no service of the test sends"
-            yield Diagnostic(end.span, "application-input", message, severity="warning")
+            hint = _sensor_line(context, end.port)
+            yield Diagnostic(end.span, "application-input", message, hint, severity="warning")
 
 
 Asked = dict[str, Span]

@@ -9,6 +9,7 @@ import functools
 import json
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,8 @@ def description(parameter: Parameter) -> str:
 def written(parameter: Parameter, value: Any) -> Any:
     """A value as an author writes it."""
     bare = parameter.unit in ("", quantity.SHARE)
+    if parameter.of and isinstance(value, list):
+        return [item if bare else f"{item} {parameter.unit}" for item in value]
     return value if bare or isinstance(value, str | list) else f"{value} {parameter.unit}"
 
 
@@ -116,7 +119,10 @@ def _value(parameter: Parameter) -> Schema:
     if parameter.type == "boolean":
         return {"anyOf": [{"type": "boolean"}, _PLACEHOLDER]}
     if parameter.type == "list":
-        return {"type": ["array", "string"], "items": _TEXT}
+        if not parameter.of:
+            return {"type": ["array", "string"], "items": _TEXT}
+        item = _number(replace(parameter, type=parameter.of))
+        return {"anyOf": [{"type": "array", "items": item}, item]}
     if parameter.type == "string":
         return {"type": ["string", "number", "boolean"]}
     return dict(_TEXT)

@@ -79,8 +79,14 @@ def _all_ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:
 def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diagnostic]:
     raw = plain(node)
     kind = raw["type"]
+    for key in ("of", "per"):
+        if key in raw and kind != "list":
+            yield _misplaced(node, key, f"'{key}' is for lists, but '{name}' is of type {kind}")
+    if "per" in raw and types.get(raw["per"]) != "list":
+        hint = did_you_mean(raw["per"], [n for n, t in types.items() if t == "list"])
+        yield _misplaced(node, "per", f"'per' names '{raw['per']}', expected a parameter of type list", hint)
     for key, kinds in (("unit", ("number",)), ("minimum", _NUMBERS), ("maximum", _NUMBERS)):
-        if key in raw and kind not in kinds:
+        if key in raw and raw.get("of", kind) not in kinds:
             yield _misplaced(node, key, f"'{key}' is for numbers, but '{name}' is of type {kind}")
     if "choices" in raw and kind not in ("string", "list"):
         yield _misplaced(node, "choices", f"'choices' are for strings and lists, but '{name}' is of type {kind}")
@@ -106,12 +112,16 @@ def _default(name: str, node: Mapping, raw: dict[str, Any]) -> Iterator[Diagnost
     if kind == "path":
         yield _misplaced(node, "default", f"'{name}' is a path in a test, so it cannot have a default")
         return
-    if not isinstance(default, _DEFAULTS[kind]) or (isinstance(default, bool) and kind != "boolean"):
+    if not _is_of(kind, default) or ("of" in raw and not all(_is_of(raw["of"], item) for item in default)):
         yield _misplaced(node, "default", f"the default of '{name}' is not of type {kind}")
     elif kind in _NUMBERS and not raw.get("minimum", default) <= default <= raw.get("maximum", default):
         yield _misplaced(node, "default", f"the default of '{name}' is not between its minimum and its maximum")
     elif kind == "string" and default not in raw.get("choices", [default]):
         yield _misplaced(node, "default", f"the default of '{name}' is not one of its choices")
+
+
+def _is_of(kind: str, value: object) -> bool:
+    return isinstance(value, _DEFAULTS[kind]) and (kind == "boolean" or not isinstance(value, bool))
 
 
 def _misplaced(node: Mapping, key: str, message: str, hint: str = "") -> Diagnostic:
@@ -130,12 +140,15 @@ class Parameter:
     its JSON file (``map-path.obstacles``), whose entries' names are the allowed values; ``within_timeout`` marks a
     duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
     service is ready; ``not_empty`` names lists of a JSON file that must not be empty; ``format`` says what is in the
-    file that a path names, which is checked as the service reads it.
+    file that a path names, which is checked as the service reads it. Items of a list are strings, or numbers where
+    ``of`` says so; it has as many of them as the list that ``per`` names, or one.
     """
 
     name: str
     type: str
     help: str
+    of: str = ""
+    per: str = ""
     unit: str = ""
     default: Value = None
     required: bool = False

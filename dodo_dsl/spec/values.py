@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Literal
@@ -171,6 +171,8 @@ def _list(parameter: Parameter, node: Node, root: Path) -> Value:
     if isinstance(node, Mapping):
         hint = f"write [{', '.join(node.entries)}]"
         raise ValueProblem(node.span, "wrong-type", f"{_name(parameter)} is a mapping, expected a list", hint)
+    if parameter.of:
+        return Value(",".join(_number(replace(parameter, type=parameter.of), item, root).text for item in items))
     texts = []
     for item in items:
         text = _text(parameter, item, root).text

@@ -51,8 +51,9 @@ def load_manifest(folder: Path) -> dict[str, Any]:
 
 
 def parameters(manifest: Mapping[str, Any]) -> dict[str, About]:
-    """All flags of a service, the common ones last."""
-    return {**(manifest.get("parameters") or {}), **COMMON}
+    """All flags of a service, the common ones last; a parameter of its own replaces a common one of its name."""
+    own: dict[str, About] = manifest.get("parameters") or {}
+    return {**own, **{name: about for name, about in COMMON.items() if name not in own}}
 
 
 def unit(about: About) -> str:
@@ -83,7 +84,7 @@ def example(about: About) -> str:
     return words.get(about["type"]) or str(about.get("minimum", 1))
 
 
-Value = int | float | str | bool | list[str] | None
+Value = int | float | str | bool | list[Any] | None
 
 _FLAG = re.compile(r"--(?P<name>[A-Za-z][A-Za-z0-9.-]*)(?:=(?P<value>.*))?", re.DOTALL)
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
@@ -95,6 +96,7 @@ _KINDS = {
     "path": "a path",
     "memory": "a name",
     "output": "a file to write",
+    "list": "a list of items with commas between them",
 }
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
@@ -107,8 +109,8 @@ class FlagsError(ValueError):
 class Flags(Mapping[str, Any]):
     """Values by parameter name, defaults filled in; an optional parameter without default is None.
 
-    A ``number`` is a float, an ``integer`` an int, a ``list`` a list of strings, a ``boolean`` a bool, everything else
-    a string; numbers are in the manifest's unit.
+    A ``number`` is a float, an ``integer`` an int, a ``list`` a list of strings or of what its ``of`` says, a
+    ``boolean`` a bool, everything else a string; numbers are in the manifest's unit.
     """
 
     values_by_name: Mapping[str, Any]
@@ -163,6 +165,9 @@ def _value(name: str, about: About, text: str | None) -> Value:
         if kind == "boolean":
             return True
         raise FlagsError(f"--{name} has no value, expected --{name}={example(about)}")
+    if "of" in about:
+        item = {**{key: fact for key, fact in about.items() if key != "of"}, "type": about["of"]}
+        return [_value(name, item, part) for part in text.split(",") if part]
     value = _CONVERTERS.get(kind, str)(text) if text or kind in ("string", "list") else None
     if value is None:
         raise FlagsError(f"--{name}={text} is not {_expected(about)}")
@@ -218,7 +223,8 @@ def example_line(manifest: Mapping[str, Any]) -> str:
 
 
 def _facts(about: About) -> str:
-    facts = [about["type"] + unit(about), ("one of " if about.get("choices") else "") + bounds(about)]
+    kind = f"list of {about['of']}s" if "of" in about else about["type"]
+    facts = [kind + unit(about), ("one of " if about.get("choices") else "") + bounds(about)]
     if about.get("required"):
         facts.append("required")
     elif about.get("default") not in (None, [], ""):

@@ -191,7 +191,8 @@ def _serve(
             if world and (service.drive or not os.environ.get("DODO_CLOCK")):
                 session.hear_directly()
             members = resources.enter_context(_membership(session, role, key, world))
-            loop = Loop(role, service, session, clock, flags["id"], members)
+            stamp = flags["id"] if isinstance(flags["id"], int) else 0  # a list of its own gives each message one
+            loop = Loop(role, service, session, clock, stamp, members)
             resources.enter_context(_readiness(ready, session))
             try:
                 (service.drive or loop.run)(stop)

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "kiwi"
-PERCEPTION, STEERING = "perception", "steering"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+PERCEPTION, STEERING, DRIVER = "perception", "steering", "driver"
+FOLDERS = {PERCEPTION: "kiwi", STEERING: "kiwi", DRIVER: "ranges"}
 
 Program = Any
-"""A module, ``perception`` or ``steering``, loaded for this process alone."""
+"""A module, ``perception``, ``steering`` or ``driver``, loaded for this process alone."""
 
 Make = Callable[[Program], None]
 """Makes a program faulty."""
@@ -31,8 +32,8 @@ HANDSHAKE = "SystemStatusMessage"
 
 
 def program(name: str) -> Program:
-    """A new copy of one of the example's programs."""
-    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
+    """A new copy of one of the examples' programs."""
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / FOLDERS[name] / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -9,7 +9,7 @@ import yaml
 from dodo_dsl.atomic import write_text
 from tests.faulty.makes import GOOD
 from tests.faulty.matrix import Cell, Cells, ShippedTest
-from tests.faulty.table import FAULTS, Fault
+from tests.faulty.table import FAULTS, RANGES, Fault
 
 GAPS: Mapping[str, Mapping[str, str]] = yaml.safe_load(Path(__file__).with_name("gaps.yml").read_text(encoding="utf-8"))
 MARKS = {"failed": "**F**", "passed": "·", "error": "E"}
@@ -40,7 +40,7 @@ def problems(cells: Cells, tests: Sequence[ShippedTest]) -> list[str]:
 def write(path: Path, cells: Cells, tests: Sequence[ShippedTest]) -> None:
     """The page of what has run."""
     kinds = list(dict.fromkeys(fault.kind for fault in FAULTS.values()))
-    parts = [_head(cells, tests), _legend(tests), *(_table(kind, cells, tests) for kind in kinds)]
+    parts = [_head(cells, tests), _legend(tests), *(_table(kind, cells, tests) for kind in kinds), of_ranges()]
     write_text(path, "\n".join([*parts, _reasons(cells), _gaps(cells, tests)]))
 
 
@@ -99,6 +99,18 @@ def _table(kind: str, cells: Cells, tests: Sequence[ShippedTest]) -> str:
     ]
     head = [f"## Faults of {kind}", "", f"| fault | what it does | {numbers} |", "|---|---|" + "---|" * len(tests)]
     return "\n".join([*head, *rows, ""])
+
+
+def of_ranges() -> str:
+    """Those of another application, which a test of this repository runs against the test of that."""
+    rows = [f"| `{fault.name}` | {fault.does} | {fault.test} |" for fault in RANGES.values()]
+    head = [
+        "## Faults of ranges",
+        "",
+        "Those of [examples/ranges](../../examples/ranges/README.md); the test of that application catches each:",
+        "",
+    ]
+    return "\n".join([*head, "| fault | what it does | test |", "|---|---|---|", *rows, ""])
 
 
 def _mark(cells: Cells, fault: str, slug: str) -> str:

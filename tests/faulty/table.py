@@ -1,11 +1,11 @@
-"""The faults of ``faults.yml``: what the tests have to find."""
+"""The faults of ``faults.yml`` and ``faults_of_ranges.yml``: what the tests have to find."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
-TABLE = Path(__file__).with_name("faults.yml")
+TABLE, RANGES_TABLE = (Path(__file__).with_name(name) for name in ("faults.yml", "faults_of_ranges.yml"))
 
 
 @dataclass(frozen=True)
@@ -23,4 +23,10 @@ class Fault:
     due: str = ""
 
 
-FAULTS = {name: Fault(name, **about) for name, about in yaml.safe_load(TABLE.read_text(encoding="utf-8")).items()}
+def _faults(table: Path) -> dict[str, Fault]:
+    return {name: Fault(name, **about) for name, about in yaml.safe_load(table.read_text(encoding="utf-8")).items()}
+
+
+FAULTS = _faults(TABLE)
+RANGES = _faults(RANGES_TABLE)
+"""Of examples/ranges, which has a test of its own."""

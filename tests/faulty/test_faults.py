@@ -16,8 +16,9 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from tests.faulty import of_conduct
 from tests.faulty.kiwi import PERCEPTION, STEERING, Make, program
 from tests.faulty.makes import MAKES, NAMES, fault_of
+from tests.faulty.of_ranges import RANGE_FAULTS
 from tests.faulty.page import GAPS
-from tests.faulty.table import FAULTS
+from tests.faulty.table import FAULTS, RANGES
 
 WIDTH, HEIGHT, CID = 160, 120, 200
 FRAMES = 70
@@ -110,7 +111,7 @@ CASES = [(name, fault) for name, faults in MAKES.items() for fault in faults if 
 
 
 def test_the_table_is_complete_and_names_real_tests() -> None:
-    assert set(FAULTS) == set(NAMES)
+    assert set(FAULTS) == set(NAMES) and set(RANGES) == set(RANGE_FAULTS)
     assert len(FAULTS) >= 40
     for fault in FAULTS.values():
         folder = fault.test.partition("--")[0]

@@ -1,14 +1,16 @@
 """Faults against the one shipped test that has to catch them, in one run: one of each kind, in `make proof` all."""
 
 import re
+import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.drive.applications import dodo, results
+from tests.drive.applications import ROOT, dodo, results
 from tests.drive.variants import registry, variant
 from tests.faulty.matrix import APPLICATION
-from tests.faulty.table import FAULTS, Fault
+from tests.faulty.table import FAULTS, RANGES, Fault
 
 LONG = {"slow-computing", "slow-sleeping"}  # take half a minute each: scripts/kill-matrix runs them
 CAUGHT = sorted(
@@ -35,17 +37,38 @@ def copy_of(fault: Fault, tests: Path) -> Path:
 def test_each_fault_is_caught_and_its_cause_named(
     faults: list[Fault], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tests, report = registry(tmp_path), tmp_path / "report"
+    tests = registry(tmp_path)
     specs = [str(copy_of(fault, tests)) for fault in faults]
+    caught(faults, specs, APPLICATION, tmp_path / "report", monkeypatch)
+
+
+@pytest.mark.slow
+def test_faults_of_range_sensors_are_caught(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one run with the application without a fault, which passes."""
+    faults = sorted(RANGES.values(), key=lambda fault: fault.name)
+    shutil.copytree(ROOT / "examples" / "ranges" / "tests", tmp_path / "tests")
+    specs = [str(variant(tmp_path / "tests", fault.test, fault.name)) for fault in faults]
+    specs.append(str(tmp_path / "tests" / "sil-closed-corridor" / "sil-closed-corridor.dodo.yml"))
+    application = Path(__file__).with_name("ranges.compose.yml")
+    (good,) = caught(faults, specs, application, tmp_path / "report", monkeypatch)
+    assert (good["slug"], good["outcome"]) == ("sil-closed-corridor", "passed"), good["reason"]
+
+
+def caught(
+    faults: list[Fault], specs: list[str], application: Path, report: Path, monkeypatch: pytest.MonkeyPatch
+) -> list[dict[str, Any]]:
+    """Each spec of a fault has to fail with the words of that; the results of other specs."""
     by_bus = dict(enumerate(faults, FIRST_CID))
     monkeypatch.setenv("FAULT", ",".join(f"{cid}={fault.name}" for cid, fault in by_bus.items()))
-    dodo("run", *specs, "--application", str(APPLICATION), "--report", str(report), "--jobs", SILENT, code=1)
+    dodo("run", *specs, "--application", str(application), "--report", str(report), "--jobs", SILENT, code=1)
 
     found = {test["slug"].partition("--")[0]: test for test in results(report).values()}
-    assert {name: test["cid"] for name, test in found.items()} == {fault.name: cid for cid, fault in by_bus.items()}
+    of_faults = {fault.name: found.pop(fault.name) for fault in faults}
+    assert {name: test["cid"] for name, test in of_faults.items()} == {fault.name: cid for cid, fault in by_bus.items()}
     wrong = [
-        f"{fault.name}: expected '{fault.words}', {found[fault.name]['outcome']}: {found[fault.name]['reason']}"
+        f"{fault.name}: expected '{fault.words}', {of_faults[fault.name]['outcome']}: {of_faults[fault.name]['reason']}"
         for fault in faults
-        if found[fault.name]["outcome"] != "failed" or not re.search(fault.words, found[fault.name]["reason"])
+        if of_faults[fault.name]["outcome"] != "failed" or not re.search(fault.words, of_faults[fault.name]["reason"])
     ]
     assert not wrong, "\n".join(wrong)
+    return list(found.values())

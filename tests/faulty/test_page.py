@@ -66,3 +66,8 @@ def test_the_page_has_marks_reasons_and_gaps(tmp_path: Path) -> None:
     assert "| `silent` | Sends nothing | ? | ? |" in text
     assert "| `steering-nan` | `sil-open-straight` | steering was not a finite number in 55 samples |" in text
     assert "| perception | `steering-nan` | perception tests do not look at steering |" in text
+
+
+def test_the_page_has_the_faults_of_range_sensors() -> None:
+    written = (Path(__file__).parents[2] / "docs" / "reference" / "kill-matrix.md").read_text(encoding="utf-8")
+    assert page.of_ranges() in written

@@ -102,3 +102,17 @@ def test_a_test_that_extends_another_one_may_leave_out_what_a_service_uses(schem
     validator = Draft202012Validator(schema)
     assert [error.message for error in validator.iter_errors({**own, "extends": "../a.dodo.yml"})] == []
     assert "'uses' is a required property" in [error.message for error in validator.iter_errors(own)]
+
+
+@pytest.mark.parametrize(
+    ("values", "fits"),
+    [
+        ({"id": [0, 2], "yaw": ["0 deg", "180 deg"]}, True),
+        ({"id": 0, "yaw": "0.5 rad"}, True),
+        ({"id": [0, "two"]}, False),
+        ({"id": [0], "yaw": [90]}, False),
+    ],
+)
+def test_items_of_lists_have_their_types(values: dict[str, Any], fits: bool, schema: dict[str, Any]) -> None:
+    use = {"uses": "range-finder", "with": {"map-path": "../maps/straight", **values}}
+    assert (problems(schema, use) == []) == fits

@@ -18,12 +18,18 @@ PARAMETERS = {
     "{type: number, unit: m, within-timeout: true}": "'a' is not a duration",
     "{type: number, setup-times: 2}": "'a' is not a duration",
     "{type: number, minimum: 2, maximum: 1}": "the minimum of 'a' is larger than its maximum",
+    "{type: number, of: integer}": "'of' is for lists, but 'a' is of type number",
+    "{type: list, of: number, default: [x]}": "the default of 'a' is not of type list",
+    "{type: list, of: number, unit: m, default: [true]}": "the default of 'a' is not of type list",
+    "{type: list, unit: m}": "'unit' is for numbers, but 'a' is of type list",
+    "{type: list, per: map}": "'per' names 'map', expected a parameter of type list",
     "{type: string, among: b.names}": "'among' begins with 'b', expected a parameter of type path",
 }
 GOOD = [
     "{type: integer, default: 1, minimum: 0, maximum: 1}",
     "{type: number, unit: s, default: 0.5, within-timeout: true, setup-times: 1}",
     "{type: list, default: [], choices: [x]}",
+    "{type: list, of: number, unit: m, per: a, default: [0, 1.5], minimum: 0}",
     "{type: boolean, default: false}",
     "{type: string, among: map.obstacles}",
 ]

@@ -33,6 +33,9 @@ CASES: list[tuple[Parameter, str, Value]] = [
     (parameter("message"), "a.b.C", Value("a.b.C")),
     (parameter("list"), "[left, 3]", Value("left,3")),
     (parameter("list"), "left", Value("left")),
+    (parameter("list", of="number", unit="deg"), "[0 deg, -90 deg, 3.5 deg]", Value("0,-90,3.5")),
+    (parameter("list", of="number", unit="m"), "8 cm", Value("0.08")),
+    (parameter("list", of="integer"), "[0, 2]", Value("0,2")),
 ]
 MEMORY = "parameter 'p' is 'a/b', expected a shared memory's name such as video0.argb"
 REFUSED = [
@@ -50,6 +53,24 @@ REFUSED = [
     (parameter("boolean"), "yes", "wrong-type", "parameter 'p' is 'yes', expected true or false"),
     (parameter("memory"), "a/b", "wrong-value", MEMORY),
     (parameter("message"), "C", "wrong-value", "parameter 'p' is 'C', expected a message's full name"),
+    (
+        parameter("list", of="integer"),
+        "[0, 1.5]",
+        "wrong-type",
+        "parameter 'p' is '1.5', expected a whole number without a unit",
+    ),
+    (
+        parameter("list", of="number", unit="m"),
+        "[1 m, 2]",
+        "wrong-unit",
+        "parameter 'p': '2' has no unit, expected a length in m",
+    ),
+    (
+        parameter("list", of="number", unit="m", maximum=1),
+        "[1 m, 2 m]",
+        "out-of-range",
+        "parameter 'p' is 2 m, expected at most 1 m",
+    ),
     (parameter("list"), "['a,b']", "wrong-value", "parameter 'p': 'a,b' must not contain a comma"),
     (parameter("path"), "/etc", "path-escape", "parameter 'p' is '/etc', expected a path relative to the spec"),
 ]  # fmt: skip

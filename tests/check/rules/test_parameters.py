@@ -57,3 +57,22 @@ rigs: {kiwi: {kind: static, cid: 121CAMERA}}
     assert missing == {"source", "map-path"}
     given = example.replace("CAMERA", ", camera: {source: /dev/video0, width: 640, height: 480}")
     assert {message.split("'")[3] for _, message in found(check_parameters, given, tmp_path)} == {"map-path"}
+
+
+@pytest.mark.parametrize(
+    ("values", "problems"),
+    [
+        ("yaw: 90 deg", []),
+        ("yaw: [0 deg, 90 deg]", []),
+        (
+            "yaw: [0 deg, 90 deg, 180 deg]",
+            [("wrong-value", "parameter 'yaw' has 3 items, expected one, or 2 as 'id' has")],
+        ),
+        ("walls: [left, right, finish]", []),
+    ],
+)
+def test_lists_that_belong_together(values: str, problems: list[tuple[str, str]], tmp_path: Path) -> None:
+    example = (
+        f"environment: {{ranges: {{uses: range-finder, with: {{map-path: ../maps/plain, id: [0, 2], {values}}}}}}}\n"
+    )
+    assert found(check_parameters, example, tmp_path) == problems

@@ -77,3 +77,27 @@ def test_the_application_consumes_what_no_service_sends(tmp_path: Path) -> None:
 def test_other_rules_come_first(tmp_path: Path) -> None:
     assert found(check_producers, "evaluation: {track: {uses: collide}}\n", tmp_path) == []
     assert found(check_producers, "environment: {pose: {uses: integrator}}\n", tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("consumed", "line"),
+    [
+        ("opendlv.proxy.DistanceReading", "id: [0, 2]"),
+        ("opendlv.proxy.VoltageReading/3", "id: [3], message: opendlv.proxy.VoltageReading"),
+    ],
+)
+def test_the_line_of_a_sensor_that_the_application_hears(consumed: str, line: str, tmp_path: Path) -> None:
+    """The camera has the map already."""
+    example = CAMERA.format(more="z: 9 cm") + APPLICATION.format(consumed=consumed, produced=BOTH)
+    problems = [one for one in check_producers(context(example, tmp_path)) if one.rule == "application-input"]
+    assert [one.hint for one in problems] == [
+        f"add under 'environment': range-finder: {{uses: range-finder, with: {{{line}}}}}"
+    ]
+
+
+def test_a_sensor_sends_what_the_application_hears(tmp_path: Path) -> None:
+    ranges = "environment: {ranges: {uses: range-finder, with: {map-path: ../maps/plain, id: [0, 2]}}}\n"
+    heard = "opendlv.proxy.DistanceReading/0, opendlv.proxy.DistanceReading/2"
+    assert found(check_producers, ranges + APPLICATION.format(consumed=heard, produced=BOTH), tmp_path) == []
+    (problem,) = check_producers(context(ranges + APPLICATION.format(consumed=heard + "1", produced=BOTH), tmp_path))
+    assert "consumes opendlv.proxy.DistanceReading/21" in problem.message
