@@ -89,9 +89,9 @@ def _start(flags: Flags) -> CameraPose | None:
 
 
 def _memories(context: Context) -> Memories:
-    width, height = context.flags["width"], context.flags["height"]
+    size = context.flags["width"] * context.flags["height"]
     names = {kind: context.flags[f"name.{kind}"] for kind in pixels.FORMATS}
-    return [(context.memory(name, pixels.size(kind, width, height)), kind) for kind, name in names.items() if name]
+    return [(context.memory(name, size * pixels.HALF_BYTES[kind] // 2), kind) for kind, name in names.items() if name]
 
 
 def build(context: Context) -> Service:
