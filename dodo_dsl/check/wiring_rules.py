@@ -178,7 +178,7 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
         others = {name for other, own in asked.items() if other != asking for name in own}
         if made.isdisjoint(names) and others.isdisjoint(names):
             for name, span in names.items():
-                yield _missing(asking, name, span, made)
+                yield _missing(asking, name, span, made, _offer(context, name))
 
 
 def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
@@ -197,10 +197,20 @@ def readers(application: ApplicationSource, names: Collection[str]) -> list[str]
     return [each.name for each in services if not set(names).isdisjoint(_asked(each, dict(application.known)))]
 
 
-def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
+def _offer(context: RuleContext, name: str) -> str:
+    """The line of the test with which one of its services makes a memory of this name; empty where none can."""
+    key = f"name.{name.rpartition('.')[2]}"
+    able = [each.use.name for each in context.services if f"{{{key}}}" in each.manifest.memory.outputs]
+    return f"write '{key}: {name}' under 'with' of '{able[0]}'" if able else ""
+
+
+def _missing(service: str, name: str, span: Span, made: set[str], offer: str) -> Diagnostic:
     message = f"the application's '{service}' asks for the memory '{name}', which no service of the test makes"
     near = closest(name, made)
     hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
+    stem, _, format_ = name.rpartition(".")
+    alike = {each.rpartition(".")[0] for each in made if each.endswith(f".{format_}")}
+    hint = hint if closest(stem, alike) else offer or hint
     return Diagnostic(span, "application-memory", message, hint, "warning")
 
 

@@ -1,8 +1,9 @@
 """The drive in a recording: the vehicle's path over the map's cones and lines."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -113,11 +114,16 @@ def read_ground(place: Path) -> Ground:
         (colour_of(model), [each.position[:2] for each in model.instances]) for model in found.models if model.instances
     ]
     try:
-        lines = map_file.read_obstacles(found.path)
+        lines = [(name, [(*a, *b) for a, b in each]) for name, each in map_file.read_obstacles(found.path).items()]
+        lines += [(name, _edges(each)) for name, each in map_file.footprints(found.blocks).items() if each]
     except MapError:
-        lines = {}
+        lines = []
     moving = tuple(model for model in found.models if model.frames)
-    return Ground(models, [(name, [(*a, *b) for a, b in each]) for name, each in lines.items()], moving)
+    return Ground(models, lines, moving)
+
+
+def _edges(outlines: Iterable[map_file.Outline]) -> list[tuple[float, float, float, float]]:
+    return [(*a, *b) for corners in outlines for a, b in pairwise([*corners, corners[0]])]
 
 
 def colour_of(model: map_file.ModelEntry) -> tuple[float, float, float]:

@@ -136,8 +136,9 @@ Value = str | int | float | bool | list[str | int | float] | None
 class Parameter:
     """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number.
 
-    ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names a path parameter and a list of
-    its JSON file (``map-path.obstacles``), whose entries' names are the allowed values; ``within_timeout`` marks a
+    ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names a path parameter and lists of
+    its JSON file (``map-path.obstacles``), whose entries' names are the allowed values, and so are ``words``;
+    ``within_timeout`` marks a
     duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
     service is ready; ``not_empty`` names lists of a JSON file that must not be empty; ``format`` says what is in the
     file that a path names, which is checked as the service reads it. Items of a list are strings, or numbers where
@@ -158,6 +159,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     rig: str = ""
     among: str = ""
+    words: tuple[str, ...] = ()
     not_empty: tuple[str, ...] = ()
     format: str = ""
     within_timeout: bool = False
@@ -224,8 +226,13 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
             within_timeout=p.get("within-timeout", False),
             setup_times=p.get("setup-times", 0),
             choices=tuple(p.get("choices", ())),
+            words=tuple(p.get("words", ())),
             not_empty=tuple(p.get("not-empty", ())),
-            **{k: v for k, v in p.items() if k not in ("within-timeout", "setup-times", "choices", "not-empty")},
+            **{
+                k: v
+                for k, v in p.items()
+                if k not in ("within-timeout", "setup-times", "choices", "words", "not-empty")
+            },
         )
         for name, p in (raw.get("parameters") or {}).items()
     }

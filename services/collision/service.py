@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.assets.map_file import NO_BODIES
+from dodo_dsl.opendlv.assets.map_file import HIGHEST, NO_BODIES
 from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
 from services.collision.bodies import Footprints, load_footprints
 from services.collision.model import Requests, TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
+from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick, pick_walls
 
 FRAME = "opendlv.sim.Frame"
 SILENCE, GAPS = 2.0, 3.0
@@ -41,7 +41,7 @@ class Collision(TrackEvaluator):
         for name, stamp in requests:
             self.inputs[name, stamp] = self._request(name)
             self.judged.message(name, stamp)
-        roles = {**dict.fromkeys(flags["walls"], "wall"), **dict.fromkeys(flags["gates"], "gate")}
+        roles = {**dict.fromkeys(self.track.walls, "wall"), **dict.fromkeys(flags["gates"], "gate")}
         roles |= {flags["goal"]: "goal"} if flags["goal"] else {}
         self.judged.way(flags["frame-id"], box.length, box.width, roles)
 
@@ -120,7 +120,7 @@ def track(flags: Flags) -> Track:
     obstacles = load_obstacles(path)
     picked = pick(obstacles, gates, "gates", path)
     return Track(
-        walls=pick(obstacles, walls, "walls", path),
+        walls=pick_walls(obstacles, walls, {goal, *gates}, path, flags["height"] or HIGHEST),
         goal=pick(obstacles, [goal] if goal else [], "goal", path),
         max_time=flags["max-time"],
         gates=tuple((name, picked[name]) for name in gates),

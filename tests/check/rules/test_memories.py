@@ -21,6 +21,9 @@ def hints(folder: Path, *services: str) -> list[str]:
     [
         ("--cid=111 --name=vido0.argb", "did you mean 'video0.argb'?"),
         ("--cid=111 --name.i420=/video9.i420", "did you mean 'video0.i420'?"),
+        ("--cid=111 --name=video0.bgr", "write 'name.bgr: video0.bgr' under 'with' of 'camera'"),
+        ("--cid=111 --name=/img.rgb", "write 'name.rgb: img.rgb' under 'with' of 'camera'"),
+        ("--cid=111 --name=img.argb", "write 'name.argb: img.argb' under 'with' of 'camera'"),
         ("--cid=111 --name=pictures", "the test makes video0.argb, video0.i420"),
         ("--cid=111 --name=${MEMORY:-pictures}", "the test makes video0.argb, video0.i420"),
     ],

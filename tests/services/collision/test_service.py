@@ -35,7 +35,14 @@ def lane(tmp_path: Path) -> Iterator[Path]:
 
 
 def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool = False, **changes: Any) -> Collision:
-    flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
+    flags = {
+        "length": 0.36,
+        "width": 0.16,
+        "height": 0.15,
+        "goal": "finish",
+        "walls": ["left", "right"],
+        "max-time": 40.0,
+    }
     none: dict[str, Any] = {
         "gates": [],
         "min-margin": 0.0,
@@ -44,6 +51,7 @@ def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool
         "max-speed": None,
         "bodies": None,
         "min-body-margin": None,
+        "height": None,
     }
     return Collision(
         Context(
@@ -249,3 +257,15 @@ def test_no_frame_is_an_error_and_no_verdict(lane: Path) -> None:
 def test_a_wrong_name_is_refused(lane: Path) -> None:
     sentence = f"--goal: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"
     assert refusal("collision", f"--map-path={lane}", "--goal=finnish") == sentence
+
+
+def test_a_block_of_the_map_is_hit(lane: Path) -> None:
+    box = {"name": "crate", "dimension": [0.1, 0.1, 0.3], "color": [1, 0, 0], "instances": [[1.0, 0.1, 0.0, 0.0]]}
+    (lane / "map.json").write_text(json.dumps({**LANE, "block": [box]}))
+    judge = service(lane, walls=["*", "blocks"])
+    judge.begin(START)
+    for step in range(10):
+        judge.inputs[FRAME, 2](frame(step / 10, 0), START + step * 100_000)
+    assert judge.verdict is not None
+    assert judge.verdict.reason == "hit wall crate after 0.80 s at x = 0.80 m, y = 0.00 m"
+    assert judge.verdict.evidence["obstacle"] == "crate"
