@@ -43,11 +43,18 @@ def rates_fit(rate: float, step: float) -> bool:
 def answers(wiring: Wiring) -> list[str]:
     """The messages that answer a frame, each once: those that the application declares, else those that drive the
     vehicle, else those that are judged; empty without any."""
-    declared = _names(wiring.answers)
-    expected = [end for end in _from_application(wiring) if _is_expected(end, wiring)]
-    driving = _names(end for end in expected if end.layer == "action")
+    expected = _expected(wiring)
     judged = (e for e in expected if e.layer == "evaluation" and not e.port.name.startswith(DETECTIONS))
-    return declared or driving or _names(judged)
+    return _names(wiring.answers) or driving(wiring) or _names(judged)
+
+
+def driving(wiring: Wiring) -> list[str]:
+    """The messages of the application that drive the vehicle, each once."""
+    return _names(end for end in _expected(wiring) if end.layer == "action")
+
+
+def _expected(wiring: Wiring) -> list[End]:
+    return [end for end in _from_application(wiring) if _is_expected(end, wiring)]
 
 
 def other_inputs(wiring: Wiring) -> list[str]:

@@ -89,7 +89,7 @@ def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
 
 
 def _sends(manifest: Manifest, name: str) -> bool:
-    return any(port.partition("/")[0] == name for port in manifest.messages.outputs)
+    return any(port.partition("/")[0] == name for port in manifest.all_messages.outputs)
 
 
 def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
