@@ -230,3 +230,12 @@ def test_no_frame_is_an_error_and_no_verdict(lane: Path) -> None:
 def test_a_wrong_name_is_refused(lane: Path) -> None:
     sentence = f"--goal: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"
     assert refusal("collision", f"--map-path={lane}", "--goal=finnish") == sentence
+
+
+def test_a_wheel_that_is_never_asked_is_named(lane: Path) -> None:
+    model = service(lane, requests=[f"{REQUESTS[1]}/0", f"{REQUESTS[1]}/1"], **{"max-time": 1.0})
+    model.update(START)
+    model.inputs[REQUESTS[1], 0](None, START)
+    hand(model, FRAME, START, 2, qw=1.0)
+    model.update(START + 2_000_000)
+    assert model.verdict is not None and "sent no PedalPositionRequest/1" in model.verdict.reason
