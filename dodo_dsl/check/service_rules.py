@@ -89,8 +89,10 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
 def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) -> Diagnostic:
     name, when = argument.parameter.name, argument.parameter.when
     other = next(other for other, values in when.items() if service.texts.get(other, "") not in values)
-    wanted, value = (f"'{other}: {value}'" for value in (" or ".join(when[other]), service.texts.get(other, "")))
-    instead = f"this service has {value}" if other in service.texts else f"'{other}' is not given"
+    wanted = f"'{other}: {' or '.join(filter(None, when[other]))}'"
+    instead = (
+        f"this service has '{other}: {service.texts[other]}'" if other in service.texts else f"'{other}' is not given"
+    )
     message = f"parameter '{name}' is for {wanted}, and {instead}"
     return Diagnostic(entry.key, "unused-parameter", message, f"remove it, or write {wanted}")
 

@@ -143,8 +143,7 @@ def holds(when: When, texts: Map[str, str]) -> bool:
 
 def in_words(when: When) -> str:
     """``with drive: differential or bicycle``."""
-    some = (f"{name}: {' or '.join(value or 'none' for value in values)}" for name, values in when.items())
-    return f"with {' and '.join(some)}"
+    return "with " + " and ".join(f"{name}: {' or '.join(filter(None, values))}" for name, values in when.items())
 
 
 def _when(raw: dict[str, list[str | bool]]) -> When:

@@ -223,8 +223,8 @@ def example_line(manifest: Mapping[str, Any]) -> str:
 
 
 def _wanted(name: str, values: Sequence[str | bool]) -> str:
-    """``--drive=kiwi or none``."""
-    return f"--{name}={' or '.join(str(value).lower() if value != '' else 'none' for value in values)}"
+    """``--drive=kiwi or bicycle``."""
+    return f"--{name}={' or '.join(str(value).lower() for value in values if value != '')}"
 
 
 def _facts(about: About) -> str:
