@@ -13,6 +13,7 @@ from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import EMULATED_FILE
+from dodo_dsl.spec.values import default_value
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,8 @@ def _argument(spec: Spec, use: Use, argument: Argument) -> ArgumentExplained:
 def _origin(spec: Spec, use: Use, argument: Argument) -> str:
     entry = argument.entry
     if entry is None:
-        return "default"
+        is_default = argument.value == default_value(argument.parameter)
+        return "default" if is_default else "what the vehicle takes"
     place = _place(entry.key)
     if argument.parameter.name in use.parameters:
         return place

@@ -6,11 +6,13 @@ is judged by, is left out of what is played: it would be taken for the applicati
 """
 
 import functools
+import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.model import ApplicationSource, Declared
+from dodo_dsl.check.lockstep import driving
 from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, message, wire
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
@@ -40,7 +42,7 @@ class Replayed:
 
 def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]) -> Replayed:
     """What services of one test that play recordings send; ``own`` are the files with the deployment's messages."""
-    players = [each for each in services if ANYTHING in each.manifest.messages.outputs and _recording(each)]
+    players = [each for each in services if ANYTHING in each.messages.outputs and _recording(each)]
     if not players:
         return Replayed(wiring, {})
     ids = frozenset(known_ids(own).items())
@@ -177,9 +179,28 @@ def resolve(
             for use in spec.uses
             if (manifest := manifests.get(use.uses.text)) is not None
         )
-        played = replayed(wire(services, declared), services, deployment.messages)
+        services, wiring = _driven(services, wire(services, declared), declared)
+        played = replayed(wiring, services, deployment.messages)
         found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
     return found
+
+
+def _driven(
+    services: tuple[ResolvedService, ...], wiring: Wiring, declared: Mapping[str, Declared | None] | None
+) -> tuple[tuple[ResolvedService, ...], Wiring]:
+    """Services and wiring where the messages that drive the vehicle have taken the place of defaults."""
+    messages = ",".join(driving(wiring))
+    found = tuple(_with_default(service, messages) for service in services) if messages else services
+    return (services, wiring) if all(map(operator.is_, found, services)) else (found, wire(found, declared))
+
+
+def _with_default(service: ResolvedService, messages: str) -> ResolvedService:
+    changed = {
+        name: replace(each, value=replace(each.value, text=messages))
+        for name, each in service.arguments.items()
+        if each.parameter.driving and each.entry is None and each.value and each.value.text != messages
+    }
+    return replace(service, arguments={**service.arguments, **changed}) if changed else service
 
 
 def _arguments(test: ResolvedTest | None, layer: str, name: str) -> Mapping[str, Argument] | None:

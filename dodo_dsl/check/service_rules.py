@@ -5,7 +5,7 @@
 ``wrong-layer``: a service is in a layer that its manifest lists.
 Parameters fit the manifest: known, complete, of the right type and unit, within bounds, files in place:
 ``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
-``missing-file``, ``path-escape``.
+``missing-file``, ``path-escape``. ``unused-parameter``: those that are set have an effect beside the others.
 ``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
 ``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
 ``camera-source``: what a rig's computer can take pictures from, in which sizes, and how often.
@@ -24,6 +24,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_f
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import MANIFEST
+from dodo_dsl.spec.manifest import holds
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
 from dodo_dsl.spec.slips import meant, slip_in_key
 
@@ -95,6 +96,19 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
         elif argument.problem:
             yield argument.problem
+        elif not holds(argument.parameter.when, service.texts):
+            yield _without_effect(service, argument, entry)
+
+
+def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) -> Diagnostic:
+    name, when = argument.parameter.name, argument.parameter.when
+    other = next(other for other, values in when.items() if service.texts.get(other, "") not in values)
+    wanted = f"'{other}: {' or '.join(filter(None, when[other]))}'"
+    instead = (
+        f"this service has '{other}: {service.texts[other]}'" if other in service.texts else f"'{other}' is not given"
+    )
+    message = f"parameter '{name}' is for {wanted}, and {instead}"
+    return Diagnostic(entry.key, "unused-parameter", message, f"remove it, or write {wanted}")
 
 
 def _is_empty(entry: Entry) -> bool:
@@ -155,7 +169,7 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
             argument = service.arguments.get(name)
             if argument and argument.parameter.type == "message" and argument.value:
                 yield from _known(context, argument.value.text, entry.value.span)
-            if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.manifest.messages.inputs):
+            if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.messages.inputs):
                 for item in entry.value.items[:MAX_PROBLEMS]:
                     if isinstance(item, Scalar):
                         yield from _known(context, item.text.partition("/")[0], item.span)

@@ -107,7 +107,7 @@ def wire(services: Iterable[ResolvedService], declared: Mapping[str, Declared | 
     consumed: list[End] = []
     for service in services:
         use, manifest = service.use, service.manifest
-        kinds: tuple[tuple[Kind, Ports], ...] = (("message", manifest.messages), ("memory", manifest.memory))
+        kinds: tuple[tuple[Kind, Ports], ...] = (("message", service.messages), ("memory", manifest.memory))
         for kind, ports in kinds:
             produced += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, service, 0)]
             consumed += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.inputs, service, None)]

@@ -93,7 +93,7 @@ def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
 
 
 def _sends(manifest: Manifest, name: str) -> bool:
-    return any(name in _names_of(manifest, port) for port in manifest.messages.outputs)
+    return any(name in _names_of(manifest, port) for port in manifest.all_messages.outputs)
 
 
 def _names_of(manifest: Manifest, port: str) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ def _sensor_line(context: RuleContext, port: Port) -> str:
     given = {name for use in context.spec.uses for name in use.parameters}
     needed = [p for p in manifest.parameters.values() if p.required and not (p.shared and p.name in given)]
     written = {p.name: "..." if p.example is None else str(p.example) for p in needed}
-    for output in manifest.messages.outputs:
+    for output in manifest.all_messages.outputs:
         name, _, stamp = output.partition("/")
         if port.name in _names_of(manifest, output):
             for each, value in ((name, port.name), (stamp, "" if port.stamp is None else str(port.stamp))):

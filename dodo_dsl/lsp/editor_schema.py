@@ -17,7 +17,7 @@ from dodo_dsl import atomic, package_data
 from dodo_dsl.lsp.documents import Steps
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
+from dodo_dsl.spec.manifest import Manifest, Parameter, in_words, load_manifests
 from dodo_dsl.spec.schema_errors import written_schema
 
 Schema = dict[str, Any]
@@ -97,6 +97,8 @@ def description(parameter: Parameter) -> str:
         facts.append(f"At {'most' if low is None else 'least'} {high if low is None else low}{unit}.")
     if parameter.required and not parameter.rig and not parameter.shared:
         facts.append("Required.")
+    if parameter.when:
+        facts.append(f"Only {in_words(parameter.when)}.")
     if parameter.rig:
         facts.append(f"Defaults to the rig's {parameter.rig}.")
     return " ".join(facts)

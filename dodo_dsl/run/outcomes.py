@@ -166,7 +166,7 @@ def _may_send(service: PlannedService, message: str) -> bool:
         names = {flag.name for flag in service.flags}
         return message == FRAMES and "frames" in names and "pictures" not in names
     manifest = load_manifests()[0].get(service.uses)
-    ports = manifest.messages.outputs if manifest else (ANYTHING,)
+    ports = manifest.all_messages.outputs if manifest else (ANYTHING,)
     return any(port.rstrip("?").partition("/")[0] in (message, ANYTHING) for port in ports)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.source import Entry
-from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter
+from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter, Ports, holds
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
@@ -19,8 +19,8 @@ FRAME = "opendlv.sim.Frame"
 class Argument:
     """A parameter's value as its flag carries it, converted once.
 
-    ``entry`` is where it is written, None for the manifest's default. ``value`` is None when there is no value, or when
-    the written one does not fit, which ``problem`` then describes.
+    ``entry`` is where it is written, None for the manifest's default. ``value`` is None when there is no value, when
+    the written one does not fit, which ``problem`` then describes, and when it has no effect beside other parameters.
     """
 
     parameter: Parameter
@@ -40,6 +40,11 @@ class ResolvedService:
     use: Use
     manifest: Manifest
     arguments: Mapping[str, Argument]
+
+    @functools.cached_property
+    def messages(self) -> Ports:
+        """The messages that it consumes and produces with these arguments."""
+        return self.manifest.messages_with(self.texts)
 
     @functools.cached_property
     def texts(self) -> Mapping[str, str]:
@@ -98,11 +103,17 @@ def resolved(
 ) -> ResolvedService:
     """A service with all its arguments; those of ``like`` that come from the very same entry are taken over.
 
-    The instances of a matrix share the entries that do not depend on it, and so their arguments.
+    The instances of a matrix share the entries that do not depend on it, and so their arguments. Parameters without an
+    effect beside others have no value.
     """
     arguments = {}
     for name, parameter in manifest.parameters.items():
         known = like.get(name) if like else None
         same = known is not None and known.parameter is parameter and known.entry is written(spec, use, parameter, rig)
+        same = same and not (parameter.when or parameter.driving)
         arguments[name] = known if known is not None and same else argument(spec, use, parameter, rig)
+    texts = {name: each.value.text for name, each in arguments.items() if each.value is not None}
+    for name, each in arguments.items():
+        if not holds(each.parameter.when, texts):
+            arguments[name] = replace(each, value=None, problem=None)
     return ResolvedService(use, manifest, arguments)

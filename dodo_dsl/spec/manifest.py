@@ -7,13 +7,14 @@ name.
 import functools
 import re
 from collections.abc import Iterator
+from collections.abc import Mapping as Map
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
-from dodo_dsl.source import Mapping, Node, Reader, Scalar, plain, read, walk
+from dodo_dsl.source import Mapping, Node, Reader, Scalar, Sequence, plain, read, walk
 from dodo_dsl.spec.validation import validate
 
 RULE = "wrong-manifest"
@@ -42,6 +43,11 @@ def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
         written = node.get(key)
         if written is not None:
             yield from _all_ports(written, types)
+    messages = node.get("messages")
+    cases = messages.get("cases") if isinstance(messages, Mapping) else None
+    for item in cases.items if isinstance(cases, Sequence) else ():
+        if isinstance(item, Mapping):
+            yield from _conditions(item.get("when"), types)
     groups = node.get("one-of")
     for scalar in walk(groups) if groups is not None else ():
         if isinstance(scalar, Scalar) and scalar.text not in types:
@@ -53,6 +59,12 @@ def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, RULE, message, "choose another name")
         if isinstance(entry.value, Mapping):
             yield from _parameter(name, entry.value, types)
+
+
+def _conditions(node: Node | None, types: dict[str, str]) -> Iterator[Diagnostic]:
+    for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
+        if name not in types:
+            yield Diagnostic(entry.key, RULE, f"'when' names the unknown parameter '{name}'", did_you_mean(name, types))
 
 
 def name_inconsistencies(name: str, path: Path) -> Iterator[Diagnostic]:
@@ -102,6 +114,9 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
     if source and types.get(source) != "path":
         message = f"'among' begins with '{source}', expected a parameter of type path"
         yield _misplaced(node, "among", message, did_you_mean(source, [n for n, t in types.items() if t == "path"]))
+    yield from _conditions(node.get("when"), types)
+    if raw.get("driving") and kind != "list":
+        yield _misplaced(node, "driving", f"'driving' is for lists, but '{name}' is of type {kind}")
     yield from _default(name, node, raw)
 
 
@@ -131,6 +146,23 @@ def _misplaced(node: Mapping, key: str, message: str, hint: str = "") -> Diagnos
 
 Value = str | int | float | bool | list[str | int | float] | None
 
+When = Map[str, tuple[str, ...]]
+"""Parameters with the values that each may have, as texts; the empty one is for a parameter that is not given."""
+
+
+def holds(when: When, texts: Map[str, str]) -> bool:
+    """Whether the parameters with these values, as texts, are as ``when`` says."""
+    return all(texts.get(name, "") in values for name, values in when.items())
+
+
+def in_words(when: When) -> str:
+    """``with drive: differential or bicycle``."""
+    return "with " + " and ".join(f"{name}: {' or '.join(filter(None, values))}" for name, values in when.items())
+
+
+def _when(raw: dict[str, list[str | bool]]) -> When:
+    return {name: tuple(v if isinstance(v, str) else str(v).lower() for v in values) for name, values in raw.items()}
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -142,7 +174,8 @@ class Parameter:
     duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
     service is ready; ``not_empty`` names lists of a JSON file that must not be empty; ``format`` says what is in the
     file that a path names, which is checked as the service reads it. Items of a list are strings, or numbers where
-    ``of`` says so; it has as many of them as the list that ``per`` names, or one.
+    ``of`` says so; it has as many of them as the list that ``per`` names, or one. It has an effect only ``when``
+    others are so. The messages that drive the vehicle take the place of the default of one that is ``driving``.
     """
 
     name: str
@@ -165,6 +198,8 @@ class Parameter:
     within_timeout: bool = False
     setup_times: int = 0
     example: Value = None
+    when: When = field(default_factory=dict)
+    driving: bool = False
 
 
 @dataclass(frozen=True)
@@ -174,13 +209,25 @@ class Ports:
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
 
+    def __add__(self, other: "Ports") -> "Ports":
+        return Ports(self.inputs + other.inputs, self.outputs + other.outputs)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Ports that a service has ``when`` its parameters are so."""
+
+    when: When
+    ports: Ports
+
 
 @dataclass(frozen=True)
 class Manifest:
     """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None.
 
     A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
-    by patterns of their names, empty where it does not tell.
+    by patterns of their names, empty where it does not tell. ``messages`` are those that it has whatever its parameters
+    are, ``cases`` the others.
     """
 
     folder: Path
@@ -196,6 +243,16 @@ class Manifest:
     example: tuple[str, ...] | None = None
     one_of: tuple[tuple[str, ...], ...] = ()
     checks: dict[str, str] = field(default_factory=dict)
+    cases: tuple[Case, ...] = ()
+
+    def messages_with(self, texts: Map[str, str]) -> Ports:
+        """The messages that it has where its parameters have these values, as texts."""
+        return sum((case.ports for case in self.cases if holds(case.when, texts)), Ports()) + self.messages
+
+    @property
+    def all_messages(self) -> Ports:
+        """The messages that it may have, whatever its parameters are."""
+        return sum((case.ports for case in self.cases), Ports()) + self.messages
 
     @property
     def has_own_image(self) -> bool:
@@ -203,7 +260,7 @@ class Manifest:
         return "/" not in self.image and ":" not in self.image
 
 
-def _ports(raw: dict[str, list[str]] | None) -> Ports:
+def _ports(raw: dict[str, Any] | None) -> Ports:
     raw = raw or {}
     return Ports(tuple(raw.get("in", ())), tuple(raw.get("out", ())))
 
@@ -228,10 +285,11 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
             choices=tuple(p.get("choices", ())),
             words=tuple(p.get("words", ())),
             not_empty=tuple(p.get("not-empty", ())),
+            when=_when(p.get("when", {})),
             **{
                 k: v
                 for k, v in p.items()
-                if k not in ("within-timeout", "setup-times", "choices", "words", "not-empty")
+                if k not in ("within-timeout", "setup-times", "choices", "words", "not-empty", "when")
             },
         )
         for name, p in (raw.get("parameters") or {}).items()
@@ -250,6 +308,7 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
         example=tuple(raw["example"]) if "example" in raw else None,
         one_of=tuple(tuple(names) for names in raw.get("one-of", ())),
         checks=raw.get("checks") or {},
+        cases=tuple(Case(_when(case["when"]), _ports(case)) for case in (raw.get("messages") or {}).get("cases", ())),
     )
     return manifest, found
 

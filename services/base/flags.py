@@ -139,7 +139,12 @@ def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
     for name, about in known.items():
         if about.get("required") and name not in given:
             raise FlagsError(f"--{name} is missing: {about['help']}")
-    return Flags({name: given.get(name, _default(about)) for name, about in known.items()})
+    values = {name: given.get(name, _default(about)) for name, about in known.items()}
+    for name in given:
+        for other, wanted in (known[name].get("when") or {}).items():
+            if ("" if values[other] is None else values[other]) not in wanted:
+                raise FlagsError(f"--{name} is for {_wanted(other, wanted)}")
+    return Flags(values)
 
 
 def _split(word: str) -> tuple[str, str | None]:
@@ -222,6 +227,11 @@ def example_line(manifest: Mapping[str, Any]) -> str:
     return shlex.join([*manifest["process"], *words])
 
 
+def _wanted(name: str, values: Sequence[str | bool]) -> str:
+    """``--drive=kiwi or bicycle``."""
+    return f"--{name}={' or '.join(str(value).lower() for value in values if value != '')}"
+
+
 def _facts(about: About) -> str:
     kind = f"list of {about['of']}s" if "of" in about else about["type"]
     facts = [kind + unit(about), ("one of " if about.get("choices") else "") + bounds(about)]
@@ -229,4 +239,5 @@ def _facts(about: About) -> str:
         facts.append("required")
     elif about.get("default") not in (None, [], ""):
         facts.append(f"default {example({'default': about['default'], 'type': about['type']})}")
+    facts += [f"with {_wanted(other, wanted)}" for other, wanted in (about.get("when") or {}).items()]
     return ", ".join(fact for fact in facts if fact)

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,10 @@ class Collision(TrackEvaluator):
         """``wall`` in s: on a rig it is an error when the vehicle vanishes."""
         flags = context.flags
         requests = [_port(text, context) for text in flags["requests"]]
-        names = list(dict.fromkeys(name for name, _ in requests))
+        labels = [_label(name, stamp, requests) for name, stamp in requests]
         box = VehicleBox(flags["length"], flags["width"])
         bodies = _bodies(flags)
-        super().__init__(track(flags), box, Requests(names, flags["max-silence"]), bodies)
+        super().__init__(track(flags), box, Requests(list(dict.fromkeys(labels)), flags["max-silence"]), bodies)
         self._log = context.log
         self._on_rig, self._wall = context.on_rig, wall
         self._seen: float | None = None
@@ -38,8 +38,8 @@ class Collision(TrackEvaluator):
         self.rejected = 0
         self.inputs = {(FRAME, stamp): partial(self._take_body, stamp) for stamp in bodies}
         self.inputs[FRAME, flags["frame-id"]] = self._take_frame
-        for name, stamp in requests:
-            self.inputs[name, stamp] = self._request(name)
+        for label, (name, stamp) in zip(labels, requests, strict=True):
+            self.inputs[name, stamp] = self._request(label)
             self.judged.message(name, stamp)
         roles = {**dict.fromkeys(self.track.walls, "wall"), **dict.fromkeys(flags["gates"], "gate")}
         roles |= {flags["goal"]: "goal"} if flags["goal"] else {}
@@ -55,8 +55,8 @@ class Collision(TrackEvaluator):
         if self._gap is not None and silent > max(SILENCE, GAPS * self._gap):
             raise UnjudgeableError(f"no Frame of the vehicle has come for {silent:.0f} s, and they came before")
 
-    def _request(self, name: str) -> Handler:
-        return lambda _message, _sample_time: self.request(name)
+    def _request(self, label: str) -> Handler:
+        return lambda _message, _sample_time: self.request(label)
 
     def _take_frame(self, frame: Any, sample_time: int) -> None:
         now = self._wall()
@@ -101,6 +101,12 @@ def _bodies(flags: Flags) -> Footprints:
     if not found:
         raise ValueError(f"--bodies: {NO_BODIES}")
     return found
+
+
+def _label(name: str, stamp: int | None, requests: Sequence[tuple[str, int | None]]) -> str:
+    """How a request is called: with its sender stamp where others have the same name."""
+    is_one = sum(other == name for other, _ in requests) == 1
+    return name if is_one or stamp is None else f"{name}/{stamp}"
 
 
 def track(flags: Flags) -> Track:

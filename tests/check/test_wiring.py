@@ -97,3 +97,21 @@ def test_a_test_with_declarations(tmp_path: Path) -> None:
     open_ended = wire((), {"driver": own, "eyes": None})
     assert open_ended.undeclared == ("eyes",)
     assert open_ended.application_may_produce(message("a.Other", None))
+
+
+def test_an_application_hears_the_inertial_sensor(tmp_path: Path) -> None:
+    kinds = (
+        "proxy.AngularVelocityReading",
+        "proxy.AccelerationReading",
+        "proxy.MagneticFieldReading",
+        "logic.sensation.Geolocation",
+    )
+    example = f"""\
+environment: {{imu: {{uses: inertial-sensor, with: {{sender: 3, magnetic-field: false}}}}}}
+# docker-compose.yml
+services:
+  driver: {{image: driver, command: --cid=1, x-dodo: {{in: [{", ".join(f"opendlv.{kind}/3" for kind in kinds)}]}}}}
+"""
+    wiring = resolved(example, tmp_path).wiring
+    heard = [str(end.port) for end in wiring.application_consumes if wiring.producers(end.port)]
+    assert heard == [f"opendlv.{kind}/3" for kind in kinds if "Magnetic" not in kind]

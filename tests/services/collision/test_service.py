@@ -269,3 +269,12 @@ def test_a_block_of_the_map_is_hit(lane: Path) -> None:
     assert judge.verdict is not None
     assert judge.verdict.reason == "hit wall crate after 0.80 s at x = 0.80 m, y = 0.00 m"
     assert judge.verdict.evidence["obstacle"] == "crate"
+
+
+def test_a_wheel_that_is_never_asked_is_named(lane: Path) -> None:
+    model = service(lane, requests=[f"{REQUESTS[1]}/0", f"{REQUESTS[1]}/1"], **{"max-time": 1.0})
+    model.update(START)
+    model.inputs[REQUESTS[1], 0](None, START)
+    hand(model, FRAME, START, 2, qw=1.0)
+    model.update(START + 2_000_000)
+    assert model.verdict is not None and "sent no PedalPositionRequest/1" in model.verdict.reason

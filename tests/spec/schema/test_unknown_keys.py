@@ -16,7 +16,7 @@ NAMES = {
              "$.environment.a.with", "$.action.a.with", "$.evaluation.a.with"},
     "deployment": {"$.rigs"},
     "machine": {"$.rigs"},
-    "service": {"$.parameters", "$.checks"},
+    "service": {"$.parameters", "$.checks", "$.parameters.a.when", "$.messages.cases[0].when"},
 }  # fmt: skip
 """Mappings whose keys are names; a rule checks those under ``with``."""
 Step = str | int
