@@ -116,6 +116,14 @@ def _value(parameter: Parameter) -> Schema:
         return {"anyOf": [{"type": "boolean"}, _PLACEHOLDER]}
     if parameter.type == "list":
         return {"type": ["array", "string"], "items": _TEXT}
+    if parameter.type == "amount":
+        return {
+            "anyOf": [
+                {"type": "number"},
+                {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-z0-9%/]+\s*$"},
+                _PLACEHOLDER,
+            ]
+        }
     if parameter.type == "string":
         return {"type": ["string", "number", "boolean"]}
     return dict(_TEXT)

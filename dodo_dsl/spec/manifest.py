@@ -20,10 +20,11 @@ RULE = "wrong-manifest"
 RESERVED = ("cid", "help")
 
 _PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
-_NUMBERS = ("number", "integer")
+_NUMBERS = ("number", "integer", "amount")
 _TEXTS = ("string", "memory", "message", "output")
 _DEFAULTS: dict[str, tuple[type, ...]] = {
     "number": (int, float),
+    "amount": (int, float),
     "integer": (int,),
     "boolean": (bool,),
     "list": (list,),
@@ -80,6 +81,8 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
             yield _misplaced(node, key, f"'{key}' is for numbers, but '{name}' is of type {kind}")
     if "choices" in raw and kind not in ("string", "list"):
         yield _misplaced(node, "choices", f"'choices' are for strings and lists, but '{name}' is of type {kind}")
+    if raw.get("or-share") and kind != "amount":
+        yield _misplaced(node, "or-share", f"'or-share' is for amounts, but '{name}' is of type {kind}")
     for key in ("within-timeout", "setup-times"):
         if raw.get(key) and raw.get("unit") != "s":
             yield _misplaced(node, key, f"'{name}' is not a duration", "add 'unit: s'")
@@ -126,7 +129,7 @@ class Parameter:
     its JSON file (``map-path.obstacles``), whose entries' names are the allowed values; ``within_timeout`` marks a
     duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
     service is ready; ``not_empty`` names lists of a JSON file that must not be empty; ``format`` says what is in the
-    file that a path names, which is checked as the service reads it.
+    file that a path names, which is checked as the service reads it; an amount with ``or_share`` may be ``25 %``.
     """
 
     name: str
@@ -145,6 +148,7 @@ class Parameter:
     format: str = ""
     within_timeout: bool = False
     setup_times: int = 0
+    or_share: bool = False
     example: Value = None
 
 
@@ -184,6 +188,9 @@ class Manifest:
         return "/" not in self.image and ":" not in self.image
 
 
+_TRANSLATED = ("within-timeout", "setup-times", "or-share", "choices", "not-empty")
+
+
 def _ports(raw: dict[str, list[str]] | None) -> Ports:
     raw = raw or {}
     return Ports(tuple(raw.get("in", ())), tuple(raw.get("out", ())))
@@ -206,9 +213,10 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
             name,
             within_timeout=p.get("within-timeout", False),
             setup_times=p.get("setup-times", 0),
+            or_share=p.get("or-share", False),
             choices=tuple(p.get("choices", ())),
             not_empty=tuple(p.get("not-empty", ())),
-            **{k: v for k, v in p.items() if k not in ("within-timeout", "setup-times", "choices", "not-empty")},
+            **{k: v for k, v in p.items() if k not in _TRANSLATED},
         )
         for name, p in (raw.get("parameters") or {}).items()
     }
