@@ -125,11 +125,13 @@ Value = str | int | float | bool | list[str | int | float] | None
 class Parameter:
     """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number.
 
-    ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names a path parameter and a list of
-    its JSON file (``map-path.obstacles``), whose entries' names are the allowed values; ``within_timeout`` marks a
-    duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
-    service is ready; ``not_empty`` names lists of a JSON file that must not be empty; ``format`` says what is in the
-    file that a path names, which is checked as the service reads it; an amount with ``or_share`` may be ``25 %``.
+    One that is ``shared`` has by default the value of the parameter of this name of another service of the test, or
+    of the service that it names. ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names
+    a path parameter and a list of its JSON file (``map-path.obstacles``), whose entries' names are the allowed
+    values; ``within_timeout`` marks a duration that must be shorter than the test's timeout; one with ``setup_times``
+    may pass that many times before the service is ready; ``not_empty`` names lists of a JSON file that must not be
+    empty; ``format`` says what is in the file that a path names, which is checked as the service reads it; an amount
+    with ``or_share`` may be ``25 %``.
     """
 
     name: str
@@ -138,7 +140,7 @@ class Parameter:
     unit: str = ""
     default: Value = None
     required: bool = False
-    shared: bool = False
+    shared: bool | str = False
     minimum: float | None = None
     maximum: float | None = None
     choices: tuple[str, ...] = ()
