@@ -95,7 +95,7 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
         default = "" if parameter.default in (None, []) else f", default {parameter.default}"
         facts = f"{parameter.type}{default}"
         if parameter.required:
-            others = [*["another service of the test"] * parameter.shared, *["the rig"] * bool(parameter.rig)]
+            others = [*["another service of the test"] * bool(parameter.shared), *["the rig"] * bool(parameter.rig)]
             facts += f", required unless {' or '.join(others)} provides it" if others else ", required"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
         notes = (_bounds(parameter), in_words(parameter.when) if parameter.when else "")

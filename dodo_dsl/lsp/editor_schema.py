@@ -125,6 +125,14 @@ def _value(parameter: Parameter) -> Schema:
             return {"type": ["array", "string"], "items": _TEXT}
         item = _number(replace(parameter, type=parameter.of))
         return {"anyOf": [{"type": "array", "items": item}, item]}
+    if parameter.type == "amount":
+        return {
+            "anyOf": [
+                {"type": "number"},
+                {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-z0-9%/]+\s*$"},
+                _PLACEHOLDER,
+            ]
+        }
     if parameter.type == "string":
         return {"type": ["string", "number", "boolean"]}
     return dict(_TEXT)

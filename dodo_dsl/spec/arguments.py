@@ -74,7 +74,8 @@ def written(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Entr
         return own
     if parameter.shared:
         for other in spec.uses:
-            if other is not use and parameter.name in other.parameters:
+            is_meant = parameter.shared in (True, other.uses.text)
+            if is_meant and other is not use and parameter.name in other.parameters:
                 return other.parameters[parameter.name]
     return rig.entry(parameter.rig) if rig and parameter.rig else None
 

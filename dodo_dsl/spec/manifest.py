@@ -23,10 +23,11 @@ RESERVED = ("cid", "help")
 _PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
 FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames(?: if (?P<condition>[a-z0-9.-]+))?")
 """A placeholder for the frames at which a map has models, as in ``{map-path.frames if bodies}``."""
-_NUMBERS = ("number", "integer")
+_NUMBERS = ("number", "integer", "amount")
 _TEXTS = ("string", "memory", "message", "output")
 _DEFAULTS: dict[str, tuple[type, ...]] = {
     "number": (int, float),
+    "amount": (int, float),
     "integer": (int,),
     "boolean": (bool,),
     "list": (list,),
@@ -102,6 +103,8 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
             yield _misplaced(node, key, f"'{key}' is for numbers, but '{name}' is of type {kind}")
     if "choices" in raw and kind not in ("string", "list"):
         yield _misplaced(node, "choices", f"'choices' are for strings and lists, but '{name}' is of type {kind}")
+    if raw.get("or-share") and kind != "amount":
+        yield _misplaced(node, "or-share", f"'or-share' is for amounts, but '{name}' is of type {kind}")
     for key in ("within-timeout", "setup-times"):
         if raw.get(key) and raw.get("unit") != "s":
             yield _misplaced(node, key, f"'{name}' is not a duration", "add 'unit: s'")
@@ -168,14 +171,15 @@ def _when(raw: dict[str, list[str | bool]]) -> When:
 class Parameter:
     """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number.
 
-    ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names a path parameter and lists of
-    its JSON file (``map-path.obstacles``), whose entries' names are the allowed values, and so are ``words``;
-    ``within_timeout`` marks a
-    duration that must be shorter than the test's timeout; one with ``setup_times`` may pass that many times before the
-    service is ready; ``not_empty`` names lists of a JSON file that must not be empty; ``format`` says what is in the
-    file that a path names, which is checked as the service reads it. Items of a list are strings, or numbers where
-    ``of`` says so; it has as many of them as the list that ``per`` names, or one. It has an effect only ``when``
-    others are so. The messages that drive the vehicle take the place of the default of one that is ``driving``.
+    One that is ``shared`` has by default the value of the parameter of this name of another service of the test, or
+    of the service that it names. ``rig`` is the dotted key of the rig's setting that is the default; ``among`` names
+    a path parameter and lists of its JSON file (``map-path.obstacles``), whose entries' names are the allowed values,
+    and so are ``words``; ``within_timeout`` marks a duration that must be shorter than the test's timeout; one with
+    ``setup_times`` may pass that many times before the service is ready; ``not_empty`` names lists of a JSON file that
+    must not be empty; ``format`` says what is in the file that a path names, which is checked as the service reads it;
+    an amount with ``or_share`` may be ``25 %``. Items of a list are strings, or numbers where ``of`` says so; it has as
+    many of them as the list that ``per`` names, or one. It has an effect only ``when`` others are so. The messages that
+    drive the vehicle take the place of the default of one that is ``driving``.
     """
 
     name: str
@@ -186,7 +190,7 @@ class Parameter:
     unit: str = ""
     default: Value = None
     required: bool = False
-    shared: bool = False
+    shared: bool | str = False
     minimum: float | None = None
     maximum: float | None = None
     choices: tuple[str, ...] = ()
@@ -197,6 +201,7 @@ class Parameter:
     format: str = ""
     within_timeout: bool = False
     setup_times: int = 0
+    or_share: bool = False
     example: Value = None
     when: When = field(default_factory=dict)
     driving: bool = False
@@ -260,6 +265,9 @@ class Manifest:
         return "/" not in self.image and ":" not in self.image
 
 
+_TRANSLATED = ("within-timeout", "setup-times", "or-share", "choices", "words", "not-empty", "when")
+
+
 def _ports(raw: dict[str, Any] | None) -> Ports:
     raw = raw or {}
     return Ports(tuple(raw.get("in", ())), tuple(raw.get("out", ())))
@@ -282,15 +290,12 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
             name,
             within_timeout=p.get("within-timeout", False),
             setup_times=p.get("setup-times", 0),
+            or_share=p.get("or-share", False),
             choices=tuple(p.get("choices", ())),
             words=tuple(p.get("words", ())),
             not_empty=tuple(p.get("not-empty", ())),
             when=_when(p.get("when", {})),
-            **{
-                k: v
-                for k, v in p.items()
-                if k not in ("within-timeout", "setup-times", "choices", "words", "not-empty", "when")
-            },
+            **{k: v for k, v in p.items() if k not in _TRANSLATED},
         )
         for name, p in (raw.get("parameters") or {}).items()
     }
