@@ -89,37 +89,40 @@ def _all_ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:
                     yield Diagnostic(scalar.span, RULE, message, did_you_mean(name, types))
 
 
+_KINDS_OF_KEY: dict[str, tuple[tuple[str, ...], str]] = {
+    "of": (("list",), "lists"),
+    "per": (("list",), "lists"),
+    "driving": (("list",), "lists"),
+    "choices": (("string", "list"), "strings and lists"),
+    "or-share": (("amount",), "amounts"),
+    "not-empty": (("path",), "paths"),
+    "format": (("path",), "paths"),
+    "unit": (("number",), "numbers"),
+    "minimum": (_NUMBERS, "numbers"),
+    "maximum": (_NUMBERS, "numbers"),
+}
+"""Keys that only parameters of some types may have, with these types in words."""
+
+
 def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diagnostic]:
     raw = plain(node)
     kind = raw["type"]
-    for key in ("of", "per"):
-        if key in raw and kind != "list":
-            yield _misplaced(node, key, f"'{key}' is for lists, but '{name}' is of type {kind}")
-    if "per" in raw and types.get(raw["per"]) != "list":
-        hint = did_you_mean(raw["per"], [n for n, t in types.items() if t == "list"])
-        yield _misplaced(node, "per", f"'per' names '{raw['per']}', expected a parameter of type list", hint)
-    for key, kinds in (("unit", ("number",)), ("minimum", _NUMBERS), ("maximum", _NUMBERS)):
-        if key in raw and raw.get("of", kind) not in kinds:
-            yield _misplaced(node, key, f"'{key}' is for numbers, but '{name}' is of type {kind}")
-    if "choices" in raw and kind not in ("string", "list"):
-        yield _misplaced(node, "choices", f"'choices' are for strings and lists, but '{name}' is of type {kind}")
-    if raw.get("or-share") and kind != "amount":
-        yield _misplaced(node, "or-share", f"'or-share' is for amounts, but '{name}' is of type {kind}")
+    for key, (kinds, words) in _KINDS_OF_KEY.items():
+        of_items = raw.get("of", kind) if words == "numbers" else kind
+        if raw.get(key) not in (None, False) and of_items not in kinds:
+            verb = "are" if key == "choices" else "is"
+            yield _misplaced(node, key, f"'{key}' {verb} for {words}, but '{name}' is of type {kind}")
     for key in ("within-timeout", "setup-times"):
         if raw.get(key) and raw.get("unit") != "s":
             yield _misplaced(node, key, f"'{name}' is not a duration", "add 'unit: s'")
     if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
         yield _misplaced(node, "minimum", f"the minimum of '{name}' is larger than its maximum")
-    for key in ("not-empty", "format"):
-        if key in raw and kind != "path":
-            yield _misplaced(node, key, f"'{key}' is for paths, but '{name}' is of type {kind}")
     source = str(raw.get("among", "")).partition(".")[0]
-    if source and types.get(source) != "path":
-        message = f"'among' begins with '{source}', expected a parameter of type path"
-        yield _misplaced(node, "among", message, did_you_mean(source, [n for n, t in types.items() if t == "path"]))
+    for key, named, wanted in (("among", source, "path"), ("per", raw.get("per"), "list")):
+        if named and types.get(named) != wanted:
+            message = f"'{key}' names '{named}', expected a parameter of type {wanted}"
+            yield _misplaced(node, key, message, did_you_mean(named, [n for n, t in types.items() if t == wanted]))
     yield from _conditions(node.get("when"), types)
-    if raw.get("driving") and kind != "list":
-        yield _misplaced(node, "driving", f"'driving' is for lists, but '{name}' is of type {kind}")
     yield from _default(name, node, raw)
 
 
