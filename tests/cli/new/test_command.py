@@ -368,6 +368,7 @@ def test_a_language_is_that_of_an_application(empty: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.proof
 def test_the_application_passes_its_test(empty: Path) -> None:
     assert dodo("new", "--application")[0] == 0
     command = [sys.executable, "-m", "dodo_dsl", "run", "sil-first"]
