@@ -39,7 +39,8 @@ class Relay:
 
 def serve(relay: Relay, frames: BinaryIO, stdout: TextIO) -> int:
     """Sends what comes until its end; 1 for what is no frame, as nothing behind it can be told apart."""
-    print(*relay.address, file=stdout, flush=True)
+    host, port = relay.address
+    print(f"{host} {port}", file=stdout, flush=True)
     while header := frames.read(HEADER_BYTES):
         try:
             frame = header + frames.read(body_length(header))

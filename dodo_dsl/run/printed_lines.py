@@ -75,7 +75,7 @@ def _float(type_: str, text: bytes) -> float:
     found = float(text)
     is_meant = b"i" in text.lower()  # inf, infinity
     try:
-        struct.pack("f" if type_ == "float" else "d", found)
+        struct.pack("<f" if type_ == "float" else "<d", found)
     except OverflowError:
         raise NoValue(f"out of range for {type_}") from None
     if math.isinf(found) and not is_meant:

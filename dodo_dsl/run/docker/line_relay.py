@@ -47,11 +47,16 @@ class ContainerRelay:
             raise
 
     def _said(self) -> Address:
-        header = self._stream.recv(_HEADER_BYTES, socket.MSG_WAITALL)
-        said = self._stream.recv(int.from_bytes(header[4:], "big"), socket.MSG_WAITALL).decode("utf-8", "replace")
-        host, _, port = said.strip().partition(" ")
+        data = b""
+        while not data.endswith(b"\n"):
+            header = self._stream.recv(_HEADER_BYTES, socket.MSG_WAITALL)
+            if not header:
+                break
+            data += self._stream.recv(int.from_bytes(header[4:], "big"), socket.MSG_WAITALL)
+        said = " ".join(data.decode("utf-8", "replace").split())
+        host, _, port = said.partition(" ")
         if not port.isdecimal():
-            raise ValueError(f"the program that sends it says '{said.strip()[:200]}'")
+            raise ValueError(f"the program that sends it says '{said[:200]}'")
         return host, int(port)
 
     def send(self, frame: bytes) -> None:
