@@ -159,6 +159,12 @@ def _shown(end: End) -> str:
     return f"{end.service} (application)" if end.layer == "application" else end.service
 
 
+def _sender(end: End, wiring: Wiring) -> str:
+    """A producer, and whether it only prints the message."""
+    is_printed = any((each.service, each.port) == (end.service, end.port) for each in wiring.printed)
+    return f"{end.service} (application, prints it)" if is_printed else _shown(end)
+
+
 def _lines(wiring: Wiring) -> Iterator[Line]:
     consumers = (*wiring.consumed, *wiring.application_consumes)
     produced: dict[Port, list[End]] = {}
@@ -168,7 +174,7 @@ def _lines(wiring: Wiring) -> Iterator[Line]:
         anything = port.name == ANYTHING
         by = {_shown(c): None for c in consumers if c.port.consumes(port) and (not anything or _only(wiring, c))}
         name = "any message of it" if anything else str(port)
-        yield Line(port.kind, name, tuple(map(_shown, ends)), tuple(by))
+        yield Line(port.kind, name, tuple(_sender(end, wiring) for end in ends), tuple(by))
     unsatisfied: dict[str, list[End]] = {}
     for end in consumers:
         if not any(end.port.consumes(port) for port in produced):

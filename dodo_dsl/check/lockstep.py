@@ -42,12 +42,16 @@ def rates_fit(rate: float, step: float) -> bool:
 
 def answers(wiring: Wiring) -> list[str]:
     """The messages that answer a frame, each once: those that the application declares, else those that drive the
-    vehicle, else those that are judged; empty without any."""
+    vehicle, else those that are judged, and what it prints; empty without any."""
     declared = _names(wiring.answers)
     expected = [end for end in _from_application(wiring) if _is_expected(end, wiring)]
     driving = _names(end for end in expected if end.layer == "action")
     judged = (e for e in expected if e.layer == "evaluation" and not e.port.name.startswith(DETECTIONS))
-    return declared or driving or _names(judged)
+    if declared or not (printed := [end for end in wiring.printed if not end.port.name.startswith(DETECTIONS)]):
+        return declared or driving or _names(judged)
+    chosen = [end for end in expected if end.layer == "action"] or list(judged)
+    missing = [end for end in printed if not any(each.port.consumes(end.port) for each in chosen)]
+    return _names([*chosen, *missing])
 
 
 def other_inputs(wiring: Wiring) -> list[str]:

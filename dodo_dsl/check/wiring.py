@@ -64,8 +64,8 @@ class Wiring:
     """Everything produced and consumed in a test.
 
     ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are the messages that
-    they declare to complete a frame in lockstep. ``unsent`` are services that may send anything by their manifests, and
-    messages that they cannot send.
+    they declare to complete a frame in lockstep, ``printed`` those that are lines of theirs. ``unsent`` are services
+    that may send anything by their manifests, and messages that they cannot send.
     """
 
     produced: tuple[End, ...]
@@ -77,6 +77,7 @@ class Wiring:
     answers: tuple[End, ...] = ()
     done: str = ""
     unsent: frozenset[tuple[str, str]] = frozenset()
+    printed: tuple[End, ...] = ()
 
     def producers(self, port: Port) -> list[End]:
         """The test's services that produce what a port consumes."""
@@ -142,6 +143,11 @@ def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | 
         for ends, names in ((produced, own.outputs), (consumed, own.inputs), (answers, own.answers)) if own else ():
             stamp = 0 if ends is produced else None
             ends += [End(service, "application", message(name, stamp), span) for name, span in names]
+    printed = (
+        End(service, "application", message(line.port, 0), line.message_span)
+        for service, own in declared.items()
+        for line in (own.lines if own else ())
+    )
     ending = [own.done[0] for own in declared.values() if own and own.done]
     return replace(
         wiring,
@@ -151,4 +157,5 @@ def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | 
         answers=tuple(answers),
         undeclared=tuple(s for s, own in declared.items() if own is None),
         has_application=True,
+        printed=tuple(printed),
     )

@@ -46,6 +46,7 @@ def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
         if not (end.port.optional or wiring.application_may_produce(end.port) or wiring.producers(end.port)):
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
+    yield from _judged(wiring)
     yield from _unsatisfied_application(wiring)
 
 
@@ -105,6 +106,15 @@ def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
             message = f"'{other.service}' and {who} both {does} {end.port}"
             hint = f"give one of them another {what}"
             yield Diagnostic(end.span, "two-producers", message, hint)
+
+
+def _judged(wiring: Wiring) -> Iterator[Diagnostic]:
+    """What the application prints and is judged by, under any stamp: the same as a second producer."""
+    for end in wiring.printed:
+        truths = [each for each in wiring.consumed if wiring.is_truth(each.port) and each.port.consumes(end.port)]
+        if truths and all(other.port != end.port for other in wiring.produced):
+            message = f"the application's '{end.service}' prints {end.port}, by which '{truths[0].service}' judges it"
+            yield Diagnostic(end.span, "two-producers", message, "name another message, or another sender")
 
 
 def _unsatisfied_application(wiring: Wiring) -> Iterator[Diagnostic]:

@@ -55,6 +55,15 @@ class PlannedService:
 
 
 @dataclass(frozen=True)
+class Line:
+    """What a service prints: a line in which RE2 finds ``match`` is a message, whose fields are the named groups."""
+
+    match: str
+    message: str
+    sender: int = 0
+
+
+@dataclass(frozen=True)
 class ApplicationService:
     """A service under test; ``process`` starts it without containers, None when only its image can.
 
@@ -73,6 +82,7 @@ class ApplicationService:
     outputs: tuple[str, ...] = ()
     after: dict[str, str] = field(default_factory=dict)
     optional: tuple[str, ...] = ()
+    lines: tuple[Line, ...] = ()
 
 
 @dataclass(frozen=True)

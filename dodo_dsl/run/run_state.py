@@ -43,6 +43,7 @@ from dodo_dsl.run.protocol import (
     Responded,
     Stopped,
     Time,
+    Unmatched,
     Unstartable,
     VerdictEvent,
 )
@@ -98,6 +99,7 @@ class RunState:
     _ended_by: str = ""
     """The service whose end was that of the test."""
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    _unmatched: tuple[Unmatched, ...] = ()
     _killed_before: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -277,6 +279,7 @@ class RunState:
         """The test is decided: what services write from now on, as they are ended, explains nothing."""
         names = {*self.layer_of, *self.facts.evaluators, *(finding.service for finding in self.facts.findings)}
         self._tails = {name: tuple(backend.tail(name)) for name in names}
+        self._unmatched = backend.unmatched()
 
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
@@ -284,8 +287,8 @@ class RunState:
         answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
         use = judgement.judged_use(self.resources, plan.resources)
         considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
-        finding = self._with_told(self._explained(self._elsewhere(self._timed(considered.finding))))
-        finding = self._without_display(finding)
+        found = self._explained(self._elsewhere(self._timed(considered.finding)))
+        finding = self._without_display(self._with_told(self._with_printed(found)))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
@@ -297,11 +300,28 @@ class RunState:
             checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks, *use.checks),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
-            notes=(*self.notes, *self._shortage_notes(), *losses, *answers.notes, *use.notes),
+            notes=(
+                *self.notes,
+                *self._printed_notes(finding),
+                *self._shortage_notes(),
+                *losses,
+                *answers.notes,
+                *use.notes,
+            ),
             machine=considered.load,
             response=self.response,
             resources=self.resources,
         )
+
+    def _with_printed(self, finding: Finding) -> Finding:
+        """A frame without an answer, with what the application printed instead where it answers by printing."""
+        words = [each.words for each in self._unmatched] if self.is_unanswered else []
+        return replace(finding, reason="; ".join([finding.reason, *words])) if words else finding
+
+    def _printed_notes(self, finding: Finding) -> tuple[str, ...]:
+        """Of services whose lines never matched, where that is not said already."""
+        never = (each.words for each in self._unmatched if each.never)
+        return () if self.is_unanswered or finding.result == "error" else tuple(never)
 
     def _with_told(self, finding: Finding) -> Finding:
         """A verdict on an application that is told what none is on a road says so."""

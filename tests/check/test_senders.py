@@ -90,3 +90,23 @@ def test_a_recorded_target_is_never_the_producer_of_what_the_application_sends(
     assert said == [guarded] * bool(guarded)
     assert truth(test) == tuple(word.partition("=")[0] for word in said)
     assert list(test.left_out["drive"]) == left_out
+
+
+PRINTED = """\
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=1
+    x-dodo:
+      lines:
+        - {match: 'steer (?P<groundSteering>[-.0-9]+)', message: opendlv.proxy.GroundSteeringRequest}
+        - {match: 'seen (?P<type>[0-9]+)', message: opendlv.logic.perception.DetectionType, sender: 9}
+      out: [opendlv.proxy.PedalPositionRequest]
+"""
+
+
+def test_what_is_printed_comes_from_the_runner_alone(tmp_path: Path) -> None:
+    found = senders(resolved(PRINTED, tmp_path))
+    assert {f"{STEERING}/0=dodo-lines", "opendlv.logic.perception.DetectionType/9=dodo-lines"} <= set(found)
+    assert not any(word.startswith("opendlv.proxy.PedalPositionRequest") for word in found)

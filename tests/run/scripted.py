@@ -13,7 +13,7 @@ from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockste
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot, Times
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, VerdictEvent
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
 
 T = TypeVar("T")
 Events = Sequence[tuple[float, Event]]
@@ -136,6 +136,9 @@ class ScriptedBackend:
         if self.close_problem:
             raise self.close_problem
         return ["look inside"] if keep else []
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        return ()
 
     def tail(self, service: str) -> list[str]:
         return self.tails.get(service, [])
