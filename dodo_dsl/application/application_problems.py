@@ -226,7 +226,7 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _commands, _references, _conditions, _volumes, _access, _single, _engine):
+    for rule in (_name, _display, _commands, _references, _conditions, _volumes, _access, _single, _engine):
         yield from rule(written)
 
 
@@ -250,6 +250,17 @@ def _name(written: Written) -> Iterator[Diagnostic]:
         yield _bad(written.key, f"the name of a service has {len(name)} characters, expected at most {_LONGEST}")
     if not any(written.plain.get(key) for key in ("image", "build", "x-dodo-process")):
         yield _bad(written.key, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
+
+
+def _display(written: Written) -> Iterator[Diagnostic]:
+    """A warning of an X server that only a process gets."""
+    about = written.plain.get(KEYS[0])
+    if isinstance(about, dict) and about.get("display") is True and KEYS[1] not in written.plain:
+        message = f"'display' of '{written.name}' has no effect in a container, whose image brings its own X server"
+        hint = "start it with xvfb-run there, or give it x-dodo-process; docs/reference/applications.md, Windows"
+        yield Diagnostic(
+            place(written.node, (KEYS[0], "display"), written.key), "application-file", message, hint, "warning"
+        )
 
 
 def _commands(written: Written) -> Iterator[Diagnostic]:

@@ -29,7 +29,7 @@ def holding(declarations: Declarations, files: list[Path]) -> Declarations:
 def left_out(document: Mapping, declarations: Declarations) -> dict[str, str]:
     """Why services do not start, by name: those of ``without`` that the merged compose files have."""
     services = _services(document)
-    return {word.text: f"{_place(word.span)} leaves it out" for word in declarations.without if word.text in services}
+    return {word.text: "dodo.yml leaves it out" for word in declarations.without if word.text in services}
 
 
 def declared_in(document: Mapping, declarations: Declarations) -> Mapping:

@@ -26,7 +26,7 @@ FILES = "dodo-files"
 """The service that copies the files of the repository to which an application may write."""
 KEYS = ("x-dodo", "x-dodo-process")
 
-_ABOUT_NO_MESSAGES = {"tune", "cid"}
+_ABOUT_NO_MESSAGES = {"tune", "cid", "display"}
 
 Word = tuple[str, Span]
 
@@ -70,6 +70,13 @@ class ComposeService:
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
     cid_variables: tuple[str, ...] = ()
+
+    @property
+    def has_display(self) -> bool:
+        """Whether its process is to have an X server."""
+        about = self.node.get(KEYS[0])
+        word = about.get("display") if isinstance(about, source.Mapping) else None
+        return isinstance(word, Scalar) and word.value is True
 
 
 @dataclass(frozen=True)

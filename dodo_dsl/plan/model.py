@@ -19,6 +19,12 @@ STARTED, HEALTHY, COMPLETED = "service_started", "service_healthy", "service_com
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
 
 
+DISPLAY_SERVER = ("xvfb-run", "-a", "-s", "-screen 0 1920x1080x24 -nolisten tcp")
+"""What starts a program with an X server of its own (xvfb-run(1))."""
+OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
+"""The variable by which programs that draw with Qt need no display."""
+
+
 @dataclass(frozen=True)
 class Flag:
     """``--name=value``; a path lies below ``files/``, a report below the report's folder, both relative."""

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import signal
 import traceback
 from collections.abc import Iterable, Sequence
@@ -12,7 +13,7 @@ from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.added_services import FRAMES, RECORDER
-from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.plan.model import DISPLAY_SERVER, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError, Flooded, MemoryTaken, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -20,6 +21,12 @@ LOG = "logs/runner.log"
 """The traceback of an internal error, in the test's report."""
 _RANK: dict[Result, int] = {"passed": 0, "failed": 1, "error": 2}
 _MAX_ERROR_TEXT = 300
+_NO_DISPLAY = re.compile(
+    r"cannot open display|could not connect to display|can't open display|unable to open (X )?display"
+    r"|no Qt platform plugin could be initialized|Can't initialize GTK backend",
+    re.IGNORECASE,
+)
+"""What GTK, Qt, X11 and OpenCV say without a display."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +138,19 @@ def unstartable(plan: Plan, service: str, why: str) -> str:
     program = programs.get(service, "")
     is_missing = why == f"{program}: {os.strerror(errno.ENOENT)}"
     hint = "; build it first" if is_missing and "/" in program and not Path(program).is_absolute() else ""
+    if is_missing and program == DISPLAY_SERVER[0]:
+        hint = "; its 'display' needs Xvfb: apt install xvfb xauth"
     return f"service '{service}' could not be started: {why}{hint}"
+
+
+def windowless(lines: Sequence[str]) -> str:
+    """What to do about a program that ended as it has no display, by the last lines that it wrote; else empty."""
+    if not any(_NO_DISPLAY.search(line) for line in lines):
+        return ""
+    return (
+        "cannot open display: this program draws a window; start it without one (--verbose, imshow), or write x-dodo: "
+        "{display: true} for its process, or xvfb-run in its image"
+    )
 
 
 def lost_messages(service: PlannedService, messages: int) -> str:

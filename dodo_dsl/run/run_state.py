@@ -23,6 +23,7 @@ from dodo_dsl.run.outcomes import (
     memory_taken,
     outcome_of,
     unstartable,
+    windowless,
 )
 from dodo_dsl.run.protocol import (
     Backend,
@@ -220,6 +221,13 @@ class RunState:
         """Whether the end of a service was that of the test."""
         return bool(self._ended_by)
 
+    def _without_display(self, finding: Finding) -> Finding:
+        """The end of a program of the application that wanted to draw, with what to do."""
+        if finding.result == "passed" or not self.is_application(finding.service):
+            return finding
+        told = windowless(self._tails.get(finding.service, ()))
+        return replace(finding, reason=f"{finding.reason}; {told}") if told else finding
+
     def _elsewhere(self, finding: Finding) -> Finding:
         """A failure for silence, which names the test's CID, with the bus that the application has joined instead."""
         others = sorted(self.buses - {self.plan.cid})
@@ -279,8 +287,8 @@ class RunState:
         answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
         use = judgement.judged_use(self.resources, plan.resources)
         considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
-        finding = self._elsewhere(self._timed(considered.finding))
-        finding = self._with_told(self._with_printed(self._explained(finding)))
+        found = self._explained(self._elsewhere(self._timed(considered.finding)))
+        finding = self._without_display(self._with_told(self._with_printed(found)))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(

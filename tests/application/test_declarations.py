@@ -50,7 +50,7 @@ def test_each_key_of_the_deployment_replaces_that_of_the_compose_file(
     assert declared.readers == 2
     assert plain(found.services["driver"].node)["x-dodo-process"] == ["python3", "-m", "steering"]
     assert list(found.services) == ["driver"]
-    assert found.dropped == {"viewer": "dodo.yml:4 leaves it out"}
+    assert found.dropped == {"viewer": "dodo.yml leaves it out"}
 
 
 def test_they_are_about_the_files_that_they_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
