@@ -6,7 +6,7 @@ lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it says 
 the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
 the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that backs up to the finish.
 An oval has ``far`` instead, the line half-way round.
-``two-cars`` is the straight track with another car, which is where the frames of sender stamp 1 are; the car of the test
+``two-cars`` is the straight track with another car, at the frames of sender stamp 1; the car of the test
 has stamp 0. ``static-rig`` is no track but a board with eight cones, seen from x = 0, y = 0 along +x.
 """
 
