@@ -88,7 +88,7 @@ class Loop:
     def answer(self, driver: Any, pose: VehiclePose) -> tuple[float, float]:
         eye = CameraPose.at(pose.x, pose.y, 0.095, 0.0, 0.0, pose.heading)
         places: dict[str, list[Any]] = {"yellow": [], "blue": []}
-        for cone in perception.find_cones(renderer(self.map).render(eye)):
+        for cone in perception.find(renderer(self.map).render(eye)):
             place = steering.on_the_ground(cone.x, cone.y, cone.width, cone.height)
             if place is not None:
                 places[cone.colour].append(place)

@@ -67,7 +67,7 @@ def seen(make: Make | None) -> Recorder:
     source = SimpleNamespace(name="video0.argb", width=WIDTH, height=HEIGHT)
     with noted(session):
         for number in range(FRAMES):
-            cones = module.find_cones(picture(number))
+            cones = module.find(picture(number))
             module.announce(session, cones, number, BEGIN + number * PERIOD, source)
     return session
 
