@@ -112,16 +112,16 @@ def test_a_curve_falls(text):
 def test_noise_has_its_deviation_and_its_seed(room):
     def readings(seed, **errors):
         finder = RangeFinder(room, [Sensor(3), Sensor(5)], Device(**errors), seed)
-        return np.array([finder.readings(ORIGIN, {}) for _ in range(4000)])
+        return np.array([finder.readings(ORIGIN, {}) for _ in range(1500)])
 
     noisy = readings(1, noise=0.02)
-    assert noisy.mean(axis=0) == pytest.approx([2.0, 2.0], abs=0.002)
-    assert noisy.std(axis=0) == pytest.approx([0.02, 0.02], rel=0.05)
-    assert abs(np.corrcoef(noisy.T)[0, 1]) < 0.05, "sensors err by themselves"
+    assert noisy.mean(axis=0) == pytest.approx([2.0, 2.0], abs=0.003)
+    assert noisy.std(axis=0) == pytest.approx([0.02, 0.02], rel=0.06)
+    assert abs(np.corrcoef(noisy.T)[0, 1]) < 0.08, "sensors err by themselves"
     assert np.array_equal(noisy, readings(1, noise=0.02)) and not np.array_equal(noisy, readings(2, noise=0.02))
     wrong = readings(1, outliers=0.1)
-    assert (wrong != 2.0).mean() == pytest.approx(0.1, abs=0.01)
-    assert wrong[wrong != 2.0].mean() == pytest.approx((0.03 + 6.0) / 2, rel=0.05)
+    assert (wrong != 2.0).mean() == pytest.approx(0.1, abs=0.02)
+    assert wrong[wrong != 2.0].mean() == pytest.approx((0.03 + 6.0) / 2, rel=0.1)
     assert np.array_equal(readings(1, noise=0.02, outliers=0.1)[wrong == 2.0], noisy[wrong == 2.0])
 
 
