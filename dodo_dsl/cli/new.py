@@ -327,7 +327,9 @@ def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New]
         sent = {name.partition("/")[0] for own in declared if own for name, _ in own.outputs}
         drive = recorded_drive.look(wanted.rec, sent)
         made, note = recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root)
-        return made, note + recorded_drive.unpassable(wanted.rec, drive, tests.checked.application)
+        return new_test.fitted(made, tests.checked.application), note + recorded_drive.unpassable(
+            wanted.rec, drive, tests.checked.application
+        )
     if wanted.extends:
         note = f"copied, because '{wanted.extends}' ships with DoDo and a test extends only tests of its own registry\n"
         return _from_another(wanted.name, wanted.extends, tests, place, note)
@@ -335,7 +337,8 @@ def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New]
     if start.shipped:
         note = f"copied from '{start.shipped}', because a {start.level} test of kind {start.kind} {start.why}\n"
         return _from_another(wanted.name, start.shipped, tests, place, note)
-    return new_test.test_files(wanted.name, start.template, place.registry, place.root), ""
+    made = new_test.test_files(wanted.name, start.template, place.registry, place.root)
+    return new_test.fitted(made, tests.checked.application), ""
 
 
 def _from_another(name: str, base_name: str, tests: _Tests, place: Destination, note: str) -> tuple[list[New], str]:

@@ -12,6 +12,8 @@ from pathlib import Path
 import yaml
 
 from dodo_dsl import package_data
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.pictures import pictures_of
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.new_files import New, filled, schema_of_specs
 from dodo_dsl.diagnostics import did_you_mean
@@ -54,6 +56,34 @@ def test_files(name: str, template: str, registry: Path, root: Path) -> list[New
     if f"../{TARGET}".encode() in spec and not (registry / TARGET).exists():
         files.append(New(registry / TARGET, filled("tests/straight-ahead.csv")))
     return files
+
+
+_MEMORY = re.compile(r"[A-Za-z][\w.-]*", re.ASCII)
+_USED = re.compile(r"uses: (?:virtual-camera|camera|rec-replay)(?P<with>, with: \{|\n(?P<indent> +)with:\n)")
+
+
+def fitted(files: Sequence[New], application: ApplicationSource | None) -> list[New]:
+    """A new test, its spec first, whose pictures are as the application's commands ask for them."""
+    asked = pictures_of(application) if application else []
+    if not asked:
+        return list(files)
+    pictures = max(asked, key=lambda each: bool(each.width and each.height))
+    formats = {name: format_ or "argb" for name, format_ in pictures.formats.items() if _MEMORY.fullmatch(name)}
+    names = {f"name.{format_}": name for name, format_ in formats.items() if name != f"video0.{format_}"}
+    names |= {f"name.{format_}": name for name, format_ in formats.items() if format_ in ("bgr", "rgb")}
+    spec, *rest = files
+    text = _USED.sub(lambda match: match[0] + _lines(names, match["indent"]), spec.content.decode(), count=1)
+    for key, size in (("width", pictures.width), ("height", pictures.height)):
+        camera = re.compile(rf"(uses: virtual-camera, with: \{{[^}}]*\b{key}: )\d+")
+        text = camera.sub(rf"\g<1>{size}", text) if size else text
+    return [New(spec.path, text.encode()), *rest]
+
+
+def _lines(names: Mapping[str, str], indent: str | None) -> str:
+    """Parameters at the begin of ``{...}``, or of lines below ``with`` with an indent."""
+    if indent is None:
+        return "".join(f"{key}: {name}, " for key, name in names.items())
+    return "".join(f"{indent}  {key}: {name}\n" for key, name in names.items())
 
 
 def extending_files(name: str, base: Spec, root: Path) -> list[New]:
