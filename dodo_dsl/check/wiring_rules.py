@@ -4,7 +4,8 @@ Each message or memory that a service consumes has a producer in the test, or is
 ``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
 message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces),
 ``true-pose`` (it consumes what only a simulation knows, and the test hides that).
-``application-memory``: the shared memories that the application asks for are made by services of the test.
+``application-memory``: the shared memories that the application asks for are made by services of the test, and
+``application-pictures``: in the size and the format that it asks for.
 ``application-variable``: a test sets only variables that are not DoDo's, to values that fit.
 ``application-required``: no variable that the compose file requires (``${NAME:?why}``) is certain to be without a
 value, as compose would then refuse the test.
@@ -20,13 +21,15 @@ from dodo_dsl.application.access.compose_keys import SERVICE, removed
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate, interpolated
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
+from dodo_dsl.application.pictures import FORMATS, AskedPictures, pictures_of
 from dodo_dsl.application.variables import owner, split_by
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import IMAGE, without_pictures
+from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
+from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
 
 SENSORS = "opendlv.proxy."
@@ -189,6 +192,53 @@ def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterat
             message = f"the application's '{service}' reads pictures from '{name}', and '{file}' has none"
             hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
             yield Diagnostic(names[name], "application-memory", message, hint, "warning")
+
+
+def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
+    """Pictures whose bytes the application would take for others, or refuse."""
+    if context.application is None or not context.spec.is_whole or not context.test.is_complete:
+        return
+    set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
+    for asked in pictures_of(context.application, set_here):
+        for service in context.services:
+            keys = {service.texts.get(key, "").removeprefix("/"): key for key in service.arguments if key in _NAMES}
+            if names := [name for name in asked.formats if name and name in keys]:
+                yield from _sizes(context, service, asked)
+            for name in names:
+                yield from _formats(service, asked, name, keys[name])
+
+
+_NAMES = {f"name.{format_}": format_ for format_ in FORMATS}
+_PICTURES = "application-pictures"
+
+
+def _sizes(context: RuleContext, service: ResolvedService, asked: AskedPictures) -> Iterator[Diagnostic]:
+    made, use = picture_size(service), service.use
+    wanted = asked.width or made[0], asked.height or made[1]
+    if not all(made) or wanted == made:
+        return
+    size, other = (f"{width} x {height}" for width, height in (wanted, made))
+    written = [use.parameters[key].value.span for key in ("width", "height", "rec") if key in use.parameters]
+    who = f"the application's '{asked.service}'"
+    message = f"{who} asks for pictures of {size} pixels, and '{use.name}' makes them of {other}"
+    flags = f"--width={made[0]} --height={made[1]}"
+    hint = f"{flags} in the command of '{asked.service}'"
+    if "width" in service.arguments and not (context.rig and not context.rig.is_emulated):
+        hint = f"write 'width: {wanted[0]}' and 'height: {wanted[1]}' under 'with' of '{use.name}', or {hint}"
+    else:
+        hint = f"write {hint}"
+    yield Diagnostic(written[0] if written else use.span, _PICTURES, message, hint, "warning")
+
+
+def _formats(service: ResolvedService, asked: AskedPictures, name: str, key: str) -> Iterator[Diagnostic]:
+    wanted, made, use = asked.formats[name], _NAMES[key], service.use
+    if wanted in ("", made):
+        return
+    span = use.parameters[key].value.span if key in use.parameters else use.span
+    who = f"the application's '{asked.service}'"
+    sizes = f"{wanted} with {FORMATS[wanted]:g} bytes a pixel, and '{use.name}' makes it {made} with {FORMATS[made]:g}"
+    hint = f"write 'name.{wanted}: {name}' under 'with' of '{use.name}', and another name for '{key}'"
+    yield Diagnostic(span, _PICTURES, f"{who} asks for '{name}' as {sizes}", hint, "warning")
 
 
 def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:

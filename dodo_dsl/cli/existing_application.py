@@ -12,17 +12,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application import opendlv_flags, slips, stack
+from dodo_dsl.application import stack
 from dodo_dsl.application.application_problems import takes_cid
 from dodo_dsl.application.compose_paths import is_local
-from dodo_dsl.application.interpolation import interpolated
 from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.pictures import pictures_of
 from dodo_dsl.application.read import as_written
 from dodo_dsl.spec.manifest import load_manifests
 
 _FORMATS = {"argb": "video0.argb", "i420": "video0.i420", "bgr": "", "rgb": ""}
 """Formats of pictures, with the names that services give them by default."""
-_SIZE = re.compile(r"--(?P<flag>width|height)=(?P<value>[0-9]{2,4})")
 _SUFFIXES = (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h", ".py")
 _MOST_FILES, _MOST_BYTES = 200, 200_000
 """Sources that are read; the generated headers with all messages are larger."""
@@ -59,16 +58,15 @@ class Pictures:
 
 
 def pictures(application: ApplicationSource | None) -> Pictures:
-    """The pictures of the first service with a memory's name in its command."""
-    for service in _own(application) if application else ():
-        words = [interpolated(word, dict(application.known)) for word, _ in slips.words(service)] if application else []
-        if names := [name for name in opendlv_flags.memories(words) if "$" not in name]:
+    """The pictures of the first service with a memory's name in its command, if that is none of the stack's."""
+    own = {service.name for service in _own(application)} if application else set()
+    for asked in pictures_of(application) if application else ():
+        if asked.service in own:
             memories: dict[str, str] = {}
-            for name in names:
-                ending = name.rpartition(".")[2]
-                memories.setdefault(ending if ending in _FORMATS else "argb", name)
-            size = {match["flag"]: int(match["value"]) for word in words if (match := _SIZE.fullmatch(word))}
-            return Pictures(service.name, memories, **size)
+            for name, kind in asked.formats.items():
+                memories.setdefault(kind or "argb", name)
+            size = {"width": asked.width, "height": asked.height}
+            return Pictures(asked.service, memories, **{flag: value for flag, value in size.items() if value})
     return Pictures()
 
 

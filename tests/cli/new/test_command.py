@@ -475,3 +475,24 @@ def test_the_image_of_a_pipeline_reaches_the_compose_file(repository: Path) -> N
     assert dodo("compile")[0] == 0
     application = (repository / "generated/first/application.compose.yml").read_text()
     assert "${DODO_IMAGE_APPLICATION:-registry.example.org/group/application:latest}" in application
+
+
+@pytest.mark.parametrize(
+    ("command", "kind", "made"),
+    [
+        (
+            "--name=img.argb --width=1280 --height=720",
+            "closed-loop",
+            {"name.argb": "img.argb", "width": 1280, "height": 720},
+        ),
+        ("--name.bgr=video0.bgr", "open-loop", {"name.bgr": "video0.bgr", "width": 640, "height": 480}),
+        ("--name=video0.argb --name.i420=/video0.i420", "open-loop", {"width": 640, "height": 480}),
+    ],
+)
+def test_pictures_are_as_the_application_asks_for_them(empty: Path, command: str, kind: str, made: dict) -> None:
+    (empty / "compose.yaml").write_text(f"services: {{app: {{image: example, command: --cid=111 {command}}}}}\n")
+    (empty / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: compose.yaml\n")
+    assert dodo("new", "mine", "--kind", kind)[0] == 0
+    camera = yaml.safe_load((empty / "tests/mine/mine.dodo.yml").read_text())["environment"]["camera"]["with"]
+    assert {key: value for key, value in camera.items() if key not in ("map-path", "freq", "z")} == made
+    assert "warning[application-" not in dodo("compile", "--check")[1]

@@ -67,6 +67,16 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
 
 
 @pytest.mark.thorough
+def test_the_replay_shows_pictures_where_the_application_looks(empty: Path) -> None:
+    compose = empty / "compose.yml"
+    compose.write_text(compose.read_text().replace("--cid=111", "--cid=111 --name=img.argb --name.bgr=img.bgr"))
+    shutil.copy(SHIPPED, empty / "drive.rec")
+    assert dodo("new", "mine", "--level", "dil", "--rec", "drive.rec")[0] == 0
+    assert (spec(empty, "mine")["name.argb"], spec(empty, "mine")["name.bgr"]) == ("img.argb", "img.bgr")
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+
+
+@pytest.mark.thorough
 def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: Path) -> None:
     """Such a test cannot be passed: ``new`` says so, and the check as long as it is so."""
     compose = empty / "compose.yml"
