@@ -105,6 +105,10 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
         message = f"'among' begins with '{source}', expected a parameter of type path"
         yield _misplaced(node, "among", message, did_you_mean(source, [n for n, t in types.items() if t == "path"]))
     yield from _conditions(node.get("when"), types)
+    below = list(types)[list(types).index(name) :]
+    for other in raw.get("when", {}):
+        if other in below:
+            yield _misplaced(node, "when", f"'{name}' is above '{other}', on which it depends", "put it below")
     if raw.get("driving") and kind != "list":
         yield _misplaced(node, "driving", f"'driving' is for lists, but '{name}' is of type {kind}")
     yield from _default(name, node, raw)
