@@ -65,10 +65,6 @@ def test_files(
     return files
 
 
-_MEMORY = re.compile(r"[A-Za-z][\w.-]*", re.ASCII)
-_USED = re.compile(r"uses: (?:virtual-camera|camera|rec-replay)(?P<with>, with: \{|\n(?P<indent> +)with:\n)")
-
-
 def extending_files(name: str, base: Spec, root: Path) -> list[New]:
     """A spec that extends ``base``, in its registry, and a README."""
     path = base.path.relative_to(base.location.root.resolve()).as_posix()

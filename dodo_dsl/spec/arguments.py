@@ -107,14 +107,17 @@ def resolved(
     The instances of a matrix share the entries that do not depend on it, and so their arguments. Parameters without an
     effect beside others have no value.
     """
-    arguments = {}
-    for name, parameter in manifest.parameters.items():
-        known = like.get(name) if like else None
-        same = known is not None and known.parameter is parameter and known.entry is written(spec, use, parameter, rig)
-        same = same and not (parameter.when or parameter.driving)
-        arguments[name] = known if known is not None and same else argument(spec, use, parameter, rig)
-    texts = {name: each.value.text for name, each in arguments.items() if each.value is not None}
-    for name, each in arguments.items():
-        if not holds(each.parameter.when, texts):
-            arguments[name] = replace(each, value=None, problem=None)
-    return ResolvedService(use, manifest, arguments)
+    arguments: dict[str, Argument] = {}
+    texts: dict[str, str] = {}
+    for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
+        entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
+        same = known is not None and known.parameter is parameter and known.entry is entry and not parameter.driving
+        if not holds(parameter.when, texts):
+            arguments[name] = known if known and same and known.value is None else Argument(parameter, entry)
+            continue
+        is_known = known is not None and same and not (parameter.when and known.value is None)
+        found = known if known is not None and is_known else argument(spec, use, parameter, rig)
+        arguments[name] = found
+        if found.value is not None:
+            texts[name] = found.value.text
+    return ResolvedService(use, manifest, {name: arguments[name] for name in manifest.parameters})

@@ -123,6 +123,10 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
             message = f"'{key}' names '{named}', expected a parameter of type {wanted}"
             yield _misplaced(node, key, message, did_you_mean(named, [n for n, t in types.items() if t == wanted]))
     yield from _conditions(node.get("when"), types)
+    below = list(types)[list(types).index(name) :]
+    for other in raw.get("when", {}):
+        if other in below:
+            yield _misplaced(node, "when", f"'{name}' is above '{other}', on which it depends", "put it below")
     yield from _default(name, node, raw)
 
 
