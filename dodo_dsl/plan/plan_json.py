@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import re
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
@@ -114,6 +115,7 @@ def _problem(plan: Plan) -> str:
         "shared file": all(_is_inside(path) and is_shared_name(name) for path, name in plan.shared.items()),
         "import path": not any("\0" in path for path in plan.import_paths),
         "goal": all(map(is_goal, plan.goals)),
+        "baseline": all(math.isfinite(each.value) and each.tolerance >= 0 for each in plan.baseline),
         "service name": all(_NAME.fullmatch(s.name) for s in services),
         "service layer": all(s.layer in LAYERS for s in plan.services),
         "flag": all(f.kind not in ("path", "report") or _is_inside(f.value) for s in plan.services for f in s.flags),

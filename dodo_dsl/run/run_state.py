@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.check.senders import told_in_words
-from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse
+from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse, against_baseline
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
@@ -24,6 +24,7 @@ from dodo_dsl.run.outcomes import (
     outcome_of,
     unstartable,
     windowless,
+    worse,
 )
 from dodo_dsl.run.protocol import (
     Backend,
@@ -286,10 +287,13 @@ class RunState:
         plan = self.plan
         answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
         use = judgement.judged_use(self.resources, plan.resources)
-        considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
+        verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
+        judged = [check for verdict in verdicts for check in verdict.checks]
+        base = tuple(against_baseline(judged, plan.baseline))
+        findings = (*answers.findings, *use.findings, *worse(base))
+        considered = consider(decide(self.facts, findings), self._load())
         found = self._explained(self._elsewhere(self._timed(considered.finding)))
         finding = self._without_display(self._with_told(self._with_printed(found)))
-        verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
             outcome_of(plan, finding, backend.name, backend.cid),
@@ -297,7 +301,7 @@ class RunState:
             execution_s=None if self.finished is None or self.began is None else self.finished - self.began,
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
-            checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks, *use.checks),
+            checks=(*judged, *answers.checks, *use.checks, *(check for check, _ in base)),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
             notes=(
