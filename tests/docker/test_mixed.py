@@ -18,7 +18,7 @@ from dodo_dsl.run.mixed import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.docker.compose import SUBNETS, Crate
-from tests.docker.test_started_anywhere import ODD
+from tests.docker.test_started_anywhere import WITHOUT_COLON
 from tests.faults import Book
 from tests.run.desk import ROOT
 from tests.run.faults import Fault, as_told, faults_on
@@ -104,7 +104,7 @@ def test_default_without_images_of_dodo(tmp_path: Path) -> None:
 
     It writes into a copy of its folder, whose name is odd.
     """
-    tmp_path /= ODD
+    tmp_path /= WITHOUT_COLON
     tmp_path.mkdir()
     for name in (TEST, "maps"):
         shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name)

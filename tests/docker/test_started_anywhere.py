@@ -1,6 +1,6 @@
 """Where and how a command is started does not matter on an engine either: the cases in which its paths and users do.
 
-``make test`` has an odd path on both backends: test_builds and test_mixed.
+They are for ``make proof``; ``make test`` has an odd path on both backends: test_builds and test_mixed.
 """
 
 import os
