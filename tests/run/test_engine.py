@@ -38,6 +38,7 @@ from dodo_dsl.run.protocol import (
     Ready,
     Stopped,
     Time,
+    Unmatched,
     Unstartable,
     VerdictEvent,
 )
@@ -696,3 +697,22 @@ def test_a_lower_limit_of_the_shell_is_noted_at_an_early_end(monkeypatch: pytest
     found = begun((1.0, Exited("app", 1)))
     assert (found.outcome, text in found.notes) == ("failed", True)
     assert text not in begun((1.0, FAILED), (1.0, ENDED)).notes
+
+
+@pytest.mark.parametrize(
+    ("event", "never", "reason", "notes"),
+    [
+        (Stopped("unanswered", "no answer to frame 3"), False, "no answer to frame 3; 'app' printed no line", ()),
+        (Stopped("stuck", "service 'camera' is stuck"), True, "service 'camera' is stuck", ()),
+        (FAILED, True, FAILED.reason, ("'app' printed no line",)),
+        (FAILED, False, FAILED.reason, ()),
+        (PASSED, False, PASSED.reason, ()),
+    ],
+)
+def test_what_an_application_printed_in_place_of_an_answer_is_told(
+    event: Event, never: bool, reason: str, notes: tuple[str, ...]
+) -> None:
+    backend = clocked((0.1, Time(0.0, False)), (5.0, event), (5.0, ENDED))
+    backend.printed = (Unmatched("app", "'app' printed no line", never),)
+    found = outcome(backend)
+    assert (found.reason, found.notes) == (reason, notes)
