@@ -74,7 +74,7 @@ def test_the_blocks_of_the_readme_compile_together(newcomer: Path) -> None:
         "hil-camera-scenes",
         "hil-perception",
         "sil-perception",
-        "sil-perception-two-cars",
+        "sil-perception-cars",
     ]
     assert (
         f"skipped shipped tests that do not fit what the application sends and takes: {', '.join(unfed)} (see"
@@ -97,12 +97,12 @@ def test_the_blocks_of_the_readme_compile_together(newcomer: Path) -> None:
                 "hil-camera-scenes",
                 "hil-perception",
                 "sil-perception",
-                "sil-perception-two-cars",
+                "sil-perception-cars",
             ),
         ),
-        ((), ("sil",), ("sil-perception", "sil-perception-two-cars")),
-        (("sil-*",), (), ("sil-perception", "sil-perception-two-cars")),
-        (("sil-*", "sil-my-straight"), (), ("sil-perception", "sil-perception-two-cars")),
+        ((), ("sil",), ("sil-perception", "sil-perception-cars")),
+        (("sil-*",), (), ("sil-perception", "sil-perception-cars")),
+        (("sil-*", "sil-my-straight"), (), ("sil-perception", "sil-perception-cars")),
     ],
 )
 def test_what_is_left_out_keeps_to_what_was_asked_for(

@@ -6,7 +6,7 @@ import pytest
 
 from tests.drive.applications import dodo, kiwi, results
 
-CLOSED, PERCEPTION = "sil-closed-two-cars", "sil-perception-two-cars"
+CLOSED, PERCEPTION = "sil-closed-two-cars", "sil-perception-cars"
 BLIND = (
     "perception.py",
     "        for colour, found in boxes.items()\n",
