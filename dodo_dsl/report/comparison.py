@@ -22,7 +22,7 @@ from dodo_dsl.terminal import printable
 
 _OF_THE_WAY = ("time-to-goal", "to-goal", "gates")
 """What a drive that ends early leaves undone."""
-_ENDING = ("wall-margin", "max-speed", "silence")
+_ENDING = ("wall-margin", "body-margin", "max-speed", "silence")
 """What ends it early."""
 _WORDS = {"min": ("at least", "more than"), "max": ("at most", "less than")}
 """For a limit that may be reached, and for one that may not."""

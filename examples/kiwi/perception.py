@@ -144,7 +144,8 @@ def watch(memory: SharedMemory, session: Session, numbers: Iterator[int], flags:
         frame, found = next(numbers), find(image)
         announce(session, found, frame, sample_time, flags)
         if flags.verbose:
-            print(f"frame {frame}: {len(found)} boxes", flush=True)
+            cars = sum(patch.colour == "car" for patch in found)
+            print(f"frame {frame}: {len(found) - cars} cones{f', {cars} cars' if cars else ''}", flush=True)
 
 
 def main() -> int:

@@ -137,8 +137,11 @@ dodo.map = (function () {
       context.stroke();
       context.font = "11px system-ui, sans-serif";
       context.textAlign = "left";
-      const [x, y] = view.to(pose.x, pose.y);
-      context.fillText(body.name, x + 12, y - 8);
+      const [front, reach] = [Math.max(...body.outline.map(([x]) => x)), Math.max(...body.outline.map(([x, y]) => Math.hypot(x, y)))];
+      trace(context, [view.to(pose.x, pose.y), view.to(pose.x + front * cos, pose.y + front * sin)]);
+      context.stroke();
+      const [x, y] = view.to(pose.x + reach, pose.y);
+      context.fillText(body.name, x + 4, y + 4);
     }
   }
 

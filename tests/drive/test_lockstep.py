@@ -163,10 +163,11 @@ def test_the_judge_counts_test_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.proof
-def test_repeated_under_load_it_is_the_same() -> None:
+@pytest.mark.parametrize("name", [CURVE, "sil-closed-two-cars"])
+def test_repeated_under_load_it_is_the_same(name: str) -> None:
     """Verdict, way and pictures of a run alone and of one beside processes that take all of the processor."""
-    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), CURVE, "2", "10"]
+    command = [sys.executable, str(ROOT / "scripts" / "repeat-lockstep"), name, "2", "10"]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=600)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "  0 burners  " in result.stdout and "  3 burners  " in result.stdout
-    assert f"{CURVE}: 2 of 2 runs gave " in result.stdout
+    assert f"{name}: 2 of 2 runs gave " in result.stdout

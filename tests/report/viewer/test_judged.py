@@ -10,6 +10,7 @@ import pytest
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import from_json
+from dodo_dsl.report.trajectory import Way, read_drive
 from dodo_dsl.report.viewer import encoded, page
 from dodo_dsl.report.viewer.record import JudgedRecord, read
 from services.base import Judged, JudgedBoxes
@@ -120,3 +121,25 @@ def test_lines_of_the_map_have_roles(tmp_path: Path) -> None:
     assert (shown["length"], shown["width"], shown["frame"]["sender"]) == (0.36, 0.16, 0)
     other = replace(way, roles={})
     assert {line["role"] for line in page.scene(whole, tmp_path, other)["lines"]} == {"other"}
+
+
+def test_other_vehicles_are_known_by_their_stamps(tmp_path: Path) -> None:
+    """But for the own one; their outlines have x ahead."""
+    (tmp_path / "files").symlink_to(ROOT / "tests_registry")
+    whole = plan("sil-closed-two-cars")
+    (body,) = page.scene(whole, tmp_path, Way(frame=0))["bodies"]
+    assert (body["name"], body["sender"], body["colour"]) == ("kiwi", 1, [0.75, 0.1, 0.6])
+    xs, ys = zip(*body["outline"], strict=True)
+    assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((-0.18, 0.18, -0.08, 0.08))
+    assert [each["sender"] for each in page.scene(whole, tmp_path, Way(frame=1))["bodies"]] == [0]
+    assert page.scene(plan("sil-closed-straight"), tmp_path, Way())["bodies"] == []
+
+
+def test_the_way_is_that_of_one_sender(tmp_path: Path) -> None:
+    """Of the judged vehicle, or else of the first; another vehicle's frames lie between."""
+    (tmp_path / "files").symlink_to(ROOT / "tests_registry")
+    frames = [(n / 10, "opendlv.sim.Frame", 3 * (n % 2), {"x": float(n % 2), "qw": 1.0}) for n in range(6)]
+    drives.record(tmp_path / "test.rec", drives.MadeDrive("sil-closed-two-cars", 1.0, frames, {}))
+    for sender, x in ((3, 1.0), (0, 0.0), (7, 0.0)):
+        found = read_drive(plan("sil-closed-two-cars"), tmp_path, tmp_path / "test.rec", Way(frame=sender))
+        assert found is not None and [place[0] for place in found.path] == [x] * 3
