@@ -12,13 +12,24 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from dodo_dsl.opendlv.assets.map_file import FRAME_TURN, BlockEntry, Instance, Line, MapFile, ModelEntry, read_map
+from dodo_dsl.opendlv.assets.map_file import (
+    FRAME_TURN,
+    BlockEntry,
+    Instance,
+    Line,
+    MapFile,
+    ModelEntry,
+    read_map,
+    read_obstacles,
+)
 from services.scene.meshes import Indices, is_closed, load_obj
 from services.scene.scene import picked_lines
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.intp]
 
+EVERY = "*"
+"""As a wall: all obstacles."""
 _SLACK = 1e-9
 """By how much of its length a segment counts as longer, so that no ray slips through between two of them."""
 _HEIGHTS = 64
@@ -200,10 +211,13 @@ class Outlines:
     """All that stands in a map, and what moves in it: models at the frames of sender stamps."""
 
     def __init__(self, path: Path, walls: Sequence[str] = (), own: int | None = None) -> None:
-        """``walls`` are obstacles whose lines stop rays; the model at the frame ``own`` is the vehicle itself, which
-        its sensors do not see. Raises MapError."""
+        """``walls`` are obstacles whose lines stop rays, ``*`` for all.
+
+        The model at the frame ``own`` is the vehicle itself, which its sensors do not see. Raises MapError.
+        """
         self._map: MapFile = read_map(path)
-        self._walls: list[Line] = picked_lines(path, walls)
+        names = list(read_obstacles(self._map.path)) if EVERY in walls else walls
+        self._walls: list[Line] = picked_lines(path, names)
         files = dict.fromkeys(model.file for model in self._map.models)
         self._meshes = {file: Mesh.load(file) for file in files}
         self.moving: dict[int, Mesh] = dict(self._moving(own))
