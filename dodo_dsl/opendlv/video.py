@@ -66,10 +66,13 @@ class VideoDecoder:
         self._codec.thread_type = "SLICE"  # a frame comes with its packet, not some packets later
         self._codec.flags |= self._av.codec.context.Flags.low_delay
         self._begun = False
+        self.early = 0
+        """Packets that came before the first key frame."""
 
     def decode(self, packet: bytes) -> DecodedFrame | None:
         """The frame of a packet, or None."""
         if not packet or not (self._begun or self._begins(packet)):
+            self.early += bool(packet)
             return None
         try:
             frames = self._codec.decode(self._av.Packet(packet))

@@ -77,6 +77,10 @@ def decoded(
                 reasons.add(str(error))
                 problem(str(error))
         yield packet, frame
+    for (sender, _), decoder in decoders.items():
+        if early := decoder.early:
+            come = "packet of camera {} comes" if early == 1 else "packets of camera {} come"
+            problem(f"{early} {come.format(sender)} before the first key frame, and so cannot be decoded")
 
 
 def write_picture(path: Path, frame: DecodedFrame) -> None:

@@ -91,8 +91,10 @@ class Replay(Service):
         """Log what could not be played."""
         if self._too_large:
             _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
-        if self._stream.decoder.undecoded:
-            _log.warning("%d pictures could not be decoded and were not shown", self._stream.decoder.undecoded)
+        if lost := self._stream.decoder.undecoded:
+            early = self._stream.decoder.early
+            why = f": {early} came before the first key frame" if early else ""
+            _log.warning("%d pictures could not be decoded and were not shown%s", lost, why)
         if self._memories is not None:
             _log.info("%d pictures were shown", self._memories.shown)
 

@@ -30,10 +30,13 @@ class RecordedPicture(NamedTuple):
 
 
 class Decoder:
-    """Decodes one camera's ImageReading messages in their order; `undecoded` counts those that gave no picture."""
+    """Decodes one camera's ImageReading messages in their order; `undecoded` counts those that gave no picture.
+
+    ``early`` are those of them that came before the first key frame.
+    """
 
     def __init__(self) -> None:
-        self.undecoded = 0
+        self.undecoded = self.early = 0
         self._messages = MessageSet.standard()
         self._format = ""
         self._codec: VideoDecoder | None = None
@@ -50,7 +53,9 @@ class Decoder:
             refuse_large(image.width, image.height)
             if self._codec is None or image.format != self._format:
                 self._codec, self._format = VideoDecoder(image.format), image.format
+            before = self._codec.early
             frame = self._codec.decode(image.data)
+            self.early += self._codec.early - before
         self.undecoded += frame is None
         return frame
 
@@ -80,7 +85,8 @@ def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
         frame = decoder.frame(envelope)
         if frame is not None:
             return frame
-    raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded")
+    why = ": there is no key frame among them" if decoder.early == len(rows) else ""
+    raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded{why}")
 
 
 def lead_in(recording: Recording, rows: Numbers, before: int) -> Iterator[Envelope]:
@@ -150,10 +156,10 @@ class EntryStream:
         self.decoder.restart()
         before = int(np.searchsorted(self._images, position))
         if before and before < len(self._images):
-            undecoded = self.decoder.undecoded
+            undecoded, early = self.decoder.undecoded, self.decoder.early
             for envelope in lead_in(self._recording, self._part.rows[self._images], before):
                 self._decoded(envelope)
-            self.decoder.undecoded = undecoded
+            self.decoder.undecoded, self.decoder.early = undecoded, early
 
     def prepare(self) -> None:
         """Read the next entry and decode its picture, before it is due."""

@@ -100,7 +100,8 @@ def test_a_truth_that_is_none(drive: Path, tmp_path: Path, content: str, words: 
 def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_path: Path) -> None:
     path = record([*video(12)[2:], *cone(BEGIN + 700_000, 0, "yellow", 0.25)])
     answer = dodo_rec("export", path, "--coco", "-o", tmp_path / "set")
-    assert (answer.code, answer.stderr) == (0, "dodo rec: 3 of 10 packets cannot be decoded\n")
+    told = "dodo rec: 3 packets of camera 0 come before the first key frame, and so cannot be decoded\n"
+    assert (answer.code, answer.stderr) == (0, f"{told}dodo rec: 3 of 10 packets cannot be decoded\n")
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,7 @@ def test_recordings_that_cannot_be_played(tmp_path: Path) -> None:
         empty: f"{empty} is empty: there is nothing to play",
         garbage: f"{garbage} is not a recording: its 19 bytes hold no message",
         others: f"{others} has no pictures of sender 0, but of 3: set --video-sender",
-        undecodable: f"none of the 1 pictures in {undecodable} can be decoded",
+        undecodable: f"none of the 1 pictures in {undecodable} can be decoded: there is no key frame among them",
         tmp_path / "none.rec": f"[Errno 2] No such file or directory: '{tmp_path / 'none.rec'}'",
     }
     for path, problem in problems.items():

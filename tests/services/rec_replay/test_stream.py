@@ -64,14 +64,14 @@ def test_pictures_that_cannot_be_decoded_are_counted(tmp_path: Path) -> None:
     with Recording(write(tmp_path / "bad.rec", [*broken, strange])) as recording:
         one = stream(recording)
         assert shown(one) == [None, None, 4, 5, None]
-        assert one.decoder.undecoded == 3
+        assert (one.decoder.undecoded, one.decoder.early) == (3, 2)
 
 
 def test_a_recording_without_a_decodable_picture(tmp_path: Path) -> None:
     path = write(tmp_path / "bad.rec", images([0, 0.1])[1:])
     with Recording(path) as recording, pytest.raises(VideoError) as caught:
         first_frame(recording, np.array([0]))
-    assert str(caught.value) == f"none of the 1 pictures in {path} can be decoded"
+    assert str(caught.value) == f"none of the 1 pictures in {path} can be decoded: there is no key frame among them"
 
 
 def test_memories_are_in_their_formats(path: Path) -> None:
