@@ -85,9 +85,9 @@ test:
 		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status
 
 proof: dev tools
-	@rm -f $(JUNIT)/proof.xml; status=0; \
+	@rm -f $(JUNIT)/proof.xml $(JUNIT)/search.xml; status=0; \
 		$(PYTEST) -m proof --session-timeout=$(PROOF_S) --junitxml=$(JUNIT)/proof.xml || status=$$?; \
-		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search || status=$$?; \
+		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search --junitxml=$(JUNIT)/search.xml || status=$$?; \
 		.venv/bin/python scripts/slowest-tests --held $(JUNIT)/proof.xml; exit $$status
 
 first: realtime-tests fast-tests
