@@ -200,11 +200,9 @@ class SignalMeasures:
     def checks(self, limits: SignalLimits) -> tuple[Check, ...]:
         """Each measure with its limit; one that has no value does not keep a limit."""
         shares = [("share", self.share, limits.share)] if limits.band is not None else []
-        frames = (
-            ("frame-share", self.frame_share, limits.frame_share),
-            ("sign-share", self.sign_share, limits.sign_share),
-        )
-        shares += [each for each in frames if each[2] is not None]
+        by_frames = (("frame-share", self.frame_share), ("sign-share", self.sign_share))
+        wanted = (limits.frame_share, limits.sign_share)
+        shares += [(*each, limit) for each, limit in zip(by_frames, wanted, strict=True) if limit is not None]
         held, gap = (self.coverage.share, self.coverage.gap) if self.coverage else (None, None)
         longest = None if limits.gap is None else limits.gap / MICROSECONDS
         lag = () if limits.lag is None else (_check("lag", self.lag, "max", limits.lag, "s"),)
