@@ -22,6 +22,7 @@ from dodo_dsl.spec.model import LEVEL_WORDS
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)
+PERCEPTIONS = ("sil-empty-pictures", "sil-perception", "sil-perception-cars")
 
 
 def block(word: str) -> str:
@@ -76,9 +77,6 @@ def test_the_blocks_of_the_readme_compile_together(newcomer: Path) -> None:
     compiled = {path.parent.name.partition("--")[0] for path in newcomer.glob("generated/*/test.json")}
     shipped = {path.parent.name for path in (ROOT / "tests_registry").glob("*/*.dodo.yml")}
     assert compiled == {"sil-my-straight", *shipped} - {*unfed}
-
-
-PERCEPTIONS = ("sil-empty-pictures", "sil-perception", "sil-perception-cars")
 
 
 @pytest.mark.parametrize(
