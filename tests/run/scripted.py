@@ -96,6 +96,7 @@ class ScriptedBackend:
     """What services of the application have used, as ``loads``."""
     listens: Mapping[str, float] | None = None
     """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
+    printed: tuple[Unmatched, ...] = ()
 
     def __post_init__(self) -> None:
         self.cid = self.plan.cid + 1
@@ -138,7 +139,7 @@ class ScriptedBackend:
         return ["look inside"] if keep else []
 
     def unmatched(self) -> tuple[Unmatched, ...]:
-        return ()
+        return self.printed
 
     def tail(self, service: str) -> list[str]:
         return self.tails.get(service, [])

@@ -39,6 +39,7 @@ from dodo_dsl.run.protocol import (
     Ready,
     Stopped,
     Time,
+    Unmatched,
     Unstartable,
     VerdictEvent,
 )
@@ -723,3 +724,22 @@ def test_nobody_looks_for_buses_on_the_machine_s_own_network(monkeypatch: pytest
     said = "nothing came; the test is on CID 130"
     events = {**READY, "begin": [(3.0, VerdictEvent("track", False, said, ())), (3.1, ENDED)]}
     assert outcome(ScriptedBackend(plan(), events, is_on_host=True)).reason == said
+
+
+@pytest.mark.parametrize(
+    ("event", "never", "reason", "notes"),
+    [
+        (Stopped("unanswered", "no answer to frame 3"), False, "no answer to frame 3; 'app' printed no line", ()),
+        (Stopped("stuck", "service 'camera' is stuck"), True, "service 'camera' is stuck", ()),
+        (FAILED, True, FAILED.reason, ("'app' printed no line",)),
+        (FAILED, False, FAILED.reason, ()),
+        (PASSED, False, PASSED.reason, ()),
+    ],
+)
+def test_what_an_application_printed_in_place_of_an_answer_is_told(
+    event: Event, never: bool, reason: str, notes: tuple[str, ...]
+) -> None:
+    backend = clocked((0.1, Time(0.0, False)), (5.0, event), (5.0, ENDED))
+    backend.printed = (Unmatched("app", "'app' printed no line", never),)
+    found = outcome(backend)
+    assert (found.reason, found.notes) == (reason, notes)
