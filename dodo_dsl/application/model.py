@@ -16,7 +16,6 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.application.host_access import is_true
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
-from dodo_dsl.application.printed_lines import PrintedLine, printed_lines
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -29,6 +28,22 @@ KEYS = ("x-dodo", "x-dodo-process")
 _ABOUT_NO_MESSAGES = {"tune", "cid", "display"}
 
 Word = tuple[str, Span]
+
+
+@dataclass(frozen=True)
+class PrintedLine:
+    """A pattern, and the message under a sender stamp that a line becomes in which it is found, with their places."""
+
+    match: str
+    match_span: Span
+    message: str
+    message_span: Span
+    sender: int = 0
+
+    @property
+    def port(self) -> str:
+        """The message as other keys of ``x-dodo`` name it."""
+        return f"{self.message}/{self.sender}" if self.sender else self.message
 
 
 @dataclass(frozen=True)
@@ -192,6 +207,23 @@ def declared(service: source.Mapping) -> Declared | None:
     sent = {name.removesuffix("/0") for name, _ in outputs}
     printed = {line.port: (line.port, line.message_span) for line in lines if line.port not in sent}
     return Declared(inputs, (*outputs, *printed.values()), answers, done[0] if done else None, count, entry.key, lines)
+
+
+def printed_lines(node: Node | None) -> tuple[PrintedLine, ...]:
+    """The ``lines`` of a service, as far as they fit the schema; ``$$`` is a dollar sign, as everywhere in compose."""
+    items = node.items if isinstance(node, source.Sequence) else ()
+    found = (_printed_line(item) for item in items)
+    return tuple(line for line in found if line is not None)
+
+
+def _printed_line(node: Node) -> PrintedLine | None:
+    if not isinstance(node, source.Mapping):
+        return None
+    match, message, sender = (node.get(key) for key in ("match", "message", "sender"))
+    if not (isinstance(match, Scalar) and isinstance(message, Scalar)):
+        return None
+    stamp = sender.value if isinstance(sender, Scalar) and isinstance(sender.value, int) else 0
+    return PrintedLine(match.text.replace("$$", "$"), match.span, message.text, message.span, stamp)
 
 
 def scalars(node: Node | None) -> list[Scalar]:

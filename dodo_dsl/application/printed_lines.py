@@ -6,14 +6,11 @@ patterns are.
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.application.model import PrintedLine
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.opendlv.odvd import SCALARS, Definition
-from dodo_dsl.source import Mapping as Node
-from dodo_dsl.source import Node as AnyNode
-from dodo_dsl.source import Scalar, Sequence
 
 LINES_RULE = "application-lines"
 SAMPLE_TIME = "sample_time"
@@ -21,22 +18,6 @@ SAMPLE_TIME = "sample_time"
 _SYNTAX = "patterns are those of RE2, https://github.com/google/re2/wiki/Syntax"
 _MAX_MEMORY = 8 << 20
 _PLAIN_GROUP = re.compile(r"(?<!\\)(?:\\\\)*\((?!\?)")
-
-
-@dataclass(frozen=True)
-class PrintedLine:
-    """A pattern, and the message under a sender stamp that a line becomes in which it is found, with their places."""
-
-    match: str
-    match_span: Span
-    message: str
-    message_span: Span
-    sender: int = 0
-
-    @property
-    def port(self) -> str:
-        """The message as other keys of ``x-dodo`` name it."""
-        return f"{self.message}/{self.sender}" if self.sender else self.message
 
 
 class PatternError(ValueError):
@@ -56,23 +37,6 @@ def compiled(pattern: str) -> Any:
         raise PatternError(text.decode(errors="replace") if isinstance(text, bytes) else str(text)) from None
     except UnicodeEncodeError:
         raise PatternError("it is no text in UTF-8") from None
-
-
-def printed_lines(node: AnyNode | None) -> tuple[PrintedLine, ...]:
-    """The ``lines`` of a service, as far as they fit the schema; ``$$`` is a dollar sign, as everywhere in compose."""
-    items = node.items if isinstance(node, Sequence) else ()
-    found = (_printed_line(item) for item in items)
-    return tuple(line for line in found if line is not None)
-
-
-def _printed_line(node: AnyNode) -> PrintedLine | None:
-    if not isinstance(node, Node):
-        return None
-    match, message, sender = (node.get(key) for key in ("match", "message", "sender"))
-    if not (isinstance(match, Scalar) and isinstance(message, Scalar)):
-        return None
-    stamp = sender.value if isinstance(sender, Scalar) and isinstance(sender.value, int) else 0
-    return PrintedLine(match.text.replace("$$", "$"), match.span, message.text, message.span, stamp)
 
 
 def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterator[Diagnostic]:

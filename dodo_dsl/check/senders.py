@@ -23,8 +23,8 @@ def senders(test: ResolvedTest) -> tuple[str, ...]:
         for port in _guarded(end.port, wiring):
             table.setdefault(port, sorted({each.service for each in wiring.producers(port)}))
     for end in wiring.printed:
-        table.setdefault(end.port, []).append(LINES)
-        table[end.port] = sorted(set(table[end.port]))
+        if not wiring.judges_by(end.port):
+            table[end.port] = [LINES]
     sources = sorted(use.name for use in test.spec.uses if use.layer in SENDING_LAYERS)
     table[Port("message", END_OF_INPUT)] = sources
     words = (

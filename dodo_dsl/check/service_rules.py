@@ -17,7 +17,7 @@ import math
 from collections.abc import Collection, Iterator
 from pathlib import PurePath
 
-from dodo_dsl.application.printed_lines import line_problems
+from dodo_dsl.application.model import PrintedLine
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import known_messages
 from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
@@ -152,7 +152,15 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
     for own in declared:
         for name, span in (*own.inputs, *own.outputs, *own.answers) if own else ():
             yield from _known(context, name.partition("/")[0], span)
-        for line in own.lines if own else ():
+        yield from _lines(context, own.lines if own else ())
+
+
+def _lines(context: RuleContext, lines: Collection[PrintedLine]) -> Iterator[Diagnostic]:
+    """What is wrong with lines that become messages; what reads patterns is loaded where there are any."""
+    if lines:
+        from dodo_dsl.application.printed_lines import line_problems
+
+        for line in lines:
             yield from line_problems(line, known_messages(context.deployment.messages))
 
 

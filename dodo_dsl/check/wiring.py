@@ -88,6 +88,11 @@ class Wiring:
         """Whether the application is judged by it, and services of the test produce it."""
         return port.truth and bool(self.producers(port))
 
+    def judges_by(self, port: Port) -> str:
+        """The service that judges the application by a message; empty if none does."""
+        found = (end.service for end in self.consumed if self.is_truth(end.port) and end.port.consumes(port))
+        return next(found, "")
+
     def application_may_produce(self, port: Port) -> bool:
         """Whether the application declares it, or could produce it because it does not declare everything."""
         if not port.can_be_required:

@@ -111,9 +111,9 @@ def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
 def _judged(wiring: Wiring) -> Iterator[Diagnostic]:
     """What the application prints and is judged by, under any stamp: the same as a second producer."""
     for end in wiring.printed:
-        truths = [each for each in wiring.consumed if wiring.is_truth(each.port) and each.port.consumes(end.port)]
-        if truths and all(other.port != end.port for other in wiring.produced):
-            message = f"the application's '{end.service}' prints {end.port}, by which '{truths[0].service}' judges it"
+        judge = wiring.judges_by(end.port)
+        if judge and all(other.port != end.port for other in wiring.produced):
+            message = f"the application's '{end.service}' prints {end.port}, by which '{judge}' judges it"
             yield Diagnostic(end.span, "two-producers", message, "name another message, or another sender")
 
 

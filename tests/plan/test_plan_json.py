@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 
-from dodo_dsl.plan.model import Lockstep, Plan
+from dodo_dsl.plan.model import ApplicationService, Line, Lockstep, Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json, to_json
 from dodo_dsl.spec.load import Settings
 from tests.plan.plans import BASE, plans
@@ -157,3 +157,14 @@ def test_a_missing_or_an_unknown_key(key: str) -> None:
     del found[key]
     refused(found)
     refused({**document(), f"{key}x": 1})
+
+
+def test_lines_are_written_where_there_are_some() -> None:
+    """So that plans without them are as before."""
+    service = ApplicationService("app", lines=(Line("(?P<x>.)", "a.B", 2),))
+    plan = replace(BASE, application=replace(BASE.application, services=(service,)))
+    assert from_json(to_json(plan)) == plan
+    assert '"lines"' not in to_json(BASE)
+    wrong = to_json(plan).replace('"sender": 2', '"sender": -1')
+    with pytest.raises(PlanError, match="wrong line"):
+        from_json(wrong)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dodo_dsl.application.read import read_application
-from dodo_dsl.plan.model import Application
+from dodo_dsl.plan.model import Application, Line
 from dodo_dsl.plan.rewrite.rewrite import plan_application
 from dodo_dsl.plan.rewrite.service_copy import Setting
 from tests.plan.rewrite.copies import CONFINED
@@ -137,3 +137,16 @@ services:
         "d": {"e": started},
         "e": {},
     }
+
+
+def test_what_prints_messages_has_a_terminal(tmp_path: Path) -> None:
+    lines = "[{match: '(?P<position>.)$', message: opendlv.proxy.PedalPositionRequest, sender: 2}]"
+    text = f"""services:
+  a: {{image: a, command: --cid=111, tty: false, x-dodo: {{lines: {lines}}}}}
+  b: {{image: b, x-dodo: {{out: []}}}}
+"""
+    application = planned(tmp_path, text)
+    assert [service.get("tty") for service in application.compose["services"].values()] == [True, None]
+    assert "a: tty: true, as programs print each line at once to a terminal" in application.changes
+    line = Line("(?P<position>.)$", "opendlv.proxy.PedalPositionRequest", 2)
+    assert [service.lines for service in application.services] == [(line,), ()]
