@@ -48,7 +48,7 @@ style: dev
 	PYTHONPATH=. .venv/bin/lint-imports
 
 types: dev
-	.venv/bin/mypy
+	$(BESIDE) .venv/bin/mypy
 
 quick-tests: dev
 	$(PYTEST) -n $(WORKERS) -m "not slow and not thorough" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
@@ -79,7 +79,7 @@ check:
 	@$(MAKE) --no-print-directory -j 3 style types quick-tests
 
 test:
-	@$(MAKE) --no-print-directory -j 4 style types tools compiled-tests
+	@$(MAKE) --no-print-directory -j 3 style tools compiled-tests
 	@status=0; rm -f $(JUNIT)/*.xml; for part in first second; do \
 		$(MAKE) --no-print-directory -j 3 --keep-going --output-sync=target $$part || status=$$?; done; \
 		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status
@@ -90,7 +90,8 @@ proof: dev tools
 		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search --junitxml=$(JUNIT)/search.xml || status=$$?; \
 		.venv/bin/python scripts/slowest-tests --held $(JUNIT)/proof.xml; exit $$status
 
-first: realtime-tests fast-tests
+first: BESIDE = $(BEHIND)
+first: realtime-tests fast-tests types
 
 second: engine-tests slow-tests
 

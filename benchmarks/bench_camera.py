@@ -2,8 +2,9 @@
 
     python benchmarks/bench_camera.py [FOLDER]
 
-Both draw the same drive, in turns; each picture ends in memory. FOLDER keeps the pictures of both. The cost of each
-condition follows, alone. Without moderngl or EGL only the virtual camera is measured.
+Both draw the same drive, in turns; each picture ends in memory. FOLDER keeps the pictures of both. The same with a maze
+of 136 textured blocks follows, and the cost of each condition, alone. Without moderngl or EGL only the virtual camera
+is measured.
 """
 
 import json
@@ -15,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -68,15 +70,48 @@ def make_map(folder: Path) -> Path:
     return folder
 
 
+BLOCKS, CELL, CELLS = 136, 0.6, 12
+
+
+def make_maze(folder: Path) -> Path:
+    """Walls of 5 cm to 1 m, 2 cm thick, 15 cm above a floor, on the edges of 12 by 12 cells; a ceiling."""
+    straight = package_data.registry() / "maps" / "straight"
+    shutil.copy(straight / "floor.png", folder / "floor.png")
+    random = np.random.RandomState(36)
+    edges = [(x, y, turn) for x in range(CELLS) for y in range(CELLS) for turn in (0.0, 1.571)]
+    texture = {"textureFile": "floor.png", "textureSize": [1.0, 1.0]}
+    flat = {"dimension": [10.0, 10.0, 0.2], **texture}
+    blocks = [
+        {"name": "floor", **flat, "instances": [[0.0, 0.0, -0.1, 0.0]]},
+        {"name": "ceiling", **flat, "instances": [[0.0, 0.0, 1.9, 0.0]]},
+    ]
+    for number, length in zip(
+        random.permutation(len(edges))[:BLOCKS].tolist(), random.uniform(0.05, 1, BLOCKS), strict=True
+    ):
+        x, y, turn = edges[number]
+        place = [(x + (turn == 0.0) / 2 - CELLS / 2) * CELL, (y + (turn > 0.0) / 2 - CELLS / 2) * CELL, 0.0, turn]
+        blocks.append({"name": "wall", "dimension": [round(length, 2), 0.02, 0.3], **texture, "instances": [place]})
+    (folder / "map.json").write_text(json.dumps({"block": blocks}))
+    return folder
+
+
+def wander() -> list[CameraPose]:
+    """In the middle of cells, looking all round."""
+    random = np.random.RandomState(37)
+    cells, turns = random.randint(0, CELLS, (FRAMES, 2)), random.uniform(-math.pi, math.pi, FRAMES)
+    places = ((cells + 0.5 - CELLS / 2) * CELL).tolist()
+    return [CameraPose.at(x, y, 0.095, yaw=turn) for (x, y), turn in zip(places, turns.tolist(), strict=True)]
+
+
 def drive() -> list[CameraPose]:
     """Along the oval's middle, counter-clockwise."""
     turns = [2 * math.pi * k / FRAMES for k in range(FRAMES)]
     return [CameraPose.at(2 * math.cos(t), 2 * math.sin(t), 0.095, yaw=t + math.pi / 2) for t in turns]
 
 
-def rate(draw: Callable[[CameraPose], object], every: int = 1) -> float:
-    """Pictures a second over the drive, of which every so many are drawn."""
-    start, poses = time.perf_counter(), drive()[::every]
+def rate(draw: Callable[[CameraPose], object], poses: Sequence[CameraPose]) -> float:
+    """Pictures a second from these poses."""
+    start = time.perf_counter()
     for pose in poses:
         draw(pose)
     return len(poses) / (time.perf_counter() - start)
@@ -90,20 +125,34 @@ def peer(folder: Path) -> GlPeer | None:
         return None
 
 
-def speed_row(ours: Sequence[float], **rest: Any) -> Row:
-    return rate_row("virtual camera", "pictures/s", ours, goal=Goal(3), **rest)
+@dataclass(frozen=True)
+class Scenery:
+    """What both draw; ``ratio`` is how many times the peer's rate is to be reached, ``alike`` the least SSIM."""
+
+    what: str
+    make: Callable[[Path], Path]
+    poses: Callable[[], list[CameraPose]]
+    ratio: float
+    alike: float
+
+    def speed(self, ours: Sequence[float], **rest: Any) -> Row:
+        return rate_row(self.what, "pictures/s", ours, goal=Goal(self.ratio), **rest)
+
+    def likeness(self, values: Sequence[float]) -> Row:
+        return rate_row(f"{self.what}, SSIM with the peer at worst", "", values, goal=Goal(self.alike, of="value"))
 
 
-def likeness_row(values: Sequence[float]) -> Row:
-    return rate_row("virtual camera, SSIM with the peer at worst", "", values, goal=Goal(0.95, of="value"))
+OVAL = Scenery("virtual camera", make_map, drive, 3, 0.95)
+MAZE = Scenery(f"virtual camera, {BLOCKS} blocks", make_maze, wander, 1, 0.95)
 
 
 def cost_of(condition: str, ours: Sequence[float], without: Sequence[float]) -> Row:
     return cost_row(f"virtual camera, {condition}", "ms a picture", ours, "no condition", without)
 
 
-def beside(folder: Path, keep: Path | None, budget: Budget) -> None:
+def beside(scenery: Scenery, folder: Path, keep: Path | None, budget: Budget, until: float) -> None:
     """The rates of both in turns, and how alike their pictures are."""
+    poses = scenery.poses()
     camera, gl = Renderer(load_scene(folder), *SIZE, FOVY), peer(folder)
     image = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
 
@@ -116,23 +165,26 @@ def beside(folder: Path, keep: Path | None, budget: Budget) -> None:
         return gl.render(view.position, view.axes)
 
     draws = [ours, theirs] if gl else [ours]
-    columns = list(zip(*([rate(draw) for draw in draws] for _ in budget.rounds(ROUNDS, until=0.4)), strict=True))
+    columns = list(
+        zip(*([rate(draw, poses) for draw in draws] for _ in budget.rounds(ROUNDS, until=until)), strict=True)
+    )
     rest = {"peer": "moderngl on llvmpipe", "theirs": columns[1]} if gl else {"note": NO_PEER}
-    row = speed_row(columns[0], **rest)
+    row = scenery.speed(columns[0], **rest)
     report(row)
-    print(f"virtual-camera {median(row.ours):7.1f} pictures/s")
+    print(f"{scenery.what}\nvirtual-camera {median(row.ours):7.1f} pictures/s")
     if gl is None:
-        plan(likeness_row([]), note=NO_PEER)
+        plan(scenery.likeness([]), note=NO_PEER)
         return
     print(f"moderngl       {median(row.theirs):7.1f} pictures/s on {gl.name}")
-    print(f"ratio          {median(row.ratios):7.2f} (target 3)")
-    alike = [ssim(ours(pose), theirs(pose)) for pose in drive()]
-    report(likeness_row([min(alike)]))
-    print(f"SSIM           {min(alike):7.4f} at worst, {np.mean(alike):.4f} on average (target 0.95)")
+    print(f"ratio          {median(row.ratios):7.2f} (target {scenery.ratio})")
+    alike = [ssim(ours(pose), theirs(pose)) for pose in poses]
+    report(scenery.likeness([min(alike)]))
+    print(f"SSIM           {min(alike):7.4f} at worst, {np.mean(alike):.4f} on average (target {scenery.alike})")
     if keep is not None:
-        for number, pose in enumerate(drive()[::10]):
-            cv2.imwrite(str(keep / f"{number}-virtual-camera.png"), ours(pose))
-            cv2.imwrite(str(keep / f"{number}-moderngl.png"), theirs(pose))
+        for number, pose in enumerate(poses[::10]):
+            name = f"{scenery.make.__name__.removeprefix('make_')}-{number}"
+            cv2.imwrite(str(keep / f"{name}-virtual-camera.png"), ours(pose))
+            cv2.imwrite(str(keep / f"{name}-moderngl.png"), theirs(pose))
 
 
 CONDITIONS: dict[str, tuple[SceneOptions, dict[str, object]]] = {
@@ -167,7 +219,7 @@ def condition(folder: Path, name: str) -> Callable[[CameraPose], object]:
 def costs(folder: Path, budget: Budget) -> Iterator[str]:
     """What each condition adds to a picture, in ms, measured in turns with none."""
     draws = {name: condition(folder, name) for name in CONDITIONS}
-    rounds = [{name: 1000 / rate(draw, 4) for name, draw in draws.items()} for _ in budget.rounds(ROUNDS)]
+    rounds = [{name: 1000 / rate(draw, drive()[::4]) for name, draw in draws.items()} for _ in budget.rounds(ROUNDS)]
     for name in list(CONDITIONS)[1:]:
         report(cost_of(name, [r[name] for r in rounds], [r["nothing"] for r in rounds]))
         added = median(r[name] - r["nothing"] for r in rounds)
@@ -176,9 +228,9 @@ def costs(folder: Path, budget: Budget) -> Iterator[str]:
 
 
 @contextmanager
-def map_folder() -> Iterator[Path]:
+def map_folder(scenery: Scenery) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as name:
-        yield make_map(Path(name))
+        yield scenery.make(Path(name))
 
 
 def main(argv: list[str]) -> int:
@@ -188,11 +240,14 @@ def main(argv: list[str]) -> int:
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     budget = Budget.given()
-    first, others = [speed_row([]), likeness_row([])], [cost_of(name, [], []) for name in list(CONDITIONS)[1:]]
-    plan(*first, *others)
-    with map_folder() as folder:
+    first, maze = ([each.speed([]), each.likeness([])] for each in (OVAL, MAZE))
+    others = [cost_of(name, [], []) for name in list(CONDITIONS)[1:]]
+    plan(*first, *maze, *others)
+    with map_folder(MAZE) as walls, map_folder(OVAL) as folder:
         with attempt(*first):
-            beside(folder, keep, budget)
+            beside(OVAL, folder, keep, budget, 0.3)
+        with attempt(*maze):
+            beside(MAZE, walls, keep, budget, 0.5)
         with attempt(*others):
             for line in costs(folder, budget):
                 print(line)

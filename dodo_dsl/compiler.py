@@ -137,7 +137,9 @@ def load(
     loaded = sources.load(locations)
     source = None
     if files := application or deployment.application:
-        source, of_application = read_application(files, access(deployment), deployment.sandbox, reader)
+        source, of_application = read_application(
+            files, access(deployment), deployment.sandbox, reader, deployment.declarations
+        )
         found = [*found, *of_application, *(unseen_problems(source, deployment) if source else ())]
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]

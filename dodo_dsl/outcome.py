@@ -2,11 +2,12 @@
 
 import math
 import sys
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dodo_dsl.spec.model import Goal
+from dodo_dsl.spec.model import BASELINE, Goal, RecordedValue
 
 Result = Literal["passed", "failed", "error"]
 NEXT_REPORT = ".next-"
@@ -217,6 +218,32 @@ def failed_checks(outcome: Outcome) -> tuple[str, ...]:
     """The names of the checks that failed, but for those that differ from run to run."""
     names = {check["name"] for check in outcome.checks if not check["ok"]}
     return tuple(sorted(name for name in names if not differs_each_run(name)))
+
+
+def against_baseline(
+    checks: Sequence[Mapping[str, Any]], baseline: Sequence[RecordedValue]
+) -> Iterator[tuple[dict[str, Any], RecordedValue]]:
+    """A check for each recorded value whose check has a limit now: on that side it may be worse by the tolerance only.
+
+    The tolerance is a share of the recorded value, or where that is 0 of the limit. Of two limits the nearer one to
+    the recorded value counts. What differs from run to run does not count.
+    """
+    counts: Counter[str] = Counter()
+    found = {}
+    for check in checks:
+        found[check["name"], counts[check["name"]]] = check
+        counts[check["name"]] += 1
+    for before in baseline:
+        now = found.get((before.check, before.number))
+        if now is None or not now["limit"] or differs_each_run(before.check):
+            continue
+        side, limit = min(now["limit"].items(), key=lambda pair: abs(pair[1] - before.value))
+        allowed = before.tolerance * (abs(before.value) or abs(limit))
+        bound = before.value + allowed if side == "max" else before.value - allowed
+        value = now["value"]
+        ok = value is not None and (value <= bound if side == "max" else value >= bound)
+        check = {"name": BASELINE + before.check, "value": value, "limit": {side: bound}, "unit": now["unit"], "ok": ok}
+        yield with_margin(check), before
 
 
 def _margin(check: Mapping[str, Any]) -> float | None:

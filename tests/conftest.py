@@ -17,7 +17,7 @@ from dodo_dsl.terminal import WIDE
 from tests.faults import Book
 
 settings.register_profile("search", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("dodo", settings.get_profile("search"), derandomize=True)
+settings.register_profile("dodo", settings.get_profile("search"), derandomize=True, max_examples=25)
 settings.register_profile("quick", settings.get_profile("dodo"), max_examples=20)
 settings.load_profile("dodo")  # the same examples each time: chance and the machine's speed decide no test
 

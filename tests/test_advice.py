@@ -105,11 +105,17 @@ def test_in_the_environment_of_a_checkout_its_set_up_is_named(monkeypatch: pytes
     assert os.access(command, os.X_OK)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("extra", ["storage"])
 def test_elsewhere_pip_gets_the_checkout_with_the_extra(extra: str) -> None:
+    assert f"{ROOT}[{extra}]" in advice.install(extra)
+    assert re.search(rf"^{extra} = \[", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.parametrize("extra", ["storage"])
+def test_pip_takes_the_command(extra: str) -> None:
     command = advice.install(extra)
-    assert f"{ROOT}[{extra}]" in command
     dry = ["--dry-run", "--no-index", "--no-build-isolation", "--disable-pip-version-check"]
     done = subprocess.run([*shlex.split(command), *dry], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

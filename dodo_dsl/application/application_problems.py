@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application import host_access, opendlv_flags
+from dodo_dsl.application import host_access, opendlv_flags, stack
 from dodo_dsl.application.access.findings import service_findings
 from dodo_dsl.application.access.model import Look, diagnostic, place
 from dodo_dsl.application.compose_paths import is_local
@@ -29,13 +29,14 @@ from dodo_dsl.application.model import (
 )
 from dodo_dsl.application.mounts import missing_folders, nested_mounts
 from dodo_dsl.application.slips import cid_slips, missing_program
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
 
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 
 _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
+_GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
 _LONGEST_HOST = 64
 """Bytes of a host's name, and of its domain's (utsname(7))."""
 _LONGEST_TEXT = 131_072
@@ -52,16 +53,18 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         return
     volumes = plain(application.rest["volumes"]) if "volumes" in application.rest else {}
     found: list[Diagnostic] = []
-    for service in application.services.values():
-        found.extend(problems(Written.of(service, application, volumes or {})))
-        found.extend(_missing_files(service, application))
-        found.extend(_missing_folder(service, application))
-        found.extend(missing_program(service, application.folder))
+    of_stack = stack.parts(application)
+    for name, service in application.services.items():
+        own = [*problems(Written.of(service, application, volumes or {})), *_missing_files(service, application)]
+        own += [*_missing_folder(service, application), *missing_program(service, application.folder)]
+        part = of_stack.get(name)
+        found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(nested_mounts(application))
     found.extend(missing_folders(application))
     found.extend(_cycles(application))
     found.extend(_never_healthy(application))
     found.extend(_same_variable(application))
+    found.extend(_several_cids(application))
     yield from found
     if not has_errors(found):
         yield from _without_cid(application)
@@ -147,23 +150,35 @@ def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
             yield Diagnostic(application.services[name].span, "application-file", message, "rename one of them")
 
 
+def _several_cids(application: ApplicationSource) -> Iterator[Diagnostic]:
+    for cid in application.cids:
+        first = application.cids[0]
+        if cid.value != first.value:
+            place = f"{shown_path(first.span.file)}:{first.span.line}"
+            message = f"'cid' is {cid.text}, and {first.text} in {place}: a test has one bus"
+            yield Diagnostic(cid.span, "application-cid", message, "declare the same one, or none where it is a flag")
+
+
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Warnings of flags that give no CID, of services with messages that take none, and of none that does."""
     services = application.services.values()
-    slips = {service.name: list(cid_slips(service, _takes_cid(service))) for service in services}
+    slips = {service.name: list(cid_slips(service, takes_cid(service))) for service in services}
     yield from (slip for found in slips.values() for slip in found)
-    without = [service for service in services if not slips[service.name] and not _takes_cid(service)]
+    if application.cid is not None:
+        return
+    without = [service for service in services if not slips[service.name] and not takes_cid(service)]
     if len(without) == len(services):
         message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
-        yield Diagnostic(without[0].span, "application-cid", message, "add --cid=111 to its command", "warning")
+        yield Diagnostic(without[0].span, "application-cid", message, _GIVE_CID, "warning")
         return
     for service in without:
         if service.declared and (service.declared.inputs or service.declared.outputs):
             message = f"'{service.name}' has messages, but takes no CID (--cid=, CID or OD4SESSION_CID)"
-            yield Diagnostic(service.span, "application-cid", message, "add --cid=111 to its command", "warning")
+            yield Diagnostic(service.span, "application-cid", message, _GIVE_CID, "warning")
 
 
-def _takes_cid(service: ComposeService) -> bool:
+def takes_cid(service: ComposeService) -> bool:
+    """Whether the CID of a service can be set."""
     raw = plain(service.node)
     variables = environment(raw.get("environment"))
     words = [*_words(raw.get("entrypoint")), *_words(raw.get("command")), *(v for v in variables.values() if v)]
@@ -211,7 +226,7 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _commands, _references, _conditions, _volumes, _access, _single, _engine):
+    for rule in (_name, _display, _commands, _references, _conditions, _volumes, _access, _single, _engine):
         yield from rule(written)
 
 
@@ -235,6 +250,17 @@ def _name(written: Written) -> Iterator[Diagnostic]:
         yield _bad(written.key, f"the name of a service has {len(name)} characters, expected at most {_LONGEST}")
     if not any(written.plain.get(key) for key in ("image", "build", "x-dodo-process")):
         yield _bad(written.key, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
+
+
+def _display(written: Written) -> Iterator[Diagnostic]:
+    """A warning of an X server that only a process gets."""
+    about = written.plain.get(KEYS[0])
+    if isinstance(about, dict) and about.get("display") is True and KEYS[1] not in written.plain:
+        message = f"'display' of '{written.name}' has no effect in a container, whose image brings its own X server"
+        hint = "start it with xvfb-run there, or give it x-dodo-process; docs/reference/applications.md, Windows"
+        yield Diagnostic(
+            place(written.node, (KEYS[0], "display"), written.key), "application-file", message, hint, "warning"
+        )
 
 
 def _commands(written: Written) -> Iterator[Diagnostic]:

@@ -200,8 +200,8 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
     if not others or len(others) == len(found):
         return
     names = listed([f"'{os.path.relpath(path, folder)}'" for path in others])
-    items = [_item(path, root or folder) for path in [*found, *(path for path in named if path not in found)]]
-    own = _item(next(path for path in named if path in found), folder)
+    items = [as_item(path, root or folder) for path in [*found, *(path for path in named if path not in found)]]
+    own = as_item(next(path for path in named if path in found), folder)
     yield Diagnostic(
         Span(str(paths[0])),
         "application-override",
@@ -228,7 +228,7 @@ def _whole_file(path: Path) -> Path:
     return Path(os.path.normpath(path.absolute()))
 
 
-def _item(path: Path, folder: Path) -> str:
+def as_item(path: Path, folder: Path) -> str:
     """A path as an item of a list in YAML."""
     text = os.path.relpath(path, _whole_file(folder))
     return text if _PLAIN.fullmatch(text) else f'"{text}"'

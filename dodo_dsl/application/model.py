@@ -16,6 +16,7 @@ from dodo_dsl.application.access.model import Access
 from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.application.host_access import is_true
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
+from dodo_dsl.application.printed_lines import PrintedLine, printed_lines
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -25,12 +26,17 @@ FILES = "dodo-files"
 """The service that copies the files of the repository to which an application may write."""
 KEYS = ("x-dodo", "x-dodo-process")
 
+_ABOUT_NO_MESSAGES = {"tune", "cid", "display"}
+
 Word = tuple[str, Span]
 
 
 @dataclass(frozen=True)
 class Declared:
-    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp`` with its place. ``readers`` may be 0."""
+    """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp`` with its place. ``readers`` may be 0.
+
+    ``outputs`` are also those of ``lines``.
+    """
 
     inputs: tuple[Word, ...]
     outputs: tuple[Word, ...]
@@ -38,6 +44,7 @@ class Declared:
     done: Word | None
     readers: int
     span: Span
+    lines: tuple[PrintedLine, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,7 @@ class EnvFile:
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo or with only ``tune`` there.
+    ``declared`` is None without x-dodo, or where that says nothing of messages.
     ``cid_variables`` are the CID variables that its ``env_files`` set.
     """
 
@@ -64,6 +71,13 @@ class ComposeService:
     env_files: tuple[EnvFile, ...] = ()
     cid_variables: tuple[str, ...] = ()
 
+    @property
+    def has_display(self) -> bool:
+        """Whether its process is to have an X server."""
+        about = self.node.get(KEYS[0])
+        word = about.get("display") if isinstance(about, source.Mapping) else None
+        return isinstance(word, Scalar) and word.value is True
+
 
 @dataclass(frozen=True)
 class ApplicationSource:
@@ -73,7 +87,8 @@ class ApplicationSource:
     are relative to ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the
     services by their ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set
     the secret ones among them. ``known`` are all variables whose values are known, ``access`` is what the deployment
-    allows, ``limits`` are the highest that the services may set.
+    allows, ``limits`` are the highest that the services may set. ``named`` are the files as ``dodo.yml`` names them,
+    ``without`` the services that it leaves out. ``cids`` are declared to be built in, all the same one.
     """
 
     path: Path
@@ -87,6 +102,9 @@ class ApplicationSource:
     access: Access = field(default_factory=Access)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     left_out: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    cids: tuple[Scalar, ...] = ()
 
     @functools.cached_property
     def demanding(self) -> tuple[tuple[str, str, Scalar], ...]:
@@ -99,6 +117,12 @@ class ApplicationSource:
             for part in source.walk(node)
             if isinstance(part, Scalar) and isinstance(part.value, str) and "?" in part.value and "${" in part.value
         )
+
+    @property
+    def cid(self) -> int | None:
+        """The CID that is built into the application, so that its tests use it."""
+        values = [cid.value for cid in self.cids if isinstance(cid.value, int)]
+        return values[0] if values else None
 
     @functools.cached_property
     def paths(self) -> HostPaths:
@@ -158,13 +182,16 @@ def declared(service: source.Mapping) -> Declared | None:
     entry = service.entries.get("x-dodo")
     if entry is None or not isinstance(entry.value, source.Mapping):
         return None
-    if set(entry.value.entries) == {"tune"}:
+    if entry.value.entries and entry.value.entries.keys() <= _ABOUT_NO_MESSAGES:
         return None
     words = {key: tuple((s.text, s.span) for s in scalars(e.value)) for key, e in entry.value.entries.items()}
     inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))
     readers = entry.value.get("readers")
     count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 0
-    return Declared(inputs, outputs, answers, done[0] if done else None, count, entry.key)
+    lines = printed_lines(entry.value.get("lines"))
+    sent = {name.removesuffix("/0") for name, _ in outputs}
+    printed = {line.port: (line.port, line.message_span) for line in lines if line.port not in sent}
+    return Declared(inputs, (*outputs, *printed.values()), answers, done[0] if done else None, count, entry.key, lines)
 
 
 def scalars(node: Node | None) -> list[Scalar]:

@@ -3,10 +3,12 @@
 import itertools
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
+from dodo_dsl.application import declarations as declared
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.access import secret_problems
 from dodo_dsl.application.access.findings import shared_findings
@@ -15,12 +17,14 @@ from dodo_dsl.application.access.model import Access, Look, diagnostic
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
-from dodo_dsl.application.load import load, unread
-from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, declared, env_files, plain
+from dodo_dsl.application.load import as_item, load, unread
+from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, env_files, plain
+from dodo_dsl.application.model import declared as declaration_of
 from dodo_dsl.application.slips import variable_problems
 from dodo_dsl.application.variables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Reader
+from dodo_dsl.spec.deployment import Declarations
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.validation import validate
 
@@ -33,19 +37,25 @@ def read_application(
     access: Access = Access(),  # noqa: B008  (it is frozen)
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008
     reader: Reader = source.read,
+    declarations: Declarations = Declarations(),  # noqa: B008
 ) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems.
 
-    ``access`` is what the deployment allows it, ``limits`` are the highest that it may set.
+    ``access`` is what the deployment allows it, ``limits`` are the highest that it may set. ``declarations`` are what
+    the deployment says of the application in its files; they do not hold for others.
     """
     paths = [path] if isinstance(path, Path) else list(path)
+    declarations = declared.holding(declarations, paths)
     roots = (*repository(paths[0].resolve().parent), *map(Path, access.roots))
     files = ComposeFiles(reader, roots)
     found = files.problems
     found.extend(_links(paths))
     if found:
         return None, found
-    document = load(files, paths)
+    document, gone = load(files, paths), {}
+    if document is not None:
+        found.extend(declared.problems(document, declarations))
+        document, gone = declared.declared_in(document, declarations), declared.left_out(document, declarations)
     services = document.get("services") if document else None
     if isinstance(services, source.Mapping):
         found.extend(itertools.chain.from_iterable(unknown_keys(e.value) for e in services.entries.values()))
@@ -59,9 +69,13 @@ def read_application(
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
     application = _application(paths[0].resolve(), document, services, files, access, limits)
-    found.extend(unread(paths, Path(access.roots[0]) if access.roots else None))
+    root = Path(access.roots[0]) if access.roots else None
+    named = tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths)
+    application = replace(application, dropped={**application.dropped, **gone}, named=named, without=tuple(gone))
+    found.extend(unread(paths, root))
     found.extend(_shared(document, application))
-    found.extend(application_problems(application, next(iter(services.entries.values())).key))
+    found.extend(declared.depending(application, gone))
+    found.extend(application_problems(application, _first(services, declarations)))
     found.extend(tunable_problems(application))
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
     refused = {problem.span for problem in found}
@@ -71,6 +85,23 @@ def read_application(
     found.extend(secret_problems.in_files(_own_files(application)))
     found.extend(secret_problems.left_out(files.secrets))
     return (None if has_errors(found) else application), found
+
+
+def as_written(path: Path) -> ApplicationSource | None:
+    """The application of a compose file with whatever else is wrong with it; None where it is no compose file."""
+    roots = repository(path.resolve().parent)
+    files = ComposeFiles(source.read, roots)
+    document = load(files, [path])
+    services = document.get("services") if document else None
+    if document is None or not isinstance(services, source.Mapping) or has_errors(validate(document, "application")):
+        return None
+    return _application(path.resolve(), document, services, files, Access(), SandboxLimits())
+
+
+def _first(services: source.Mapping, declarations: Declarations) -> Span:
+    """The place of the first service, or of the first that is left out where all are."""
+    entries = list(services.entries.values())
+    return entries[0].key if entries else next((word.span for word in declarations.without), services.span)
 
 
 def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
@@ -110,7 +141,17 @@ def _application(
         access=access,
         limits=limits,
         left_out=left_out,
+        cids=tuple(_declared_cids([document, *(service.node for service in kept.values())])),
     )
+
+
+def _declared_cids(nodes: Iterable[source.Mapping]) -> Iterator[source.Scalar]:
+    """What ``x-dodo`` of the document and of its services says to be built in."""
+    for node in nodes:
+        about = node.get("x-dodo")
+        cid = about.get("cid") if isinstance(about, source.Mapping) else None
+        if isinstance(cid, source.Scalar):
+            yield cid
 
 
 def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -134,7 +175,7 @@ def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:
     if not isinstance(node, source.Mapping):
         return None
     files = tuple(env_files(node))
-    return ComposeService(name, node, entry.key, declared(node), files, cid_variables(files, folder))
+    return ComposeService(name, node, entry.key, declaration_of(node), files, cid_variables(files, folder))
 
 
 def _used_cid_variables(services: Iterable[source.Mapping]) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check import file_rules, resolve, service_rules, spec_rules, wiring_rules
+from dodo_dsl.check import baseline, file_rules, resolve, service_rules, spec_rules, wiring_rules
 from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic
@@ -19,6 +19,7 @@ RULES: tuple[Rule, ...] = (
     spec_rules.check_clock_rates,
     spec_rules.check_pools,
     spec_rules.check_rigs,
+    spec_rules.check_built_in_cid,
     service_rules.check_camera_sources,
     service_rules.check_services,
     service_rules.check_layers,
@@ -28,10 +29,12 @@ RULES: tuple[Rule, ...] = (
     file_rules.check_files,
     file_rules.check_limits,
     spec_rules.check_goals,
+    spec_rules.check_baseline,
     wiring_rules.check_producers,
     wiring_rules.check_hidden_messages,
     wiring_rules.check_variables,
     wiring_rules.check_memories,
+    wiring_rules.check_pictures,
 )
 
 
@@ -71,7 +74,8 @@ def check(
 
 def forget_files() -> None:
     """What is kept of the files that tests name, which may have changed."""
-    for cache in (file_rules.entries, file_rules.problems, resolve.known_ids, resolve.holds):
+    read = (file_rules.entries, file_rules.problems, baseline.results)
+    for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()
 
 

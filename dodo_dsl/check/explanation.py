@@ -13,6 +13,7 @@ from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import EMULATED_FILE
+from dodo_dsl.spec.values import default_value
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,8 @@ def _argument(spec: Spec, use: Use, argument: Argument) -> ArgumentExplained:
 def _origin(spec: Spec, use: Use, argument: Argument) -> str:
     entry = argument.entry
     if entry is None:
-        return "default"
+        is_default = argument.value == default_value(argument.parameter)
+        return "default" if is_default else "what the vehicle takes"
     place = _place(entry.key)
     if argument.parameter.name in use.parameters:
         return place
@@ -159,6 +161,12 @@ def _shown(end: End) -> str:
     return f"{end.service} (application)" if end.layer == "application" else end.service
 
 
+def _sender(end: End, wiring: Wiring) -> str:
+    """A producer, and whether it only prints the message."""
+    is_printed = any((each.service, each.port) == (end.service, end.port) for each in wiring.printed)
+    return f"{end.service} (application, prints it)" if is_printed else _shown(end)
+
+
 def _lines(wiring: Wiring) -> Iterator[Line]:
     consumers = (*wiring.consumed, *wiring.application_consumes)
     produced: dict[Port, list[End]] = {}
@@ -168,7 +176,7 @@ def _lines(wiring: Wiring) -> Iterator[Line]:
         anything = port.name == ANYTHING
         by = {_shown(c): None for c in consumers if c.port.consumes(port) and (not anything or _only(wiring, c))}
         name = "any message of it" if anything else str(port)
-        yield Line(port.kind, name, tuple(map(_shown, ends)), tuple(by))
+        yield Line(port.kind, name, tuple(_sender(end, wiring) for end in ends), tuple(by))
     unsatisfied: dict[str, list[End]] = {}
     for end in consumers:
         if not any(end.port.consumes(port) for port in produced):

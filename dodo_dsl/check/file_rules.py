@@ -17,7 +17,7 @@ from pathlib import Path
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import known_ids
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix
-from dodo_dsl.opendlv.assets import formats
+from dodo_dsl.opendlv.assets import formats, map_file
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -73,8 +73,9 @@ MAP = "map.json"
 _MAX_BYTES = 20 << 20
 _ATTEMPT = re.compile(r"\$\{(matrix|vary)")
 """A placeholder that nothing has replaced, which another rule reports."""
-_CLASSES = "categories"
+_CLASSES, _OBSTACLES = "categories", "obstacles"
 _HELP = {"obstacles": "see docs/reference/maps.md"}
+_PLURAL = {"block": "blocks"}
 
 
 def check_references(context: RuleContext) -> Iterator[Diagnostic]:
@@ -88,17 +89,20 @@ def check_references(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _among(context: RuleContext, service: ResolvedService, argument: Argument, entry: Entry) -> Iterator[Diagnostic]:
-    source, _, key = argument.parameter.among.partition(".")
-    file = _file(service.arguments[source])
+    source, keys = sources(argument.parameter.among)
+    file, key = _file(service.arguments[source]), " and ".join(_PLURAL.get(key, key) for key in keys)
     if file is None:
         return
-    names = _names(file, key)
+    names = _names(file, keys)
     if has_errors(file_problems(context, service, service.arguments[source])):
         return  # told with the file
     if isinstance(names, str):
-        yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(key, ""))
+        yield Diagnostic(
+            entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(keys[0], "")
+        )
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
+    names += argument.parameter.words
     for item in items[:MAX_PROBLEMS]:
         if isinstance(item, Scalar) and item.text not in names and not _ATTEMPT.search(item.text):
             message = f"'{item.text}' is not among the {key} of {file.parent.name}/{file.name}"
@@ -113,15 +117,26 @@ def _file(argument: Argument) -> Path | None:
     return path / MAP if path.is_dir() else path
 
 
-def _names(file: Path, key: str) -> tuple[str, ...] | str:
-    """The names of the entries of a list in a JSON file, or the problem of the file."""
-    found = entries(file, key)
-    return found if isinstance(found, str) else tuple(dict.fromkeys(name for name in found if name))
+def sources(among: str) -> tuple[str, list[str]]:
+    """The parameter that names a JSON file, and the lists of it, as ``map-path.obstacles|block`` says."""
+    source, _, keys = among.partition(".")
+    return source, keys.split("|")
+
+
+def _names(file: Path, keys: list[str]) -> tuple[str, ...] | str:
+    """The names of the entries of lists in a JSON file, or the problem of the file."""
+    found: list[str] = []
+    for key in keys:
+        listed = entries(file, key)
+        if isinstance(listed, str):
+            return listed
+        found += [name for name in listed if name]
+    return tuple(dict.fromkeys(found))
 
 
 @functools.lru_cache(maxsize=256)
 def entries(file: Path, key: str) -> tuple[str, ...] | str:
-    """The entries of a list in a JSON file by name, empty for those without one, or the problem of the file.
+    """The entries of a list in a JSON file by name, empty for those that have none, or the problem of the file.
 
     A class may be written with ``color:`` before its name, as in messages.
     """
@@ -134,8 +149,10 @@ def entries(file: Path, key: str) -> tuple[str, ...] | str:
         found = document.get(key, []) if isinstance(document, dict) else None
         if not isinstance(found, list):
             return f"expected an object with a list '{key}'"
-        plain = _plain if key == _CLASSES else str
-        return tuple(plain(e["name"]) if isinstance(e, dict) and "name" in e else "" for e in found)
+        plain, unnamed = _plain if key == _CLASSES else str, map_file.numbered if key == _OBSTACLES else lambda _: ""
+        return tuple(
+            plain(e["name"]) if isinstance(e, dict) and "name" in e else unnamed(n) for n, e in enumerate(found, 1)
+        )
     except OSError as error:
         return f"cannot be read: {error.strerror}"
     except (ValueError, RecursionError) as error:

@@ -42,12 +42,23 @@ def rates_fit(rate: float, step: float) -> bool:
 
 def answers(wiring: Wiring) -> list[str]:
     """The messages that answer a frame, each once: those that the application declares, else those that drive the
-    vehicle, else those that are judged; empty without any."""
-    declared = _names(wiring.answers)
-    expected = [end for end in _from_application(wiring) if _is_expected(end, wiring)]
-    driving = _names(end for end in expected if end.layer == "action")
-    judged = (e for e in expected if e.layer == "evaluation" and not e.port.name.startswith(DETECTIONS))
-    return declared or driving or _names(judged)
+    vehicle, else those that are judged, and what it prints; empty without any."""
+    expected = _expected(wiring)
+    driven = [end for end in expected if end.layer == "action"]
+    judged = [e for e in expected if e.layer == "evaluation" and not e.port.name.startswith(DETECTIONS)]
+    chosen = driven or judged
+    printed = [end for end in wiring.printed if not end.port.name.startswith(DETECTIONS)]
+    missing = [end for end in printed if not any(each.port.consumes(end.port) for each in chosen)]
+    return _names(wiring.answers) or _names([*chosen, *missing])
+
+
+def driving(wiring: Wiring) -> list[str]:
+    """The messages of the application that drive the vehicle, each once."""
+    return _names(end for end in _expected(wiring) if end.layer == "action")
+
+
+def _expected(wiring: Wiring) -> list[End]:
+    return [end for end in _from_application(wiring) if _is_expected(end, wiring)]
 
 
 def other_inputs(wiring: Wiring) -> list[str]:

@@ -6,11 +6,13 @@ is judged by, is left out of what is played: it would be taken for the applicati
 """
 
 import functools
+import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.model import ApplicationSource, Declared
+from dodo_dsl.check.lockstep import driving
 from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, message, wire
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
@@ -40,7 +42,7 @@ class Replayed:
 
 def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]) -> Replayed:
     """What services of one test that play recordings send; ``own`` are the files with the deployment's messages."""
-    players = [each for each in services if ANYTHING in each.manifest.messages.outputs and _recording(each)]
+    players = [each for each in services if ANYTHING in each.messages.outputs and _recording(each)]
     if not players:
         return Replayed(wiring, {})
     ids = frozenset(known_ids(own).items())
@@ -94,6 +96,24 @@ def without_pictures(service: ResolvedService) -> Path | None:
     return None if path is None or holds(path, image, _NO_STAMP) else path
 
 
+def picture_size(service: ResolvedService) -> tuple[int, int]:
+    """Width and height of the pictures that a service makes: as written, or of its recording; 0 where unknown."""
+    path = _recording(service)
+    if path is not None:
+        sender = service.texts.get("video-sender", "")
+        return _recorded_size(path, int(sender)) if sender.isdecimal() else (0, 0)
+    width, height = (service.texts.get(key, "") for key in ("width", "height"))
+    return (int(width), int(height)) if width.isdecimal() and height.isdecimal() else (0, 0)
+
+
+@functools.lru_cache(maxsize=256)
+def _recorded_size(path: Path, sender: int) -> tuple[int, int]:
+    try:
+        return recording_contents.picture_size(path, known_ids(())[IMAGE], sender)
+    except OSError:
+        return 0, 0  # told with the file
+
+
 def _recording(service: ResolvedService) -> Path | None:
     found = [a.value.path for a in service.arguments.values() if a.parameter.format == FORMAT and a.value]
     return found[0] if len(found) == 1 else None
@@ -121,13 +141,19 @@ def holds(path: Path, number: int, stamp: int) -> bool:
 @functools.cache
 def known_ids(own: tuple[Path, ...]) -> Mapping[str, int]:
     """The numbers of these messages, by name."""
-    ids = {d.name: d.id for d in odvd.load(STANDARD)}
+    return {name: definition.id for name, definition in known_messages(own).items()}
+
+
+@functools.cache
+def known_messages(own: tuple[Path, ...]) -> Mapping[str, odvd.Definition]:
+    """The standard messages and those in a deployment's files, as far as these can be read, by name."""
+    found = {d.name: d for d in odvd.load(STANDARD)}
     for path in own:
         try:
-            ids.update((d.name, d.id) for d in odvd.load(path))
+            found.update((d.name, d) for d in odvd.load(path))
         except odvd.OdvdError:
             continue  # reported with the deployment
-    return ids
+    return found
 
 
 @dataclass(frozen=True)
@@ -149,6 +175,11 @@ class ResolvedTest:
         return len(self.services) == len(self.spec.uses)
 
 
+def isolation(spec: Spec, rig: Rig | None) -> str:
+    """The isolation that the spec sets, else its rig's, else a network of its own."""
+    return spec.isolation or (rig.isolation if rig else "network")
+
+
 def resolve(
     specs: Iterable[Spec],
     manifests: Mapping[str, Manifest],
@@ -166,9 +197,28 @@ def resolve(
             for use in spec.uses
             if (manifest := manifests.get(use.uses.text)) is not None
         )
-        played = replayed(wire(services, declared), services, deployment.messages)
+        services, wiring = _driven(services, wire(services, declared), declared)
+        played = replayed(wiring, services, deployment.messages)
         found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
     return found
+
+
+def _driven(
+    services: tuple[ResolvedService, ...], wiring: Wiring, declared: Mapping[str, Declared | None] | None
+) -> tuple[tuple[ResolvedService, ...], Wiring]:
+    """Services and wiring where the messages that drive the vehicle have taken the place of defaults."""
+    messages = ",".join(driving(wiring))
+    found = tuple(_with_default(service, messages) for service in services) if messages else services
+    return (services, wiring) if all(map(operator.is_, found, services)) else (found, wire(found, declared))
+
+
+def _with_default(service: ResolvedService, messages: str) -> ResolvedService:
+    changed = {
+        name: replace(each, value=replace(each.value, text=messages))
+        for name, each in service.arguments.items()
+        if each.parameter.driving and each.entry is None and each.value and each.value.text != messages
+    }
+    return replace(service, arguments={**service.arguments, **changed}) if changed else service
 
 
 def _arguments(test: ResolvedTest | None, layer: str, name: str) -> Mapping[str, Argument] | None:

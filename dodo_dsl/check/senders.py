@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
-from dodo_dsl.opendlv.address import POSE, is_of_the_world
+from dodo_dsl.opendlv.address import LINES, POSE, is_of_the_world
 
 SENDING_LAYERS = ("environment", "action")
 END_OF_INPUT = "dodo.EndOfInput"
@@ -22,6 +22,9 @@ def senders(test: ResolvedTest) -> tuple[str, ...]:
     for end in wiring.consumed:
         for port in _guarded(end.port, wiring):
             table.setdefault(port, sorted({each.service for each in wiring.producers(port)}))
+    for end in wiring.printed:
+        if not wiring.judges_by(end.port):
+            table[end.port] = [LINES]
     sources = sorted(use.name for use in test.spec.uses if use.layer in SENDING_LAYERS)
     table[Port("message", END_OF_INPUT)] = sources
     words = (

@@ -5,8 +5,9 @@
 ``wrong-layer``: a service is in a layer that its manifest lists.
 Parameters fit the manifest: known, complete, of the right type and unit, within bounds, files in place:
 ``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
-``missing-file``, ``path-escape``.
+``missing-file``, ``path-escape``. ``unused-parameter``: those that are set have an effect beside the others.
 ``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
+``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
 ``camera-source``: what a rig's computer can take pictures from, in which sizes, and how often.
 ``camera-size``: a camera's optics, as they were measured, are those of pictures of one size. ``out-of-range``: sizes
 are even.
@@ -16,11 +17,14 @@ import math
 from collections.abc import Collection, Iterator
 from pathlib import PurePath
 
+from dodo_dsl.application.printed_lines import line_problems
 from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.resolve import known_messages
 from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import MANIFEST
+from dodo_dsl.spec.manifest import holds
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
 from dodo_dsl.spec.slips import meant, slip_in_key
 
@@ -92,6 +96,19 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
         elif argument.problem:
             yield argument.problem
+        elif not holds(argument.parameter.when, service.texts):
+            yield _without_effect(service, argument, entry)
+
+
+def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) -> Diagnostic:
+    name, when = argument.parameter.name, argument.parameter.when
+    other = next(other for other, values in when.items() if service.texts.get(other, "") not in values)
+    wanted = f"'{other}: {' or '.join(filter(None, when[other]))}'"
+    instead = (
+        f"this service has '{other}: {service.texts[other]}'" if other in service.texts else f"'{other}' is not given"
+    )
+    message = f"parameter '{name}' is for {wanted}, and {instead}"
+    return Diagnostic(entry.key, "unused-parameter", message, f"remove it, or write {wanted}")
 
 
 def _is_empty(entry: Entry) -> bool:
@@ -152,7 +169,7 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
             argument = service.arguments.get(name)
             if argument and argument.parameter.type == "message" and argument.value:
                 yield from _known(context, argument.value.text, entry.value.span)
-            if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.manifest.messages.inputs):
+            if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.messages.inputs):
                 for item in entry.value.items[:MAX_PROBLEMS]:
                     if isinstance(item, Scalar):
                         yield from _known(context, item.text.partition("/")[0], item.span)
@@ -160,6 +177,8 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
     for own in declared:
         for name, span in (*own.inputs, *own.outputs, *own.answers) if own else ():
             yield from _known(context, name.partition("/")[0], span)
+        for line in own.lines if own else ():
+            yield from line_problems(line, known_messages(context.deployment.messages))
 
 
 def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:

@@ -11,18 +11,21 @@
 ``rig-isolation``: hardware is on the host's network.
 ``rig-device``: a test moves the rig that it names and no other, and only the service that moves it opens its port.
 ``unknown-check``: a goal names a check of an evaluator. ``goal-values``: its values fit its direction: a goal that
-scores nothing, or the wrong way, would rank applications by mistake.
+scores nothing, or the wrong way, would rank applications by mistake. ``wrong-file``: a baseline has the test.
 """
 
 import os
 from collections.abc import Iterator
 
+from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.lockstep import answers, rates, rates_fit, step_hz
+from dodo_dsl.check.resolve import isolation
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean, shown_path
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument
+from dodo_dsl.spec.deployment import RESERVED_CIDS
 from dodo_dsl.spec.load import members
 from dodo_dsl.spec.model import Use
 from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, as_file, is_free, is_name
@@ -157,6 +160,23 @@ def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:
         yield Diagnostic(spec.span("isolation"), "rig-isolation", message, hint)
 
 
+def check_built_in_cid(context: RuleContext) -> Iterator[Diagnostic]:
+    """A built-in CID on the host's network, where real cars may listen, or on a rig with another one."""
+    if context.application is None or context.application.cid is None:
+        return
+    declared, rig = context.application.cids[0], context.rig
+    cid = context.application.cid
+    if rig is not None and rig.cid not in (None, cid):
+        message = f"the application has the CID {cid} built in, and rig '{rig.name}' has {rig.cid}"
+        yield Diagnostic(declared.span, "application-cid", message, "let the program take it from a flag: --cid=111")
+    elif cid in RESERVED_CIDS and isolation(context.spec, rig) == "host":
+        message = (
+            f"the application has the CID {cid} built in, which real cars use, and the test is on the host's network"
+        )
+        hint = "give the test a network of its own, or let the program take the CID from a flag: --cid=111"
+        yield Diagnostic(declared.span, "application-cid", message, hint)
+
+
 def _devices(context: RuleContext) -> Iterator[Diagnostic]:
     """Ports that are not the rig's: nothing would lease or check them, or ask the machine's operator."""
     rig = context.rig
@@ -199,3 +219,7 @@ def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[D
 
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
     yield from resolved_goals(context.test).problems
+
+
+def check_baseline(context: RuleContext) -> Iterator[Diagnostic]:
+    yield from resolved_baseline(context.spec).problems

@@ -65,8 +65,8 @@ class Wiring:
     """Everything produced and consumed in a test.
 
     ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are the messages that
-    they declare to complete a frame in lockstep. ``unsent`` are services that may send anything by their manifests, and
-    messages that they cannot send.
+    they declare to complete a frame in lockstep, ``printed`` those that are lines of theirs. ``unsent`` are services
+    that may send anything by their manifests, and messages that they cannot send.
     """
 
     produced: tuple[End, ...]
@@ -78,6 +78,7 @@ class Wiring:
     answers: tuple[End, ...] = ()
     done: str = ""
     unsent: frozenset[tuple[str, str]] = frozenset()
+    printed: tuple[End, ...] = ()
 
     def producers(self, port: Port) -> list[End]:
         """The test's services that produce what a port consumes."""
@@ -87,6 +88,11 @@ class Wiring:
     def is_truth(self, port: Port) -> bool:
         """Whether the application is judged by it, and services of the test produce it."""
         return port.truth and bool(self.producers(port))
+
+    def judges_by(self, port: Port) -> str:
+        """The service that judges the application by a message; empty if none does."""
+        found = (end.service for end in self.consumed if self.is_truth(end.port) and end.port.consumes(port))
+        return next(found, "")
 
     def application_may_produce(self, port: Port) -> bool:
         """Whether the application declares it, or could produce it because it does not declare everything."""
@@ -106,7 +112,7 @@ def wire(services: Iterable[ResolvedService], declared: Mapping[str, Declared | 
     consumed: list[End] = []
     for service in services:
         use, manifest = service.use, service.manifest
-        kinds: tuple[tuple[Kind, Ports], ...] = (("message", manifest.messages), ("memory", manifest.memory))
+        kinds: tuple[tuple[Kind, Ports], ...] = (("message", service.messages), ("memory", manifest.memory))
         for kind, ports in kinds:
             produced += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, service, 0)]
             consumed += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.inputs, service, None)]
@@ -148,6 +154,11 @@ def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | 
         for ends, names in ((produced, own.outputs), (consumed, own.inputs), (answers, own.answers)) if own else ():
             stamp = 0 if ends is produced else None
             ends += [End(service, "application", message(name, stamp), span) for name, span in names]
+    printed = (
+        End(service, "application", message(line.port, 0), line.message_span)
+        for service, own in declared.items()
+        for line in (own.lines if own else ())
+    )
     ending = [own.done[0] for own in declared.values() if own and own.done]
     return replace(
         wiring,
@@ -157,4 +168,5 @@ def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | 
         answers=tuple(answers),
         undeclared=tuple(s for s, own in declared.items() if own is None),
         has_application=True,
+        printed=tuple(printed),
     )

@@ -4,7 +4,8 @@ Each message or memory that a service consumes has a producer in the test, or is
 ``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
 message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces),
 ``true-pose`` (it consumes what only a simulation knows, and the test hides that).
-``application-memory``: the shared memories that the application asks for are made by services of the test.
+``application-memory``: the shared memories that the application asks for are made by services of the test, and
+``application-pictures``: in the size and the format that it asks for.
 ``application-variable``: a test sets only variables that are not DoDo's, to values that fit.
 ``application-required``: no variable that the compose file requires (``${NAME:?why}``) is certain to be without a
 value, as compose would then refuse the test.
@@ -20,14 +21,17 @@ from dodo_dsl.application.access.compose_keys import SERVICE, removed
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate, interpolated
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
+from dodo_dsl.application.pictures import FORMATS, AskedPictures, pictures_of
 from dodo_dsl.application.variables import owner, split_by
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import IMAGE, without_pictures
+from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
-from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
+from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring, message
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
+from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
+from dodo_dsl.spec.values import default_value
 
 SENSORS = "opendlv.proxy."
 """Prefix of the messages that a car's devices send."""
@@ -49,6 +53,7 @@ def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
         if not (end.port.optional or wiring.application_may_produce(end.port) or wiring.producers(end.port)):
             yield _unsatisfied(context, wiring, end)
     yield from _twice(wiring)
+    yield from _judged(wiring)
     yield from _unsatisfied_application(context, wiring)
 
 
@@ -73,13 +78,28 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
-        hint = "list it under x-dodo.out of the application's service that sends it"
+        hint = _otherwise(context, end) or "list it under x-dodo.out of the application's service that sends it"
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
         hint = _who_could(context, wiring, end)
     if rule == "no-sample":
         message += ", so it could never judge"
     return Diagnostic(end.span, rule, message, hint)
+
+
+def _otherwise(context: RuleContext, end: End) -> str:
+    """A hint: with which parameters the service takes what the application sends."""
+    sent = [each.port for each in context.wiring.application_produces]
+    service = next(each for each in context.services if each.use.name == end.service)
+    manifest, defaults = service.manifest, (default_value(each) for each in service.manifest.parameters.values())
+    texts = {n: v.text for n, v in zip(manifest.parameters, defaults, strict=True) if v} | dict(service.texts)
+    for when in (case.when for case in manifest.cases if case.ports.inputs):
+        other = {n: next(filter(None, values), "") for n, values in when.items() if texts.get(n, "") not in values}
+        taken = [message(text, None) for text in manifest.messages_with(texts | other).inputs if text[-1] not in "?!"]
+        if other and all(any(port.consumes(each) for each in sent) for port in taken):
+            written = " and ".join(f"'{name}: {value}'" for name, value in other.items())
+            return f"write {written} for an application that sends {' and '.join(map(str, taken))}"
+    return ""
 
 
 def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
@@ -92,7 +112,7 @@ def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
 
 
 def _sends(manifest: Manifest, name: str) -> bool:
-    return any(name in _names_of(manifest, port) for port in manifest.messages.outputs)
+    return any(name in _names_of(manifest, port) for port in manifest.all_messages.outputs)
 
 
 def _names_of(manifest: Manifest, port: str) -> tuple[str, ...]:
@@ -111,7 +131,7 @@ def _sensor_line(context: RuleContext, port: Port) -> str:
     given = {name for use in context.spec.uses for name in use.parameters}
     needed = [p for p in manifest.parameters.values() if p.required and not (p.shared and p.name in given)]
     written = {p.name: "..." if p.example is None else str(p.example) for p in needed}
-    for output in manifest.messages.outputs:
+    for output in manifest.all_messages.outputs:
         name, _, stamp = output.partition("/")
         if port.name in _names_of(manifest, output):
             for each, value in ((name, port.name), (stamp, "" if port.stamp is None else str(port.stamp))):
@@ -135,6 +155,15 @@ def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
             message = f"'{other.service}' and {who} both {does} {end.port}"
             hint = f"give one of them another {what}"
             yield Diagnostic(end.span, "two-producers", message, hint)
+
+
+def _judged(wiring: Wiring) -> Iterator[Diagnostic]:
+    """What the application prints and is judged by, under any stamp: the same as a second producer."""
+    for end in wiring.printed:
+        judge = wiring.judges_by(end.port)
+        if judge and all(other.port != end.port for other in wiring.produced):
+            message = f"the application's '{end.service}' prints {end.port}, by which '{judge}' judges it"
+            yield Diagnostic(end.span, "two-producers", message, "name another message, or another sender")
 
 
 def _unsatisfied_application(context: RuleContext, wiring: Wiring) -> Iterator[Diagnostic]:
@@ -168,7 +197,7 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
         others = {name for other, own in asked.items() if other != asking for name in own}
         if made.isdisjoint(names) and others.isdisjoint(names):
             for name, span in names.items():
-                yield _missing(asking, name, span, made)
+                yield _missing(asking, name, span, made, _offer(context, name))
 
 
 def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
@@ -181,16 +210,73 @@ def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterat
             yield Diagnostic(names[name], "application-memory", message, hint, "warning")
 
 
+def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
+    """Pictures whose bytes the application would take for others, or refuse."""
+    if context.application is None or not context.spec.is_whole or not context.test.is_complete:
+        return
+    set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
+    for asked in pictures_of(context.application, set_here):
+        for service in context.services:
+            keys = {service.texts.get(key, "").removeprefix("/"): key for key in service.arguments if key in _NAMES}
+            if names := [name for name in asked.formats if name and name in keys]:
+                yield from _sizes(context, service, asked)
+            for name in names:
+                yield from _formats(service, asked, name, keys[name])
+
+
+_NAMES = {f"name.{format_}": format_ for format_ in FORMATS}
+_PICTURES = "application-pictures"
+
+
+def _sizes(context: RuleContext, service: ResolvedService, asked: AskedPictures) -> Iterator[Diagnostic]:
+    made, use = picture_size(service), service.use
+    wanted = asked.width or made[0], asked.height or made[1]
+    if not all(made) or wanted == made:
+        return
+    size, other = (f"{width} x {height}" for width, height in (wanted, made))
+    written = [use.parameters[key].value.span for key in ("width", "height", "rec") if key in use.parameters]
+    who = f"the application's '{asked.service}'"
+    message = f"{who} asks for pictures of {size} pixels, and '{use.name}' makes them of {other}"
+    flags = f"--width={made[0]} --height={made[1]}"
+    hint = f"{flags} in the command of '{asked.service}'"
+    if "width" in service.arguments and not (context.rig and not context.rig.is_emulated):
+        hint = f"write 'width: {wanted[0]}' and 'height: {wanted[1]}' under 'with' of '{use.name}', or {hint}"
+    else:
+        hint = f"write {hint}"
+    yield Diagnostic(written[0] if written else use.span, _PICTURES, message, hint, "warning")
+
+
+def _formats(service: ResolvedService, asked: AskedPictures, name: str, key: str) -> Iterator[Diagnostic]:
+    wanted, made, use = asked.formats[name], _NAMES[key], service.use
+    if wanted in ("", made):
+        return
+    span = use.parameters[key].value.span if key in use.parameters else use.span
+    who = f"the application's '{asked.service}'"
+    sizes = f"{wanted} with {FORMATS[wanted]:g} bytes a pixel, and '{use.name}' makes it {made} with {FORMATS[made]:g}"
+    hint = f"write 'name.{wanted}: {name}' under 'with' of '{use.name}', and another name for '{key}'"
+    yield Diagnostic(span, _PICTURES, f"{who} asks for '{name}' as {sizes}", hint, "warning")
+
+
 def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:
     """The services of an application that ask for one of these memories."""
     services = application.services.values()
     return [each.name for each in services if not set(names).isdisjoint(_asked(each, dict(application.known)))]
 
 
-def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
+def _offer(context: RuleContext, name: str) -> str:
+    """The line of the test with which one of its services makes a memory of this name; empty where none can."""
+    key = f"name.{name.rpartition('.')[2]}"
+    able = [each.use.name for each in context.services if f"{{{key}}}" in each.manifest.memory.outputs]
+    return f"write '{key}: {name}' under 'with' of '{able[0]}'" if able else ""
+
+
+def _missing(service: str, name: str, span: Span, made: set[str], offer: str) -> Diagnostic:
     message = f"the application's '{service}' asks for the memory '{name}', which no service of the test makes"
     near = closest(name, made)
     hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
+    stem, _, format_ = name.rpartition(".")
+    alike = {each.rpartition(".")[0] for each in made if each.endswith(f".{format_}")}
+    hint = hint if closest(stem, alike) else offer or hint
     return Diagnostic(span, "application-memory", message, hint, "warning")
 
 

@@ -184,7 +184,9 @@ def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) ->
     files = selection.existing_files(options.application) or deployment.application
     if not files:
         raise UsageError(NO_APPLICATION)
-    source, problems = read_application(files, compiler.access(deployment), deployment.sandbox)
+    source, problems = read_application(
+        files, compiler.access(deployment), deployment.sandbox, declarations=deployment.declarations
+    )
     stderr.write(format_text(problems))
     if source is None or has_errors(problems):
         return Exit.PROBLEMS

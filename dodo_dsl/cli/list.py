@@ -11,7 +11,7 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
-from dodo_dsl.spec.manifest import Manifest, Parameter
+from dodo_dsl.spec.manifest import Manifest, Parameter, in_words
 from dodo_dsl.spec.model import LEVEL_WORDS
 from dodo_dsl.terminal import json_text, printable
 
@@ -95,15 +95,20 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
         default = "" if parameter.default in (None, []) else f", default {parameter.default}"
         facts = f"{parameter.type}{default}"
         if parameter.required:
-            others = [*["another service of the test"] * parameter.shared, *["the rig"] * bool(parameter.rig)]
+            others = [*["another service of the test"] * bool(parameter.shared), *["the rig"] * bool(parameter.rig)]
             facts += f", required unless {' or '.join(others)} provides it" if others else ", required"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
-        bounds = f"; {text}" if (text := _bounds(parameter)) else ""
+        notes = (_bounds(parameter), in_words(parameter.when) if parameter.when else "")
+        bounds = "".join(f"; {text}" for text in notes if text)
         lines += [f"  {parameter.name}: {facts} {unit}".rstrip() + bounds, f"      {parameter.help}"]
     for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):
         for direction, names in (("in", ports.inputs), ("out", ports.outputs)):
             if names:
                 lines.append(f"{title} {direction}: {', '.join(names)}")
+    for case in manifest.cases:
+        for direction, names in (("in", case.ports.inputs), ("out", case.ports.outputs)):
+            if names:
+                lines.append(f"messages {direction} {in_words(case.when)}: {', '.join(names)}")
     if manifest.checks:
         checks = (f"{check} ({unit})" if unit else check for check, unit in manifest.checks.items())
         lines.append(f"checks: {', '.join(checks)}")

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import package_data
-from dodo_dsl.cli import new_files, new_test
+from dodo_dsl.application.read import as_written
+from dodo_dsl.cli import existing_application, new_files, new_test
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.new_files import (
     COMPOSE_FILES,
@@ -320,14 +321,19 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
 
 def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New], str]:
     """The test's own files, its spec first; with a note for the user."""
+    there = compose_file(place.root) if tests.checked.deployment.file is None else ""
+    pictures = existing_application.pictures(
+        tests.checked.application or (as_written(place.root / there) if there else None)
+    )
     if wanted.rec:
         from dodo_dsl.cli import recorded_drive  # slow to load, and rarely needed
 
         declared = tests.checked.application.declared.values() if tests.checked.application else ()
         sent = {name.partition("/")[0] for own in declared if own for name, _ in own.outputs}
         drive = recorded_drive.look(wanted.rec, sent)
-        made, note = recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root)
-        return made, note + recorded_drive.unpassable(wanted.rec, drive, tests.checked.application)
+        made, note = recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root, pictures)
+        note += pictures.note if drive.cameras else ""
+        return made, note + recorded_drive.unpassable(wanted.rec, drive, tests.checked.application, pictures)
     if wanted.extends:
         note = f"copied, because '{wanted.extends}' ships with DoDo and a test extends only tests of its own registry\n"
         return _from_another(wanted.name, wanted.extends, tests, place, note)
@@ -335,7 +341,7 @@ def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New]
     if start.shipped:
         note = f"copied from '{start.shipped}', because a {start.level} test of kind {start.kind} {start.why}\n"
         return _from_another(wanted.name, start.shipped, tests, place, note)
-    return new_test.test_files(wanted.name, start.template, place.registry, place.root), ""
+    return new_test.test_files(wanted.name, start.template, place.registry, place.root, pictures), pictures.note
 
 
 def _from_another(name: str, base_name: str, tests: _Tests, place: Destination, note: str) -> tuple[list[New], str]:

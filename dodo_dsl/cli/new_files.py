@@ -12,6 +12,7 @@ from typing import TextIO
 import jinja2
 
 from dodo_dsl import __version__, package_data, source
+from dodo_dsl.cli.existing_application import declarable
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.spec.deployment import FILE_NAME
 from dodo_dsl.terminal import printable
@@ -73,13 +74,17 @@ def pipeline_template(name: str) -> bytes:
 
 
 def _schemas(root: Path) -> list[New]:
-    paths = [package_data.schemas() / name for name in ("deployment.schema.json", _SPEC_SCHEMA)]
+    paths = [
+        package_data.schemas() / name for name in ("deployment.schema.json", "application.schema.json", _SPEC_SCHEMA)
+    ]
     return [New(root / _SCHEMAS / path.name, path.read_bytes()) for path in paths]
 
 
 def dodo_yml(root: Path, application: str) -> New:
     """A dodo.yml; ``application`` is the name of its compose file, empty when there is none yet."""
-    return New(root / FILE_NAME, filled("deployment/dodo.yml", application=application, registry=REGISTRY))
+    declared = declarable(root / application) if (root / application).is_file() else None
+    values = {"application": application, "registry": REGISTRY, "declared": declared}
+    return New(root / FILE_NAME, filled("deployment/dodo.yml", **values))
 
 
 def application_files(root: Path, language: str) -> list[New]:

@@ -13,6 +13,7 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.cli.errors import UsageError
+from dodo_dsl.cli.existing_application import Pictures
 from dodo_dsl.cli.new_files import New, filled, schema_of_specs
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.plan.test_files import copies
@@ -42,10 +43,18 @@ def check_name(name: str, taken: list[str]) -> None:
         raise UsageError(f"there is a test '{name}' already; names are unique over all registries")
 
 
-def test_files(name: str, template: str, registry: Path, root: Path) -> list[New]:
+def test_files(
+    name: str,
+    template: str,
+    registry: Path,
+    root: Path,
+    pictures: Pictures = Pictures(),  # noqa: B008  (it is frozen)
+) -> list[New]:
     """A spec that compiles, its README, and the map or target that it needs where the registry has none."""
     folder = registry / name
-    spec = filled(template, name=name)
+    service = "camera" if template.startswith("tests/hil") else "virtual-camera"
+    memories = "".join(f", {key}: {name}" for key, name in pictures.parameters(service).items())
+    spec = filled(template, name=name, pictures=pictures, memories=memories)
     files = [*spec_files(name, folder, root, spec)]
     for place in MAPS:
         if f"../{place}".encode() in spec and not (registry / place).exists():

@@ -12,6 +12,7 @@ import numpy as np
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import wiring_rules
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
+from dodo_dsl.cli.existing_application import Pictures
 from dodo_dsl.cli.new_files import New, filled
 from dodo_dsl.cli.new_test import spec_files
 from dodo_dsl.cli.rec_actions import messages_for
@@ -34,6 +35,8 @@ SIGNALS = {
     "opendlv.proxy.AngleRequest": "angle",
 }
 """Messages with a signal that can be judged and its field, the preferred ones first."""
+BOUNDS = {"opendlv.proxy.GroundSteeringRequest": "38 deg", "opendlv.proxy.PedalPositionRequest": "1"}
+"""The size that answers to pictures may have, by the Kiwi car's vehicle; of other messages any."""
 SHARE_OF_MEAN, SHARE_OF_DISTANCE = 10, 50
 """Limits of the distance to the recorded signal, in percent of its range."""
 FEWEST = 10
@@ -53,14 +56,16 @@ class RecordedDrive:
     """What a recording holds: ``cameras`` are sender stamps, that with most pictures first; ``duration`` is in s.
 
     ``gap`` is the longest time without a message in s. ``retimed`` are messages with their times of receipt, where
-    sample times come from different drives; None elsewhere.
+    sample times come from different drives; None elsewhere. Without a ``target`` the pictures have to be answered, by
+    the message ``answer``.
     """
 
     duration: float
     gap: float
     retimed: bytes | None
     cameras: tuple[int, ...]
-    target: MessageStream
+    target: MessageStream | None
+    answer: str
     values: tuple[float, ...]
     requests: tuple[str, ...]
     others: tuple[int, ...]
@@ -68,11 +73,12 @@ class RecordedDrive:
     @property
     def range(self) -> float:
         """Of the signal; its largest value where it is constant, 1 where that is 0."""
-        return max(self.values) - min(self.values) or max(map(abs, self.values)) or 1.0
+        values = self.values or (0.0,)
+        return max(values) - min(values) or max(map(abs, values)) or 1.0
 
 
 def look(path: Path, sent: Collection[str]) -> RecordedDrive:
-    """Looks into a recording; ``sent`` are messages of the application. Raises UsageError without a signal to judge."""
+    """Looks into a recording; ``sent`` are messages of the application. Raises UsageError with nothing to judge."""
     with files_of_the_user(), Recording(path) as recording:
         if recording.size > LARGEST_BYTES:
             raise UsageError(f"'{path}' is larger than {LARGEST_BYTES >> 20} MB; cut out a part: dodo rec cut --help")
@@ -84,8 +90,7 @@ def look(path: Path, sent: Collection[str]) -> RecordedDrive:
         received = _receipts(recording, played)
         streams = sorted(contents.streams(recording, messages), key=lambda stream: -stream.count)
         target = _target(path, streams)
-        rows = recording.rows(messages=[target.id], sender_stamps=[target.sender_stamp])
-        values = _values(path, recording, messages, target, recording.by_time(rows))
+        values = _values(path, recording, messages, target) if target else ()
         times = np.sort(index["time"][played] if received is None else received[played])
         gap = float(np.diff(times).max(initial=0)) / 1e6
         retimed = None if received is None else _retimed(recording, received)
@@ -96,9 +101,10 @@ def look(path: Path, sent: Collection[str]) -> RecordedDrive:
         retimed,
         tuple(stream.sender_stamp for stream in streams if stream.id == IMAGE),
         target,
+        next((name for name in SIGNALS if name in sent), next(iter(SIGNALS))),
         values,
         tuple(sorted(name for name in names if name.endswith("Request") or name in sent)),
-        tuple(s.sender_stamp for s in streams if s.id == target.id and s is not target),
+        tuple(s.sender_stamp for s in streams if target and s.id == target.id and s is not target),
     )
 
 
@@ -118,18 +124,21 @@ def _retimed(recording: Recording, times: Numbers) -> bytes:
     return b"".join(encode_frame(envelope._replace(sample_time=time)) for envelope, time in pairs)
 
 
-def _target(path: Path, streams: list[MessageStream]) -> MessageStream:
+def _target(path: Path, streams: list[MessageStream]) -> MessageStream | None:
+    """The signal to judge; None where there are only pictures, which have to be answered."""
     for name in SIGNALS:
         found = [stream for stream in streams if stream.name == name and stream.count >= FEWEST]
         if found:
             return min(found, key=lambda stream: stream.sender_stamp != 0)  # as applications send it
+    if any(stream.id == IMAGE and stream.count >= FEWEST for stream in streams):
+        return None
     expected = ", ".join(SIGNALS)
-    raise UsageError(f"'{path}' has no signal to judge, expected {FEWEST} or more messages of one of {expected}")
+    what = f"expected {FEWEST} or more messages of one of {expected}, or as many pictures"
+    raise UsageError(f"'{path}' has no signal to judge, {what}")
 
 
-def _values(
-    path: Path, recording: Recording, messages: MessageSet, target: MessageStream, rows: Numbers
-) -> tuple[float, ...]:
+def _values(path: Path, recording: Recording, messages: MessageSet, target: MessageStream) -> tuple[float, ...]:
+    rows = recording.by_time(recording.rows(messages=[target.id], sender_stamps=[target.sender_stamp]))
     field = SIGNALS[target.name or ""]
     try:
         values = [float(getattr(messages.decode(e.data_type, e.payload), field)) for e in recording.envelopes(rows)]
@@ -138,7 +147,9 @@ def _values(
     return tuple(value for value in values if math.isfinite(value)) or (0.0,)
 
 
-def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path) -> tuple[list[New], str]:
+def files(
+    name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path, pictures: Pictures
+) -> tuple[list[New], str]:
     """The test's files, its spec first, with the recording where the registry has it not yet; and what was found."""
     place = path.resolve()
     copies = []
@@ -149,20 +160,24 @@ def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Pat
         place = registry.resolve() / "recordings" / name_of_copy
         if place.is_file() and place.read_bytes() == copies[0].content:
             copies = []
-    message, field = drive.target.name or "", SIGNALS[drive.target.name or ""]
+    message = (drive.target and drive.target.name) or drive.answer
+    field, does = SIGNALS[message], "as in the recorded drive" if drive.target else "for each picture of"
     spec = filled(
         "recording/dil-open-loop.dodo.yml",
         name=name,
-        description=_quoted(f"Send {message.rpartition('.')[2]} as in the recorded drive {path.name}."),
+        description=_quoted(f"Send {message.rpartition('.')[2]} {does} {path.name}."),
         path=_quoted(f"../{place.relative_to(registry.resolve()).as_posix()}"),
         timeout=math.ceil(drive.duration) + 2 * _START_UP_S,
         max_time=math.ceil(drive.duration) + _START_UP_S,
         cameras=drive.cameras,
+        memories=pictures.parameters("rec-replay"),
         max_gap=math.ceil(drive.gap) if drive.gap > DEFAULT_GAP_S else 0,
         without=drive.requests,
         message=message,
         field=field,
-        sender=drive.target.sender_stamp,
+        is_target=drive.target is not None,
+        bound=BOUNDS.get(message, ""),
+        sender=drive.target.sender_stamp if drive.target else 0,
         mean=_limit(drive.range * SHARE_OF_MEAN / 100),
         distance=_limit(drive.range * SHARE_OF_DISTANCE / 100),
         share_of_mean=SHARE_OF_MEAN,
@@ -171,9 +186,10 @@ def files(name: str, path: Path, drive: RecordedDrive, registry: Path, root: Pat
     return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)
 
 
-def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None) -> str:
+def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None, pictures: Pictures) -> str:
     """A warning where services of the application read pictures, of which the recording has none."""
-    readers = [] if drive.cameras or application is None else wiring_rules.readers(application, _MEMORIES)
+    names = (*_MEMORIES, *pictures.memories.values())
+    readers = [] if drive.cameras or application is None else wiring_rules.readers(application, names)
     if not readers:
         return ""
     named = " and ".join(f"'{name}'" for name in readers)
@@ -194,11 +210,13 @@ def _limit(value: float) -> str:
 
 
 def _found(path: Path, drive: RecordedDrive, field: str) -> str:
-    target = f"{drive.target.name}/{drive.target.sender_stamp}"
-    lines = [
-        f"{shown_path(str(path))}: {drive.duration:.1f} s, {_cameras(drive.cameras)}",
-        f"judged: {field} of {target}, {len(drive.values)} values from {min(drive.values):g} to {max(drive.values):g}",
-    ]
+    lines = [f"{shown_path(str(path))}: {drive.duration:.1f} s, {_cameras(drive.cameras)}"]
+    if drive.target is None:
+        lines.append(f"judged: whether each picture is answered by {drive.answer}/0, as there is no recorded signal")
+    else:
+        target = f"{drive.target.name}/{drive.target.sender_stamp}"
+        values = f"{len(drive.values)} values from {min(drive.values):g} to {max(drive.values):g}"
+        lines.append(f"judged: {field} of {target}, {values}")
     if drive.others:
         lines.append(
             f"other sender stamps of it are {', '.join(map(str, drive.others))}: change 'target-sender' for them"

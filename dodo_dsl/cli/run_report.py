@@ -12,6 +12,7 @@ from dodo_dsl.cli.progress import count, summary_line
 from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.report import comparison, results
+from dodo_dsl.report.instances import worst_instances
 from dodo_dsl.report.next_report import NextReport
 from dodo_dsl.report.report_folder import Drawable, write_report
 from dodo_dsl.run.backends import Job
@@ -52,6 +53,8 @@ def write_summary(
         if outcome.outcome != "passed":
             stream.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
     stream.write(blank)
+    if not is_quiet:
+        stream.writelines(f"{printable(worst.in_words())}\n" for worst in worst_instances(outcomes))
     if len(set(tests.values())) < len(tests):
         stream.writelines(f"{line}\n" for line in _rates(outcomes, tests))
     display.write_coloured(stream, _counts(outcomes))

@@ -272,7 +272,7 @@ def _placeholders(scene: DocumentContext, at: Cursor) -> list[str]:
 
 def _named(scene: DocumentContext, at: Cursor, parameter: Parameter) -> list[str]:
     """The names of the map, or other file, that the service has according to its text, or else to the last check."""
-    source, _, key = parameter.among.partition(".")
+    source, keys = file_rules.sources(parameter.among)
     here = at.values.get((*at.steps[:3], source)), *(text for key, text in at.values.items() if key[3:] == (source,))
     service = scene.service(str(at.steps[0]), str(at.steps[1]))
     argument = service.arguments.get(source) if service else None
@@ -280,5 +280,6 @@ def _named(scene: DocumentContext, at: Cursor, parameter: Parameter) -> list[str
     path = next((scene.path.parent / text for text in here if text), checked)
     if path is None:
         return []
-    found = file_rules.entries(path / file_rules.MAP if path.is_dir() else path, key)
-    return [] if isinstance(found, str) else [name for name in found if name]
+    listed = [file_rules.entries(path / file_rules.MAP if path.is_dir() else path, key) for key in keys]
+    names = [name for found in listed if not isinstance(found, str) for name in found if name]
+    return list(dict.fromkeys([*names, *parameter.words]))

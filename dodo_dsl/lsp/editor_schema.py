@@ -17,7 +17,8 @@ from dodo_dsl import atomic, package_data
 from dodo_dsl.lsp.documents import Steps
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
+from dodo_dsl.spec.manifest import Manifest, Parameter, in_words, load_manifests
+from dodo_dsl.spec.schema_errors import written_schema
 
 Schema = dict[str, Any]
 
@@ -96,6 +97,8 @@ def description(parameter: Parameter) -> str:
         facts.append(f"At {'most' if low is None else 'least'} {high if low is None else low}{unit}.")
     if parameter.required and not parameter.rig and not parameter.shared:
         facts.append("Required.")
+    if parameter.when:
+        facts.append(f"Only {in_words(parameter.when)}.")
     if parameter.rig:
         facts.append(f"Defaults to the rig's {parameter.rig}.")
     return " ".join(facts)
@@ -122,6 +125,14 @@ def _value(parameter: Parameter) -> Schema:
             return {"type": ["array", "string"], "items": _TEXT}
         item = _number(replace(parameter, type=parameter.of))
         return {"anyOf": [{"type": "array", "items": item}, item]}
+    if parameter.type == "amount":
+        return {
+            "anyOf": [
+                {"type": "number"},
+                {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-z0-9%/]+\s*$"},
+                _PLACEHOLDER,
+            ]
+        }
     if parameter.type == "string":
         return {"type": ["string", "number", "boolean"]}
     return dict(_TEXT)
@@ -154,8 +165,7 @@ def write(file: Path | None = None) -> None:
 
 @functools.cache
 def _document(name: str) -> Schema:
-    found: Schema = json.loads((package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
-    return found
+    return written_schema(name)
 
 
 def keys_at(name: str, steps: Steps) -> Schema | None:

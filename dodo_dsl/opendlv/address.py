@@ -15,6 +15,9 @@ OF_THE_WORLD = ("opendlv.sim.", "dodo.", "cluon.data.")
 POSE = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
 """Those that tell where the vehicle truly is, or how it moves."""
 
+LINES = "dodo-lines"
+"""The sender, among a test's services, of what its application prints: the runner, from an address of its own."""
+
 
 def group(cid: int) -> Address:
     """The multicast group of a session, with its port."""

@@ -1,9 +1,10 @@
 """The pixel formats of camera frames in shared memory, and pictures from and to them.
 
-``argb`` has 4 bytes per pixel, in memory blue, green, red, alpha; ``bgr`` 3; ``i420`` planes of brightness and, at half
-the width and height, of two colours (12 bits per pixel).
+``argb`` has 4 bytes per pixel, in memory blue, green, red, alpha; ``bgr`` 3, and ``rgb`` in the order of its letters;
+``i420`` planes of brightness and, at half the width and height, of two colours (12 bits per pixel).
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 Picture = NDArray[np.uint8]
 
-FORMATS = ("argb", "bgr", "i420")
-_HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3}  # twice the bytes a pixel
+FORMATS = ("argb", "i420", "bgr", "rgb")
+"""Services that show pictures offer the first two, and the others where ``name.bgr`` and ``name.rgb`` ask for them."""
+HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3, "rgb": 6}  # twice the bytes a pixel
 
 
 class PixelError(ValueError):
@@ -25,34 +27,40 @@ def size(format_: str, width: int, height: int) -> int:
         raise PixelError(f"unknown pixel format '{format_}', expected one of {', '.join(FORMATS)}")
     if format_ == "i420" and (width % 2 or height % 2):
         raise PixelError(f"i420 needs an even width and height, not {width} x {height}")
-    return width * height * _HALF_BYTES[format_] // 2
+    return width * height * HALF_BYTES[format_] // 2
 
 
 def format_of(name: str, memory_size: int, width: int, height: int) -> str:
     """The format of a memory by its size (names lie: some ``.argb`` have 3 bytes a pixel); raises PixelError."""
-    for format_, half_bytes in _HALF_BYTES.items():
+    for format_, half_bytes in HALF_BYTES.items():
         if 0 < memory_size == width * height * half_bytes // 2:
-            return format_
+            return "rgb" if format_ == "bgr" and name.endswith(".rgb") else format_
     raise PixelError(f"memory '{name}' has {memory_size} bytes, not a picture of {width} x {height} pixels")
 
 
 def view(data: Any, format_: str, width: int, height: int) -> Picture:
     """The bytes of a memory as an array, without a copy; raises PixelError where there are too few.
 
-    Its shape is (height, width, 4) for argb, (height, width, 3) for bgr and (height * 3 / 2, width) for i420; bytes
-    behind the picture are left out.
+    Its shape is (height, width, 4) for argb, (height, width, 3) for bgr and rgb, and (height * 3 / 2, width) for i420;
+    bytes behind the picture are left out.
     """
     wanted = size(format_, width, height)
     flat = np.frombuffer(data, np.uint8)
     if flat.size < wanted:
         raise PixelError(f"{flat.size} bytes are too few for {format_} of {width} x {height} pixels, {wanted} bytes")
-    shape = {"argb": (height, width, 4), "bgr": (height, width, 3), "i420": (height * 3 // 2, width)}[format_]
+    shape = (height * 3 // 2, width) if format_ == "i420" else (height, width, HALF_BYTES[format_] // 2)
     return flat[:wanted].reshape(shape)
+
+
+_TO_BGR = {"argb": "COLOR_BGRA2BGR", "i420": "COLOR_YUV2BGR_I420", "rgb": "COLOR_RGB2BGR"}
+_TO_I420 = {"argb": "COLOR_BGRA2YUV_I420", "bgr": "COLOR_BGR2YUV_I420", "rgb": "COLOR_RGB2YUV_I420"}
+_FROM_BGR = {"argb": "COLOR_BGR2BGRA", "i420": "COLOR_BGR2YUV_I420", "rgb": "COLOR_BGR2RGB"}
+_FROM_ARGB = {"bgr": "COLOR_BGRA2BGR", "rgb": "COLOR_BGRA2RGB"}
 
 
 def to_bgr(picture: Picture, format_: str) -> Picture:
     """A picture as blue, green, red (height, width, 3)."""
-    return _converted(picture, {"argb": "COLOR_BGRA2BGR", "i420": "COLOR_YUV2BGR_I420"}.get(format_))
+    return _converted(picture, _TO_BGR.get(format_))
 
 
 def to_i420(picture: Picture, format_: str) -> Picture:
@@ -60,12 +68,18 @@ def to_i420(picture: Picture, format_: str) -> Picture:
     if format_ == "i420":
         return picture.copy()
     size("i420", picture.shape[1], picture.shape[0])
-    return _converted(picture, {"argb": "COLOR_BGRA2YUV_I420", "bgr": "COLOR_BGR2YUV_I420"}[format_])
+    return _converted(picture, _TO_I420[format_])
 
 
 def from_bgr(picture: Picture, format_: str) -> Picture:
     """A picture of blue, green, red in another format, shaped as ``view`` has it; alpha is 255."""
-    return _converted(picture, {"argb": "COLOR_BGR2BGRA", "i420": "COLOR_BGR2YUV_I420"}.get(format_))
+    return _converted(picture, _FROM_BGR.get(format_))
+
+
+def with_copies(argb: Picture, i420: Picture | None, formats: Iterable[str]) -> dict[str, Picture]:
+    """A picture by its formats: the two that there are, and those of ``formats`` that have to be made of argb."""
+    pictures = {"argb": argb} if i420 is None else {"argb": argb, "i420": i420}
+    return pictures | {each: _converted(argb, _FROM_ARGB[each]) for each in formats if each in _FROM_ARGB}
 
 
 def _converted(picture: Picture, code: str | None) -> Picture:

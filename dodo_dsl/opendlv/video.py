@@ -17,7 +17,7 @@ CODECS = {"h264": "h264", "H264": "h264", "VP80": "vp8", "VP90": "vp9", "mjpg": 
 _START = b"\x00\x00\x01"
 _IDR = 5
 _SHOWN = 40
-_AV_NAMES = {"argb": "bgra", "i420": "yuv420p", "bgr": "bgr24"}
+_AV_NAMES = {"argb": "bgra", "i420": "yuv420p", "bgr": "bgr24", "rgb": "rgb24"}
 
 
 class VideoError(ValueError):
@@ -104,12 +104,12 @@ def pyav(purpose: str) -> Any:
 
 FORMAT = "h264"
 _MICROSECOND = Fraction(1, 1_000_000)
-_ENCODED_AV_NAMES = {"argb": "bgr0", "bgr": "bgr24", "i420": "yuv420p"}
+_ENCODED_AV_NAMES = {"argb": "bgr0", "bgr": "bgr24", "rgb": "rgb24", "i420": "yuv420p"}
 _PLANAR = "yuv420p"
 
 
 class VideoEncoder:
-    """Encodes the pictures of one camera, ``kind`` being ``argb``, ``bgr`` or ``i420`` as ``pixels`` has them.
+    """Encodes the pictures of one camera, ``kind`` being one of the formats of ``pixels``.
 
     Every ``key_interval``-th picture stands alone and brings what a decoder needs. ``quality`` is x264's constant rate
     factor, 0 (best) to 51; lossy packets are of the baseline profile, which all decoders know. ``lossless`` packets

@@ -135,7 +135,7 @@ SOURCE = "emulated"
 
 _SAME = (
     "map-path", "width", "height", "freq", "fovy", "x", "y", "z", "yaw", "pitch", "frame-id", "name.argb", "name.i420",
-    "cid",
+    "name.bgr", "name.rgb", "cid",
 )  # fmt: skip
 _TRUTH = ("truth-sender", "truth-classes", "truth-min-visible", "truth-min-height")
 _OTHER = {

@@ -12,8 +12,9 @@ from dodo_dsl.application import mounts
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounts import large_folders
 from dodo_dsl.check import senders as check_senders
+from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.goals import resolved_goals
-from dodo_dsl.check.resolve import WITHOUT, ResolvedTest
+from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import added_services, addresses
@@ -28,8 +29,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, Rig
+from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.values import Value
 
@@ -59,7 +59,7 @@ def build(
     """
     ordered = sorted(tests, key=lambda test: test.spec.slug)
     try:
-        cids = _cids(ordered, deployment)
+        cids = _cids(ordered, deployment, application.cid)
     except addresses.OutOfAddresses as error:
         span = Span(str(deployment.file)) if deployment.file else ordered[-1].spec.span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
@@ -137,17 +137,16 @@ def _import_paths(deployment: Deployment, folder: Path) -> tuple[str, ...]:
     return tuple(Path(os.path.relpath(path, folder)).as_posix() for path in above)
 
 
-def _cids(tests: Sequence[ResolvedTest], deployment: Deployment) -> list[int]:
-    """A CID for each instance: its rig's, or one of the deployment's range."""
-    reserved = [test.rig.cid if test.rig else None for test in tests]
+def _cids(tests: Sequence[ResolvedTest], deployment: Deployment, built_in: int | None) -> list[int]:
+    """A CID for each instance: its rig's, the one that is built into the application, or one of the range.
+
+    Tests may have the same one that is built in: those on networks of their own do not hear each other, and those on
+    the host's wait for each other's leases.
+    """
+    reserved = [cid if test.rig and (cid := test.rig.cid) is not None else built_in for test in tests]
     free = [test for test, cid in zip(tests, reserved, strict=True) if cid is None]
     given = iter(addresses.cids([isolation(test.spec, test.rig) for test in free], deployment.cids))
     return [next(given) if cid is None else cid for cid in reserved]
-
-
-def isolation(spec: Spec, rig: Rig | None) -> str:
-    """The isolation that the spec sets, else its rig's, else a network of its own."""
-    return spec.isolation or (rig.isolation if rig else "network")
 
 
 @dataclass(frozen=True)
@@ -210,6 +209,7 @@ class _Builder:
             "response",
             "resources",
             "goals",
+            "baseline",
         ):
             if key in spec.spans:
                 self._place(key, spec.span(key))
@@ -253,6 +253,7 @@ class _Builder:
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
+            baseline=resolved_baseline(spec).values,
             import_paths=self.shared.imports,
             source_map=self.places,
         )

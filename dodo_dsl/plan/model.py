@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.spec import model as spec_model
-from dodo_dsl.spec.model import Goal, ResourceLimits
+from dodo_dsl.spec.model import Goal, RecordedValue, ResourceLimits
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
@@ -17,6 +17,12 @@ STARTED, HEALTHY, COMPLETED = "service_started", "service_healthy", "service_com
 """The conditions of ``depends_on``."""
 
 FlagKind = Literal["text", "path", "memory", "memories", "report"]
+
+
+DISPLAY_SERVER = ("xvfb-run", "-a", "-s", "-screen 0 1920x1080x24 -nolisten tcp")
+"""What starts a program with an X server of its own (xvfb-run(1))."""
+OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
+"""The variable by which programs that draw with Qt need no display."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,15 @@ class PlannedService:
 
 
 @dataclass(frozen=True)
+class Line:
+    """What a service prints: a line in which RE2 finds ``match`` is a message, whose fields are the named groups."""
+
+    match: str
+    message: str
+    sender: int = 0
+
+
+@dataclass(frozen=True)
 class ApplicationService:
     """A service under test; ``process`` starts it without containers, None when only its image can.
 
@@ -67,6 +82,7 @@ class ApplicationService:
     outputs: tuple[str, ...] = ()
     after: dict[str, str] = field(default_factory=dict)
     optional: tuple[str, ...] = ()
+    lines: tuple[Line, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -130,7 +146,7 @@ class Plan:
     ``lockstep`` is None in real time, ``rig`` empty below level hil; ``more_tags`` are those of the rig's runner beside
     ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,
     relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
-    ``goals`` score a passed test and never change its outcome.
+    ``goals`` score a passed test and never change its outcome; checks must not be worse than those of the ``baseline``.
     ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
@@ -166,6 +182,7 @@ class Plan:
     world: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
+    baseline: tuple[RecordedValue, ...] = ()
     import_paths: tuple[str, ...] = ()
     shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)

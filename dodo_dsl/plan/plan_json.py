@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import re
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
@@ -27,6 +28,8 @@ from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS, is_goal, is_valid
 
 FORMAT = 1
+_RARE = frozenset({"lines"})
+"""Keys of the application's services that are written where there is a value."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -35,9 +38,17 @@ class PlanError(ValueError):
 
 
 def to_json(plan: Plan) -> str:
-    own = {field.name: getattr(plan, field.name) for field in dataclasses.fields(plan)}
-    document = {"dodo": "plan", "version": FORMAT, **own}
+    application = {**_shallow(plan.application), "services": [*map(_without_nothing, plan.application.services)]}
+    document = {"dodo": "plan", "version": FORMAT, **_shallow(plan), "application": application}
     return json_text(document, orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+
+
+def _shallow(value: Any) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+
+
+def _without_nothing(service: ApplicationService) -> dict[str, Any]:
+    return {name: value for name, value in _shallow(service).items() if value or name not in _RARE}
 
 
 def json_text(value: Any, option: int = 0) -> str:
@@ -73,7 +84,8 @@ def _is_complete(value: Any) -> bool:
     if isinstance(value, tuple):
         return all(map(_is_complete, value))
     fields = getattr(value, "__dataclass_fields__", {})
-    return not fields or (vars(value).keys() == fields.keys() and all(map(_is_complete, vars(value).values())))
+    missing = fields.keys() - vars(value).keys() - _RARE if fields else ()
+    return not fields or (not missing and all(map(_is_complete, vars(value).values())))
 
 
 def _with_settings(plan: Plan, settings: Settings) -> Plan:
@@ -103,6 +115,7 @@ def _problem(plan: Plan) -> str:
         "shared file": all(_is_inside(path) and is_shared_name(name) for path, name in plan.shared.items()),
         "import path": not any("\0" in path for path in plan.import_paths),
         "goal": all(map(is_goal, plan.goals)),
+        "baseline": all(math.isfinite(each.value) and each.tolerance >= 0 for each in plan.baseline),
         "service name": all(_NAME.fullmatch(s.name) for s in services),
         "service layer": all(s.layer in LAYERS for s in plan.services),
         "flag": all(f.kind not in ("path", "report") or _is_inside(f.value) for s in plan.services for f in s.flags),
@@ -110,6 +123,7 @@ def _problem(plan: Plan) -> str:
         "port": not any("\0" in s.port for s in plan.services),
         "device": all(is_device(d) for s in plan.services for d in s.devices),
         "resources": plan.resources is None or is_valid(plan.resources),
+        "line": all(0 <= line.sender < 1 << 32 for s in application.services for line in s.lines),
         "condition": all(_is_after(s, application) for s in application.services),
         "order of starts: services wait for one another": not _is_cyclic(application),
     }

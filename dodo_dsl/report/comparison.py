@@ -321,9 +321,13 @@ _TESTS: tuple[Kind, ...] = ("newly failing", "still failing", "new", "gone", "fi
 _CHECKS: tuple[Direction, ...] = ("worse", "better", "different")
 
 
-def to_markdown(comparison: Comparison) -> str:
-    """At most ``MOST_LINES`` lines; each section shows some of what it has, the first ones more."""
+def to_markdown(comparison: Comparison, matrices: Sequence[str] = ()) -> str:
+    """At most ``MOST_LINES`` lines; each section shows some of what it has, the first ones more.
+
+    ``matrices`` says how the instances of each did.
+    """
     sections = [(kind.capitalize(), [_test(test) for test in comparison.of(kind)]) for kind in _TESTS]
+    sections.append(("Matrices", [code(line) for line in matrices]))
     for direction in _CHECKS:
         items = [_check(test, change_words(check), check.name) for test, check in comparison.checks(direction)]
         sections.append((f"Checks: {direction}", items))
@@ -334,7 +338,7 @@ def to_markdown(comparison: Comparison) -> str:
     return "\n".join([*head, *body]) + "\n"
 
 
-def write_markdown(folder: Path, comparison: Comparison | None) -> None:
+def write_markdown(folder: Path, comparison: Comparison | None, matrices: Sequence[str] = ()) -> None:
     """Writes the Markdown into a report, or without a comparison removes that of an earlier one; raises OSError."""
     path = folder / FILE_NAME
     is_there = path.is_symlink() or path.exists()
@@ -342,7 +346,7 @@ def write_markdown(folder: Path, comparison: Comparison | None) -> None:
         if comparison is not None:
             raise atomic.NotReplaceable(errno.EEXIST, "not written by DoDo; nothing is replaced", str(path))
     elif comparison is not None:
-        atomic.write_text(path, to_markdown(comparison))
+        atomic.write_text(path, to_markdown(comparison, matrices))
     elif is_there:
         path.unlink()
 

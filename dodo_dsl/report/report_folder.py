@@ -20,6 +20,7 @@ from dodo_dsl.report import for_gitlab, overview, results
 from dodo_dsl.report.comparison import Comparison
 from dodo_dsl.report.duration_plot import Times
 from dodo_dsl.report.duration_plot import draw as draw_times
+from dodo_dsl.report.instances import worst_instances
 from dodo_dsl.report.trajectory import Way, read_drive
 from dodo_dsl.report.viewer import names as viewer
 from dodo_dsl.spec.matrix import SLUG
@@ -184,7 +185,7 @@ def write_summaries(
     """
     atomic.write_text(folder / results.FILE_NAME, results.to_json(outcomes, circumstances))
     atomic.write_text(folder / "metrics.txt", for_gitlab.metrics_text(outcomes))
-    report_comparison.write_markdown(folder, comparison)
+    report_comparison.write_markdown(folder, comparison, [one.in_words() for one in worst_instances(outcomes)])
     _write_linked(folder, outcomes, comparison, circumstances, place)
 
 

@@ -1,8 +1,9 @@
 """The drive in a recording: the vehicle's path over the map's cones and lines."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,12 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Ground:
-    """The map from above: model positions in metres by colour (RGB, 0 to 1), and named lines."""
+    """The map from above: model positions in metres by colour (RGB, 0 to 1), named lines, and what moves on it."""
 
     models: list[tuple[tuple[float, float, float], list[Point]]] = field(default_factory=list)
     lines: list[tuple[str, list[tuple[float, float, float, float]]]] = field(default_factory=list)
+    moving: tuple[map_file.ModelEntry, ...] = ()
+    """Models at the frames of vehicles."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,8 @@ class DrivenPath:
 
 def read_drive(plan: Plan, folder: Path, recording: Path, way: Way) -> DrivenPath | None:
     """The drive of a test, or None when its recording holds no Frame; ``way`` as its judges recorded it."""
-    path = list(_path(recording)) if recording.is_file() else []
+    paths = _paths(recording) if recording.is_file() else {}
+    path = paths.get(way.frame) or next(iter(paths.values()), [])
     return DrivenPath(path, ground_of(plan, folder), way.length, way.width, way.goal) if path else None
 
 
@@ -66,7 +70,16 @@ def ground_of(plan: Plan, folder: Path) -> Ground:
     return read_ground(folder / FILES / maps[-1]) if maps else Ground()
 
 
-def _path(path: Path) -> Iterator[tuple[float, float, float, float]]:
+def _paths(path: Path) -> dict[int, list[tuple[float, float, float, float]]]:
+    """The path of each sender of frames."""
+    found: dict[int, list[tuple[float, float, float, float]]] = {}
+    for stamp, *pose in _poses(path):
+        x, y, heading, time = pose
+        found.setdefault(stamp, []).append((x, y, heading, time))
+    return found
+
+
+def _poses(path: Path) -> Iterator[tuple[int, float, float, float, float]]:
     from dodo_dsl.opendlv.message_set import (
         MessageError,  # protobuf and numpy take longer to load than the compiler
         MessageSet,
@@ -89,7 +102,7 @@ def _path(path: Path) -> Iterator[tuple[float, float, float, float]]:
             if heading is None or not math.isfinite(frame.x + frame.y):
                 continue
             start = envelope.sample_time if start is None else start
-            yield frame.x, frame.y, heading, (envelope.sample_time - start) / 1e6
+            yield envelope.sender_stamp, frame.x, frame.y, heading, (envelope.sample_time - start) / 1e6
 
 
 def read_ground(place: Path) -> Ground:
@@ -98,11 +111,21 @@ def read_ground(place: Path) -> Ground:
     if found is None:
         return Ground()
     models = [
-        (_GREY if isinstance(model.paint, Path) else model.paint, [each.position[:2] for each in model.instances])
-        for model in found.models
+        (colour_of(model), [each.position[:2] for each in model.instances]) for model in found.models if model.instances
     ]
     try:
-        lines = map_file.read_obstacles(found.path)
+        lines = [(name, [(*a, *b) for a, b in each]) for name, each in map_file.read_obstacles(found.path).items()]
+        lines += [(name, _edges(each)) for name, each in map_file.footprints(found.blocks).items() if each]
     except MapError:
-        lines = {}
-    return Ground(models, [(name, [(*a, *b) for a, b in each]) for name, each in lines.items()])
+        lines = []
+    moving = tuple(model for model in found.models if model.frames)
+    return Ground(models, lines, moving)
+
+
+def _edges(outlines: Iterable[map_file.Outline]) -> list[tuple[float, float, float, float]]:
+    return [(*a, *b) for corners in outlines for a, b in pairwise([*corners, corners[0]])]
+
+
+def colour_of(model: map_file.ModelEntry) -> tuple[float, float, float]:
+    """Red, green and blue from 0 to 1; grey for a texture."""
+    return _GREY if isinstance(model.paint, Path) else model.paint

@@ -28,14 +28,21 @@ def begin_frame(seed: int, application: Iterable[int] = (), key: bytes = b"") ->
     ``application`` are the process ids of the application's services, where the test's services see them.
     """
     begin = MessageSet.standard().type(TEST_BEGIN)
-    now = time.time_ns() // 1000
-    return _frame(begin(seed=seed, application=",".join(map(str, application))), now, key)
+    return frame_of(begin(seed=seed, application=",".join(map(str, application))), key=key)
 
 
-def _frame(message: Message, now: int, key: bytes) -> bytes:
-    messages = MessageSet.standard()
-    id_ = messages.id(message)
-    return encode_frame(Envelope(id_, with_proof(key, id_, messages.encode(message)), now, 0, now, 0))
+def frame_of(
+    message: Message,
+    messages: MessageSet | None = None,
+    sampled: int | None = None,
+    stamp: int = 0,
+    key: bytes | None = None,
+) -> bytes:
+    """A message as a datagram of now, sampled at a time in us, by default now too; with a ``key`` it proves itself."""
+    known, now = messages or MessageSet.standard(), time.time_ns() // 1000
+    id_, payload = known.id(message), known.encode(message)
+    payload = payload if key is None else with_proof(key, id_, payload)
+    return encode_frame(Envelope(id_, payload, now, 0, now if sampled is None else sampled, stamp))
 
 
 def that_hear(plan: Plan) -> list[str]:
@@ -76,7 +83,7 @@ async def _beat(cid: int, key: bytes) -> None:
     while True:
         try:
             now = time.time_ns() // 1000
-            send_on_host(_frame(kind(time=now), now, key), [group(cid)])
+            send_on_host(frame_of(kind(time=now), sampled=now, key=key), [group(cid)])
         except OSError as error:
             _log.warning("cannot send a sign of life to CID %d: %s", cid, error)
         await asyncio.sleep(ALIVE_S)

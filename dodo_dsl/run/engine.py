@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
-from dodo_dsl.run import start_order
+from dodo_dsl.run import listeners, start_order
 from dodo_dsl.run.machine_load import shortage
 from dodo_dsl.run.machine_load.meter import LoadMeter, UseMeter, add_up
 from dodo_dsl.run.outcomes import deaf
@@ -101,6 +101,8 @@ class Engine:
             pass
         except asyncio.CancelledError:
             asyncio.current_task().uncancel()  # type: ignore[union-attr]
+        if application and not self.backend.is_on_host:
+            self.state.buses = frozenset(listeners.buses(application))
         shared = shortage.Shared(self.backend.is_on_host, self.backend.has_engine)
         self.state.shortage = shortage.used_up(shared, application)
         below = shortage.below(self.plan.application.limits) if self.state.ended_early() else ""

@@ -2,7 +2,7 @@
 
 import socket
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import PORT, group
@@ -12,6 +12,7 @@ _PROC = Path("/proc")
 _LOCAL, _INODE = 1, 9
 """Columns of ``/proc/PID/net/udp`` (proc_pid_net(5))."""
 _SOCKET = "socket:["
+_BUSES, _HEX_DIGITS = bytes((225, 0, 0)), 8
 
 
 def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | None:
@@ -41,6 +42,23 @@ def members(cid: int, process: Path = _PROC / "self") -> int | None:
     except OSError:
         return None
     return sum(int(words[1]) for words in rows if words[0] == wanted)
+
+
+def buses(processes: Iterable[int], proc: Path = _PROC) -> set[int]:
+    """The CIDs whose buses programs have joined in the networks of processes, as far as the kernel says."""
+    found = set()
+    for pid in processes:
+        try:
+            words = [line.split() for line in (proc / str(pid) / "net" / "igmp").read_text().splitlines()]
+        except OSError:
+            continue
+        groups = [int(each[0], 16).to_bytes(4, sys.byteorder) for each in words if _is_group(each[0])]
+        found |= {parts[3] for parts in groups if parts[:3] == _BUSES and parts[3]}
+    return found
+
+
+def _is_group(word: str) -> bool:
+    return len(word) == _HEX_DIGITS and set(word) <= set("0123456789ABCDEF")
 
 
 def _sockets(process: Path) -> set[str]:

@@ -32,7 +32,7 @@ from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import needed_paths, own_modules
 from dodo_dsl.run.process.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Entered, Slot
-from dodo_dsl.run.protocol import Backend, BackendError, Event
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Unmatched
 from dodo_dsl.run.rigs.session import attended
 
 _PROGRAM = "sleep"
@@ -166,6 +166,9 @@ class ApplicationContainers(DockerBackend):
     compose_kind = ApplicationCompose
     process = 0
 
+    async def _connect(self) -> None:
+        """Does nothing: the processes beside them do."""
+
     @property
     def events(self) -> asyncio.Queue[Event]:
         """What has happened, for a backend beside this one to add to."""
@@ -221,6 +224,8 @@ class MixedBackend:
         await self._processes.open(self._containers.process)
 
     async def start(self, layer: str) -> dict[str, bool]:
+        if layer == _APPLICATION and self._containers.lines:
+            await self._processes.connect(self._containers.lines)
         return await (self._containers if layer == _APPLICATION else self._processes).start(layer)
 
     async def next_event(self) -> Event:
@@ -249,6 +254,9 @@ class MixedBackend:
     async def close(self, keep: bool) -> list[str]:
         kept = await asyncio.gather(self._processes.close(keep), self._containers.close(keep))
         return [line for lines in kept for line in lines]
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        return self._containers.unmatched()
 
     def tail(self, service: str) -> list[str]:
         return (self._containers if service in self._application else self._processes).tail(service)

@@ -2,24 +2,33 @@
 
 import errno
 import os
+import re
 import signal
 import traceback
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
 from dodo_dsl.outcome import Outcome, Result
 from dodo_dsl.plan.added_services import FRAMES, RECORDER
-from dodo_dsl.plan.model import Plan, PlannedService
+from dodo_dsl.plan.model import DISPLAY_SERVER, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError, Flooded, MemoryTaken, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
+from dodo_dsl.spec.model import RecordedValue
 
 LOG = "logs/runner.log"
 """The traceback of an internal error, in the test's report."""
 _RANK: dict[Result, int] = {"passed": 0, "failed": 1, "error": 2}
 _MAX_ERROR_TEXT = 300
+_NO_DISPLAY = re.compile(
+    r"cannot open display|could not connect to display|can't open display|unable to open (X )?display"
+    r"|no Qt platform plugin could be initialized|Can't initialize GTK backend",
+    re.IGNORECASE,
+)
+"""What GTK, Qt, X11 and OpenCV say without a display."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +100,19 @@ def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
     return [Finding("passed" if v.passed else "failed", v.reason, evaluator, is_timed=True) for v in verdicts]
 
 
+def worse(compared: Iterable[tuple[dict[str, Any], RecordedValue]]) -> Iterator[Finding]:
+    """That checks are worse than those of the baseline, in one finding."""
+    broken = [(check, before) for check, before in compared if not check["ok"]]
+    said = []
+    for check, before in broken:
+        value = "nothing" if check["value"] is None else f"{check['value']:.4g} {check['unit']}".rstrip()
+        side, bound = next(iter(check["limit"].items()))
+        most = f"at {'most' if side == 'max' else 'least'} {bound:.4g}"
+        said.append(f"{before.check} is {value}, worse than {before.value:.4g} in the baseline ({most})")
+    if said:
+        yield Finding("failed", "; ".join(said), is_timed=True)
+
+
 def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:
     """The outcome of a test that never began; ``backend`` by its name."""
     return outcome_of(plan, Finding("error", reason), backend, plan.cid)
@@ -131,7 +153,19 @@ def unstartable(plan: Plan, service: str, why: str) -> str:
     program = programs.get(service, "")
     is_missing = why == f"{program}: {os.strerror(errno.ENOENT)}"
     hint = "; build it first" if is_missing and "/" in program and not Path(program).is_absolute() else ""
+    if is_missing and program == DISPLAY_SERVER[0]:
+        hint = "; its 'display' needs Xvfb: apt install xvfb xauth"
     return f"service '{service}' could not be started: {why}{hint}"
+
+
+def windowless(lines: Sequence[str]) -> str:
+    """What to do about a program that ended as it has no display, by the last lines that it wrote; else empty."""
+    if not any(_NO_DISPLAY.search(line) for line in lines):
+        return ""
+    return (
+        "cannot open display: this program draws a window; start it without one (--verbose, imshow), or write x-dodo: "
+        "{display: true} for its process, or xvfb-run in its image"
+    )
 
 
 def lost_messages(service: PlannedService, messages: int) -> str:
@@ -166,7 +200,7 @@ def _may_send(service: PlannedService, message: str) -> bool:
         names = {flag.name for flag in service.flags}
         return message == FRAMES and "frames" in names and "pictures" not in names
     manifest = load_manifests()[0].get(service.uses)
-    ports = manifest.messages.outputs if manifest else (ANYTHING,)
+    ports = manifest.all_messages.outputs if manifest else (ANYTHING,)
     return any(port.rstrip("?").partition("/")[0] in (message, ANYTHING) for port in ports)
 
 

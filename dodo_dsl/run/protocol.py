@@ -166,6 +166,15 @@ class Stopped:
     reason: str
 
 
+@dataclass(frozen=True)
+class Unmatched:
+    """What a service printed since a line of its own matched the last time, in words; ``never`` if none did."""
+
+    service: str
+    words: str
+    never: bool
+
+
 Event = (
     Ready
     | VerdictEvent
@@ -235,6 +244,10 @@ class Backend(Protocol):
 
     def tail(self, service: str) -> list[str]:
         """The last lines that a service wrote."""
+        ...
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        """Of each service of the application whose lines are messages, those that matched nothing."""
         ...
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.check.senders import told_in_words
-from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse
+from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse, against_baseline
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
@@ -23,6 +23,8 @@ from dodo_dsl.run.outcomes import (
     memory_taken,
     outcome_of,
     unstartable,
+    windowless,
+    worse,
 )
 from dodo_dsl.run.protocol import (
     Backend,
@@ -42,6 +44,7 @@ from dodo_dsl.run.protocol import (
     Responded,
     Stopped,
     Time,
+    Unmatched,
     Unstartable,
     VerdictEvent,
 )
@@ -54,6 +57,10 @@ _KILLED = (-signal.SIGKILL, 128 + signal.SIGKILL)
 
 class Ended(Exception):
     """The test is over; what decided it is among the facts."""
+
+
+_SILENT = "; the test is on CID"
+"""What the reasons of services end with, before the number, where they heard nothing of the application."""
 
 
 @dataclass
@@ -82,6 +89,8 @@ class RunState:
     """Whether the test ended as a program could not be started."""
     shortage: Shortage = field(default_factory=Shortage)
     """What of the machine was used up when the test ended."""
+    buses: frozenset[int] = frozenset()
+    """The CIDs of all buses that programs have joined in the application's networks, where these are the test's own."""
     memory_kills: Callable[[], int] = lambda: 0
     """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
@@ -91,6 +100,7 @@ class RunState:
     _ended_by: str = ""
     """The service whose end was that of the test."""
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    _unmatched: tuple[Unmatched, ...] = ()
     _killed_before: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -212,6 +222,21 @@ class RunState:
         """Whether the end of a service was that of the test."""
         return bool(self._ended_by)
 
+    def _without_display(self, finding: Finding) -> Finding:
+        """The end of a program of the application that wanted to draw, with what to do."""
+        if finding.result == "passed" or not self.is_application(finding.service):
+            return finding
+        told = windowless(self._tails.get(finding.service, ()))
+        return replace(finding, reason=f"{finding.reason}; {told}") if told else finding
+
+    def _elsewhere(self, finding: Finding) -> Finding:
+        """A failure for silence, which names the test's CID, with the bus that the application has joined instead."""
+        others = sorted(self.buses - {self.plan.cid})
+        if not others or finding.result != "failed" or not finding.reason.endswith(f"{_SILENT} {self.plan.cid}"):
+            return finding
+        told = f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}"
+        return replace(finding, reason=f"{finding.reason}; {told}")
+
     def _explained(self, finding: Finding) -> Finding:
         """An error in place of a failure that may be due to what others used up.
 
@@ -255,15 +280,20 @@ class RunState:
         """The test is decided: what services write from now on, as they are ended, explains nothing."""
         names = {*self.layer_of, *self.facts.evaluators, *(finding.service for finding in self.facts.findings)}
         self._tails = {name: tuple(backend.tail(name)) for name in names}
+        self._unmatched = backend.unmatched()
 
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
         answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
         use = judgement.judged_use(self.resources, plan.resources)
-        considered = consider(decide(self.facts, (*answers.findings, *use.findings)), self._load())
-        finding = self._with_told(self._explained(self._timed(considered.finding)))
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
+        judged = [check for verdict in verdicts for check in verdict.checks]
+        base = tuple(against_baseline(judged, plan.baseline))
+        findings = (*answers.findings, *use.findings, *worse(base))
+        considered = consider(decide(self.facts, findings), self._load())
+        found = self._explained(self._elsewhere(self._timed(considered.finding)))
+        finding = self._without_display(self._with_told(self._with_printed(found)))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
             outcome_of(plan, finding, backend.name, backend.cid),
@@ -271,14 +301,31 @@ class RunState:
             execution_s=None if self.finished is None or self.began is None else self.finished - self.began,
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
-            checks=(*(check for verdict in verdicts for check in verdict.checks), *answers.checks, *use.checks),
+            checks=(*judged, *answers.checks, *use.checks, *(check for check, _ in base)),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
-            notes=(*self.notes, *self._shortage_notes(), *losses, *answers.notes, *use.notes),
+            notes=(
+                *self.notes,
+                *self._printed_notes(finding),
+                *self._shortage_notes(),
+                *losses,
+                *answers.notes,
+                *use.notes,
+            ),
             machine=considered.load,
             response=self.response,
             resources=self.resources,
         )
+
+    def _with_printed(self, finding: Finding) -> Finding:
+        """A frame without an answer, with what the application printed instead where it answers by printing."""
+        words = [each.words for each in self._unmatched] if self.is_unanswered else []
+        return replace(finding, reason="; ".join([finding.reason, *words])) if words else finding
+
+    def _printed_notes(self, finding: Finding) -> tuple[str, ...]:
+        """Of services whose lines never matched, where that is not said already."""
+        never = (each.words for each in self._unmatched if each.never)
+        return () if self.is_unanswered or finding.result == "error" else tuple(never)
 
     def _with_told(self, finding: Finding) -> Finding:
         """A verdict on an application that is told what none is on a road says so."""

@@ -6,6 +6,8 @@ What an evaluator recorded goes into a file of its own beside the log.
 import asyncio
 import contextlib
 import os
+import termios
+import tty
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -29,7 +31,13 @@ class ServiceOutput:
     are complete.
     """
 
-    def __init__(self, log: Path, on_line: Callable[[bytes], bool]) -> None:
+    def __init__(
+        self, log: Path, on_line: Callable[[bytes], bool], terminal: bool = False, is_cooked: bool = False
+    ) -> None:
+        """With ``terminal`` it is that of a terminal, to which programs write each line at once; raises OSError.
+
+        ``is_cooked`` tells that another terminal has put a carriage return to the end of each line.
+        """
         self._log, self._record_file = atomic.appended(log), log.with_suffix(JUDGED_SUFFIX)
         self._times, self._begin = LogTimes(log), os.fstat(self._log.fileno()).st_size
         self._on_line = on_line
@@ -37,7 +45,8 @@ class ServiceOutput:
         self._rest = b""
         self._skipping = False
         self._tail: deque[bytes] = deque(maxlen=_TAIL_LINES)
-        self._reader, self.writer = os.pipe2(os.O_CLOEXEC)
+        self._is_cooked = is_cooked
+        self._reader, self.writer = _terminal() if terminal else os.pipe2(os.O_CLOEXEC)
         os.set_blocking(self._reader, False)
         self.done = asyncio.Event()
         asyncio.get_running_loop().add_reader(self._reader, self._read)
@@ -45,6 +54,11 @@ class ServiceOutput:
     def release_writer(self) -> None:
         """Closes this process's copy of the writing end, so that the service's end is the output's end."""
         os.close(self.writer)
+
+    @property
+    def unfinished(self) -> bytes:
+        """The begin of a line whose end has not come."""
+        return self._rest
 
     def tail(self) -> list[str]:
         return [line.decode("utf-8", "replace")[:_TAIL_WIDTH] for line in self._tail]
@@ -69,10 +83,14 @@ class ServiceOutput:
             data = os.read(self._reader, 1 << 16)
         except BlockingIOError:
             return False
+        except OSError:  # the end of a terminal that no program has open any more
+            data = b""
         if not data:
             self._finish()
             return False
         *lines, self._rest = (self._rest + data).split(b"\n")
+        if self._is_cooked:
+            lines = [line.removesuffix(b"\r") for line in lines]
         self._write(b"".join(line + b"\n" for line in lines if self._take(line)))
         if len(self._rest) > _MAX_LINE:
             if not self._skipping:
@@ -131,3 +149,15 @@ class ServiceOutput:
     def _write_times(self) -> None:
         with contextlib.suppress(OSError):  # the log counts without them, too
             self._times.write()
+
+
+def _terminal() -> tuple[int, int]:
+    """Both ends of a pseudo terminal that changes and repeats nothing; raises OSError."""
+    reader, writer = os.openpty()
+    try:
+        tty.setraw(writer, termios.TCSANOW)
+    except termios.error as error:
+        os.close(reader)
+        os.close(writer)
+        raise OSError(*error.args) from None
+    return reader, writer

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.source import Entry
-from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter
+from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter, Ports, holds
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
@@ -19,8 +19,8 @@ FRAME = "opendlv.sim.Frame"
 class Argument:
     """A parameter's value as its flag carries it, converted once.
 
-    ``entry`` is where it is written, None for the manifest's default. ``value`` is None when there is no value, or when
-    the written one does not fit, which ``problem`` then describes.
+    ``entry`` is where it is written, None for the manifest's default. ``value`` is None when there is no value, when
+    the written one does not fit, which ``problem`` then describes, and when it has no effect beside other parameters.
     """
 
     parameter: Parameter
@@ -40,6 +40,11 @@ class ResolvedService:
     use: Use
     manifest: Manifest
     arguments: Mapping[str, Argument]
+
+    @functools.cached_property
+    def messages(self) -> Ports:
+        """The messages that it consumes and produces with these arguments."""
+        return self.manifest.messages_with(self.texts)
 
     @functools.cached_property
     def texts(self) -> Mapping[str, str]:
@@ -69,7 +74,8 @@ def written(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Entr
         return own
     if parameter.shared:
         for other in spec.uses:
-            if other is not use and parameter.name in other.parameters:
+            is_meant = parameter.shared in (True, other.uses.text)
+            if is_meant and other is not use and parameter.name in other.parameters:
                 return other.parameters[parameter.name]
     return rig.entry(parameter.rig) if rig and parameter.rig else None
 
@@ -98,11 +104,20 @@ def resolved(
 ) -> ResolvedService:
     """A service with all its arguments; those of ``like`` that come from the very same entry are taken over.
 
-    The instances of a matrix share the entries that do not depend on it, and so their arguments.
+    The instances of a matrix share the entries that do not depend on it, and so their arguments. Parameters without an
+    effect beside others have no value.
     """
-    arguments = {}
-    for name, parameter in manifest.parameters.items():
-        known = like.get(name) if like else None
-        same = known is not None and known.parameter is parameter and known.entry is written(spec, use, parameter, rig)
-        arguments[name] = known if known is not None and same else argument(spec, use, parameter, rig)
-    return ResolvedService(use, manifest, arguments)
+    arguments: dict[str, Argument] = {}
+    texts: dict[str, str] = {}
+    for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
+        entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
+        same = known is not None and known.parameter is parameter and known.entry is entry and not parameter.driving
+        if not holds(parameter.when, texts):
+            arguments[name] = known if known and same and known.value is None else Argument(parameter, entry)
+            continue
+        is_known = known is not None and same and not (parameter.when and known.value is None)
+        found = known if known is not None and is_known else argument(spec, use, parameter, rig)
+        arguments[name] = found
+        if found.value is not None:
+            texts[name] = found.value.text
+    return ResolvedService(use, manifest, {name: arguments[name] for name in manifest.parameters})

@@ -110,6 +110,31 @@ DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 
 @dataclass(frozen=True)
+class Declarations:
+    """What ``dodo.yml`` says of an application beside its compose ``files``, at its place there.
+
+    ``without`` names services that no test starts. ``services`` have the keys of ``x-dodo``, and ``process``, by name.
+    ``own`` are the keys of ``x-dodo`` of the whole application.
+    """
+
+    files: tuple[Path, ...] = ()
+    without: tuple[Scalar, ...] = ()
+    services: dict[str, Entry] = field(default_factory=dict)
+    own: dict[str, Entry] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, entry: Entry | None, files: tuple[Path, ...]) -> "Declarations":
+        """Those of a valid ``application``."""
+        node = entry.value if entry else None
+        if not isinstance(node, Mapping):
+            return cls(files)
+        services = node.get("services")
+        declared = services.entries if isinstance(services, Mapping) else {}
+        own = {key: entry for key, entry in node.entries.items() if key not in ("files", "without", "services")}
+        return cls(files, tuple(_texts(node.entries.get("without"))), dict(declared), own)
+
+
+@dataclass(frozen=True)
 class Deployment:
     """Where tests and application are; ``root`` is the folder of ``dodo.yml``, or the working folder without one.
 
@@ -125,6 +150,7 @@ class Deployment:
     services: tuple[Path, ...] = ()
     messages: tuple[Path, ...] = ()
     application: tuple[Path, ...] = ()
+    declarations: Declarations = field(default_factory=Declarations)
     image_prefix: str = "dodo"
     image_tag: str = __version__
     cids: tuple[int, ...] = tuple(range(128, 255))
@@ -176,6 +202,9 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
     rigs = _rigs(node.entries.get("rigs"), problems)
     reserved = {r.cid for r in rigs.values()}
     registry, absent = _registry(path.parent, node.entries.get("registry"), problems)
+    about = node.entries.get("application")
+    named = about.value.entries.get("files") if about and isinstance(about.value, Mapping) else about
+    application = _files(path.parent, named, problems)
     deployment = Deployment(
         root=path.parent,
         file=path,
@@ -183,7 +212,8 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
         absent=absent,
         services=_folders(path.parent, node.entries.get("services"), problems),
         messages=_files(path.parent, node.entries.get("messages"), problems),
-        application=_files(path.parent, node.entries.get("application"), problems),
+        application=application,
+        declarations=Declarations.of(about, application),
         image_prefix=images.get("prefix", "dodo"),
         image_tag=images.get("tag", __version__),
         cids=tuple(cid for cid in _cids(node.entries.get("cids"), problems) if cid not in reserved),

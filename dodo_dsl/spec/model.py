@@ -95,7 +95,18 @@ LEVELS = tuple(LEVEL_WORDS)
 KINDS = ("perception", "open-loop", "closed-loop")
 FRAMES = (ALWAYS, ON_FAILURE, NEVER) = ("always", "on-failure", "never")
 """When the pictures of a test's cameras are kept."""
-_MAPPINGS = (*LAYERS, matrix.KEY, vary.KEY, "record", "response", "resources", "application", "goals", "rig")
+_MAPPINGS = (
+    *LAYERS,
+    matrix.KEY,
+    vary.KEY,
+    "record",
+    "response",
+    "resources",
+    "application",
+    "goals",
+    "baseline",
+    "rig",
+)
 MAX_SERVICES = 100
 """In a layer, as in the schema."""
 
@@ -122,6 +133,7 @@ class Spec:
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``resources`` are the limits of what each of the application's services uses, None without any.
     ``variables`` are those that the application gets from the test, ``goals`` the soft ones by the names of checks.
+    ``baseline`` names an earlier result, than which checks must not be worse.
     ``is_whole`` is False where services could not be read, so that missing producers are not reported.
     ``ranges`` are those of ``vary``, ``template`` is the instance before their values were filled in, and ``corners``
     are the same instance at the ends of the ranges, which are checked but never run.
@@ -149,6 +161,7 @@ class Spec:
     uses: tuple[Use, ...] = ()
     variables: dict[str, Entry] = field(default_factory=dict)
     goals: dict[str, Entry] = field(default_factory=dict)
+    baseline: Entry | None = None
     choice: Choice = field(default_factory=Choice)
     spans: dict[str, Span] = field(default_factory=dict)
     is_whole: bool = True
@@ -253,6 +266,7 @@ def spec_of(location: Location, node: Mapping, choice: Choice, is_whole: bool) -
         uses=uses,
         variables=_variables(node.get("application")),
         goals=dict(goals.entries) if isinstance(goals := node.get("goals"), Mapping) else {},
+        baseline=node.entries.get("baseline"),
         choice=choice,
         spans={key: entry.value.span for key, entry in node.entries.items()},
         is_whole=is_whole and len(uses) == _written_services(node) and not _has_stranger(node),
@@ -313,6 +327,20 @@ class Goal:
         if value is None:
             return 0.0
         return min(1.0, max(0.0, (value - self.zero) / (self.one - self.zero)))
+
+
+BASELINE = "baseline-"
+"""How the names of checks begin that compare with an earlier result: ``baseline-mean``."""
+
+
+@dataclass(frozen=True)
+class RecordedValue:
+    """What a check was in an earlier result, by how much of that it may be worse, and its number among its name."""
+
+    check: str
+    value: float
+    tolerance: float
+    number: int = 0
 
 
 def is_goal(goal: Goal) -> bool:

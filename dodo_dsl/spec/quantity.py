@@ -109,6 +109,19 @@ def convert(value: object, unit: str) -> Decimal:
     return _converted(match["number"], written, unit)
 
 
+def in_base_unit(text: str) -> Decimal:
+    """A bare number, or a quantity in the base unit of its dimension: ``3 deg`` in rad. Raises QuantityError.
+
+    For what carries no unit that is known here, such as the field of any message; a share is no such quantity.
+    """
+    unit = written_unit(text)
+    dimension = _DIMENSION[unit or SHARE]
+    if unit is None or (unit and dimension == "share"):
+        hint = with_point(text) or "write for example 0.05 or '0.05 rad'"
+        raise QuantityError(f"'{text[:_MAX_TEXT]}' is not a number or a quantity", hint)
+    return convert(text, next(iter(_FACTORS[dimension])))
+
+
 def _is_quantity(text: str, unit: str) -> bool:
     try:
         convert(text, unit)

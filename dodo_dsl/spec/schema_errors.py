@@ -20,6 +20,7 @@ from dodo_dsl.spec.slips import meant
 
 OF_COMPOSE = "application"
 UNIT = "x-unit"
+_OTHER, _OWN = "application.schema.json#/", "#/$defs/"
 WORDS = "x-words"
 """Allowed in place of a quantity."""
 
@@ -30,9 +31,45 @@ def check_quantity(unit: str, instance: object, schema: dict[str, Any]) -> None:
         quantity.convert(instance, unit)
 
 
+def written_schema(name: str) -> dict[str, Any]:
+    """``schemas/<name>.schema.json`` with what it takes from the schema of compose files."""
+    text = (package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return _with_others(schema, {}) if f'"{_OTHER}' in text else schema
+
+
+def _with_others(part: Any, compose: dict[str, Any]) -> Any:
+    """A part of a schema with the parts of compose's, which is read once, in place of references to them."""
+    if isinstance(part, list):
+        return [_with_others(item, compose) for item in part]
+    if not isinstance(part, dict):
+        return part
+    found = {key: _with_others(value, compose) for key, value in part.items() if key != "$ref"}
+    if "$ref" not in part:
+        return found
+    if not str(part["$ref"]).startswith(_OTHER):
+        return {"$ref": part["$ref"], **found}
+    compose = compose or written_schema(OF_COMPOSE)
+    target: Any = compose
+    for step in str(part["$ref"]).removeprefix(_OTHER).split("/"):
+        target = target[step]
+    return {**_self_contained(target, compose), **found}
+
+
+def _self_contained(part: Any, compose: dict[str, Any]) -> Any:
+    """A part of compose's schema without references within it."""
+    if isinstance(part, list):
+        return [_self_contained(item, compose) for item in part]
+    if not isinstance(part, dict):
+        return part
+    name = str(part.get("$ref", "")).removeprefix(_OWN)
+    base = _self_contained(compose["$defs"][name], compose) if name else {}
+    return {**base, **{key: _self_contained(value, compose) for key, value in part.items() if key != "$ref"}}
+
+
 def schema_of(name: str) -> dict[str, Any]:
     """``schemas/<name>.schema.json`` without what is for editors alone."""
-    schema: dict[str, Any] = json.loads((package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8"))
+    schema = written_schema(name)
     if (use := schema.get("$defs", {}).get("use")) is not None:
         use.pop("allOf")  # for editors; the rules give better messages
         use["required"] = ["uses"]  # what a test extends is merged here, of which editors know nothing

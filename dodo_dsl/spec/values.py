@@ -85,6 +85,18 @@ def _number(parameter: Parameter, node: Node, _: Path) -> Value:
     return _bounded(parameter, scalar, number)
 
 
+def _amount(parameter: Parameter, node: Node, _: Path) -> Value:
+    """A bare number or a quantity, in the base unit of its dimension; where allowed, a share such as ``25%``."""
+    scalar = _scalar(parameter, node, "a number or a quantity")
+    try:
+        if parameter.or_share and quantity.written_unit(scalar.text) == "%":
+            share = quantity.convert(scalar.text, quantity.SHARE)
+            return Value(f"{_bounded(parameter, scalar, share * 100).text}%")
+        return _bounded(parameter, scalar, quantity.in_base_unit(scalar.text))
+    except quantity.QuantityError as error:
+        raise ValueProblem(scalar.span, "wrong-unit", f"{_name(parameter)}: {error}", error.hint) from error
+
+
 def _bare_number(parameter: Parameter, scalar: Scalar) -> Decimal:
     whole = parameter.type == "integer"
     wanted: type | tuple[type, ...] = int if whole else (int, float)
@@ -210,6 +222,7 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
 _CONVERTERS: dict[str, Callable[[Parameter, Node, Path], Value]] = {
     "number": _number,
     "integer": _number,
+    "amount": _amount,
     "string": _text,
     "boolean": _boolean,
     "path": _path,

@@ -1,10 +1,10 @@
-"""Find the cones in the frames of the car's camera and tell the bus about them.
+"""Find the cones and other cars in the frames of the car's camera and tell the bus about them.
 
     python perception.py --cid=111 --name=video0.argb --width=640 --height=480 --verbose
 
-Reads shared memory, 4 bytes a pixel (blue, green, red, alpha). Sends for each cone, with the frame's time
-stamp as sample time and the frame's number as sampleId: DetectionType (1 yellow, 2 blue), DetectionProperty
-(`yellow`, `blue`) and DetectionBoundingBox (fractions of the image). When all cones of a frame have been sent,
+Reads shared memory, 4 bytes a pixel (blue, green, red, alpha). Sends for each cone and car, with the frame's time
+stamp as sample time and the frame's number as sampleId: DetectionType (1 yellow, 2 blue, 3 car), DetectionProperty
+(`yellow`, `blue`, `car`) and DetectionBoundingBox (fractions of the image). When all of a frame have been sent,
 also when there are none, an ImageReadingShm with the same sampleId says that the frame is complete.
 """
 
@@ -25,19 +25,21 @@ from cv2.typing import MatLike, Rect
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
-TYPES = {"yellow": 1, "blue": 2}
+TYPES = {"yellow": 1, "blue": 2, "car": 3}
 HSV_RANGES = {"yellow": ((22, 150, 45), (36, 255, 255)), "blue": ((102, 124, 20), (130, 255, 255))}
+CAR = ((145, 120, 40), (170, 255, 255))  # hue, saturation and value of the other car
 WHITE = 0.85  # how far the colour of the floor is taken for that of the light
 HORIZON = 0.45  # no cone stands higher in the image
 SMALLEST = 1 / 14_000  # of the image; less than this is noise: 22 pixels of 640 x 480
+SMALLEST_CAR = 1 / 1_000  # of the image
 SLENDER = (0.8, 3.5)  # height of a cone's box to its width
 FILLED = 0.35  # share of its box that a cone covers
 ASKS, LISTENS = 1, 2  # sender stamps of perception's question to steering and of the answer
 PATIENCE = 0.02  # seconds between questions and between looks for the camera
 
 
-class Cone(NamedTuple):
-    """A cone's colour and box: upper left corner and size as fractions of the image."""
+class Patch(NamedTuple):
+    """A patch's colour, `car` for that of other cars, and box: upper left corner and size as fractions of the image."""
 
     colour: str
     x: float
@@ -46,16 +48,21 @@ class Cone(NamedTuple):
     height: float
 
 
-def find_cones(image: MatLike) -> list[Cone]:
-    """The cones in an image of blue, green, red (and alpha), the nearest of each colour first."""
+def find(image: MatLike) -> list[Patch]:
+    """Cones and cars in an image of blue, green, red (and alpha), the nearest cone of each colour first."""
     height, width = image.shape[:2]
     top = int(HORIZON * height)
     ground = image[top:] if image.shape[2] == 3 else cv2.cvtColor(image[top:], cv2.COLOR_BGRA2BGR)
     hsv = cv2.cvtColor(white_balanced(ground), cv2.COLOR_BGR2HSV)
-    return [
-        Cone(colour, x / width, (top + y) / height, w / width, h / height)
+    boxes = {
+        colour: _cones(cv2.inRange(hsv, low, high), SMALLEST * width * height)
         for colour, (low, high) in HSV_RANGES.items()
-        for x, y, w, h in _boxes(cv2.inRange(hsv, low, high), SMALLEST * width * height)
+    }
+    boxes["car"] = _boxes(cv2.inRange(hsv, *CAR), SMALLEST_CAR * width * height)
+    return [
+        Patch(colour, x / width, (top + y) / height, w / width, h / height)
+        for colour, found in boxes.items()
+        for x, y, w, h in found
     ]
 
 
@@ -66,13 +73,17 @@ def white_balanced(ground: MatLike) -> MatLike:
     return cv2.multiply(ground, (*gains, 1.0))
 
 
-def _boxes(mask: MatLike, smallest: float) -> list[Rect]:
-    """Boxes (x, y, width, height in pixels) of the patches in a mask that may be cones, the lowest first."""
+def _cones(mask: MatLike, smallest: float) -> list[Rect]:
+    """Boxes of the patches in a mask that may be cones, the lowest first."""
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    boxes = [cv2.boundingRect(contour) for contour in contours]
-    cones = [box for box in boxes if box[2] * box[3] >= smallest and _may_be_cone(box, mask)]
+    cones = [box for box in _boxes(mask, smallest) if _may_be_cone(box, mask)]
     return sorted(cones, key=lambda box: -(box[1] + box[3]))
+
+
+def _boxes(mask: MatLike, smallest: float) -> list[Rect]:
+    """Boxes (x, y, width, height in pixels) of the patches in a mask."""
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    return [box for box in map(cv2.boundingRect, contours) if box[2] * box[3] >= smallest]
 
 
 def _may_be_cone(box: Rect, mask: MatLike) -> bool:
@@ -83,17 +94,17 @@ def _may_be_cone(box: Rect, mask: MatLike) -> bool:
     return y > 0 and (cut or (SLENDER[0] <= height / width <= SLENDER[1] and filled >= FILLED))
 
 
-def announce(session: Session, cones: list[Cone], frame: int, sample_time: int, source: argparse.Namespace) -> None:
+def announce(session: Session, found: list[Patch], frame: int, sample_time: int, source: argparse.Namespace) -> None:
     """Send what was found in a frame, and that this was all."""
     logic = "opendlv.logic.perception."
     kind, property_, box = (
         session.messages.type(logic + name) for name in ("DetectionType", "DetectionProperty", "DetectionBoundingBox")
     )
-    for number, cone in enumerate(cones):
+    for number, each in enumerate(found):
         key = {"sampleId": frame, "detectionId": number}
-        session.send(kind(**key, type=TYPES[cone.colour]), sample_time)
-        session.send(property_(**key, property=cone.colour), sample_time)
-        session.send(box(**key, x=cone.x, y=cone.y, width=cone.width, height=cone.height), sample_time)
+        session.send(kind(**key, type=TYPES[each.colour]), sample_time)
+        session.send(property_(**key, property=each.colour), sample_time)
+        session.send(box(**key, x=each.x, y=each.y, width=each.width, height=each.height), sample_time)
     done = session.messages.type("opendlv.proxy.ImageReadingShm")
     size = {"width": source.width, "height": source.height}
     session.send(done(format="argb", location=source.name, sampleId=frame, **size), sample_time)
@@ -130,14 +141,14 @@ def watch(memory: SharedMemory, session: Session, numbers: Iterator[int], flags:
             continue
         with memory.lock():
             image, sample_time = pixels.copy(), memory.sample_time()
-        frame, cones = next(numbers), find_cones(image)
-        announce(session, cones, frame, sample_time, flags)
+        frame, found = next(numbers), find(image)
+        announce(session, found, frame, sample_time, flags)
         if flags.verbose:
-            print(f"frame {frame}: {len(cones)} cones", flush=True)
+            print(f"frame {frame}: {len(found)} boxes", flush=True)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="Find cones in the frames of a camera.")
+    parser = argparse.ArgumentParser(description="Find cones and cars in the frames of a camera.")
     parser.add_argument("--cid", type=int, required=True, help="the bus, 1 to 254")
     parser.add_argument("--name", default="video0.argb", help="the camera's shared memory")
     parser.add_argument("--width", type=int, required=True, help="of the image, in pixels")

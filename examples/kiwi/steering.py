@@ -1,4 +1,4 @@
-"""Steer the car between the yellow cones on its left and the blue ones on its right.
+"""Steer the car between the yellow cones on its left and the blue ones on its right, and behind other cars.
 
     python steering.py --cid=111 --verbose
 
@@ -13,6 +13,7 @@ import math
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.envelope import Envelope
@@ -29,6 +30,8 @@ STEERING_GAIN = float(os.environ.get("STEERING_GAIN", "1"))  # above 1 it steers
 TRACK_WIDTH = float(os.environ.get("LANE_WIDTH", "0.5"))  # m, assumed where only one side is seen
 PEDAL = float(os.environ.get("PEDAL", "0.08"))  # 0.52 m/s
 PEDAL_BLIND = 0.05
+STOP, SLOW = 0.45, 1.0  # m to another car, from below the camera: between the two it slows down
+BESIDE = 0.25  # m to the side, beyond which a car is not in the way
 FRAMES_BLIND = 10  # then stop
 ASKS, LISTENS = 1, 2  # sender stamps of perception's question and of the answer
 
@@ -77,6 +80,12 @@ def steering_towards(aim: Point) -> float:
     return max(-STEERING_LIMIT, min(STEERING_LIMIT, request))
 
 
+def free_way(cars: Sequence[Point]) -> float:
+    """How fast to drive behind other cars: 1 where none is near, 0 to stop."""
+    ahead = min((car.ahead for car in cars if abs(car.left) < BESIDE), default=SLOW)
+    return max(0.0, min(1.0, (ahead - STOP) / (SLOW - STOP)))
+
+
 class Driver:
     """Chooses steering and pedal, frame by frame; holds its steering for a while when it sees nothing."""
 
@@ -85,15 +94,15 @@ class Driver:
         self.steering = 0.0
         self.blind = 0
 
-    def drive(self, yellow: list[Point], blue: list[Point]) -> tuple[float, float]:
-        """The steering request (rad, left is positive) and the pedal for a frame's cones."""
-        aim = aim_point(yellow, blue)
+    def drive(self, yellow: list[Point], blue: list[Point], cars: Sequence[Point] = ()) -> tuple[float, float]:
+        """The steering request (rad, left is positive) and the pedal for a frame's cones and cars."""
+        aim, free = aim_point(yellow, blue), free_way(cars)
         if aim is None:
             self.blind += 1
-            return self.steering, PEDAL_BLIND if self.blind <= FRAMES_BLIND else 0.0
+            return self.steering, PEDAL_BLIND * free if self.blind <= FRAMES_BLIND else 0.0
         self.blind = 0
         self.steering = self.sign * steering_towards(aim)
-        return self.steering, PEDAL
+        return self.steering, PEDAL * free
 
 
 class Frames:
@@ -113,15 +122,15 @@ class Frames:
             if place:
                 self.places[key] = place
 
-    def complete(self, frame: int) -> tuple[list[Point], list[Point]]:
-        """The yellow and the blue cones of a frame; everything heard so far is forgotten."""
-        found: dict[str, list[Point]] = {"yellow": [], "blue": []}
+    def complete(self, frame: int) -> tuple[list[Point], list[Point], list[Point]]:
+        """The yellow and the blue cones of a frame, and the cars; everything heard so far is forgotten."""
+        found: dict[str, list[Point]] = {"yellow": [], "blue": [], "car": []}
         for key, place in self.places.items():
             if key[0] == frame and self.colours.get(key) in found:
                 found[self.colours[key]].append(place)
         self.colours.clear()
         self.places.clear()
-        return found["yellow"], found["blue"]
+        return found["yellow"], found["blue"], found["car"]
 
 
 def handle(session: Session, envelope: Envelope, frames: Frames, driver: Driver, verbose: bool) -> None:

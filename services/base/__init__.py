@@ -2,7 +2,7 @@
 
 from services.base.clock import Clock, Inbox, RealTimeClock
 from services.base.evaluator import Evaluator, JudgedTime, UnjudgeableError
-from services.base.flags import Flags, FlagsError
+from services.base.flags import Flags, FlagsError, Share
 from services.base.judged import Judged, JudgedBoxes, Series
 from services.base.process import run
 from services.base.service import Check, Context, Handler, Output, Service, Verdict, period_of
@@ -23,6 +23,7 @@ __all__ = [
     "RealTimeClock",
     "Series",
     "Service",
+    "Share",
     "UnjudgeableError",
     "Verdict",
     "period_of",

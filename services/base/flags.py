@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -84,7 +84,13 @@ def example(about: About) -> str:
     return words.get(about["type"]) or str(about.get("minimum", 1))
 
 
-Value = int | float | str | bool | list[Any] | None
+class Share(NamedTuple):
+    """An amount that is written as a share, such as 25 % of a target: 0.25."""
+
+    of_one: float
+
+
+Value = int | float | str | bool | list[Any] | Share | None
 
 _FLAG = re.compile(r"--(?P<name>[A-Za-z][A-Za-z0-9.-]*)(?:=(?P<value>.*))?", re.DOTALL)
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
@@ -92,6 +98,7 @@ _INTEGER = re.compile(r"[-+]?[0-9]{1,20}")
 _KINDS = {
     "number": "a finite number",
     "integer": "a whole number",
+    "amount": "a finite number",
     "boolean": "true or false",
     "path": "a path",
     "memory": "a name",
@@ -109,7 +116,8 @@ class FlagsError(ValueError):
 class Flags(Mapping[str, Any]):
     """Values by parameter name, defaults filled in; an optional parameter without default is None.
 
-    A ``number`` is a float, an ``integer`` an int, a ``list`` a list of strings or of what its ``of`` says, a
+    A ``number`` is a float, an ``amount`` a float or a Share, an ``integer`` an int, a ``list`` a list of strings or of
+    what its ``of`` says, a
     ``boolean`` a bool, everything else a string; numbers are in the manifest's unit.
     """
 
@@ -139,7 +147,12 @@ def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
     for name, about in known.items():
         if about.get("required") and name not in given:
             raise FlagsError(f"--{name} is missing: {about['help']}")
-    return Flags({name: given.get(name, _default(about)) for name, about in known.items()})
+    values = {name: given.get(name, _default(about)) for name, about in known.items()}
+    for name in given:
+        for other, wanted in (known[name].get("when") or {}).items():
+            if ("" if values[other] is None else values[other]) not in wanted:
+                raise FlagsError(f"--{name} is for {_wanted(other, wanted)}")
+    return Flags(values)
 
 
 def _split(word: str) -> tuple[str, str | None]:
@@ -151,7 +164,7 @@ def _split(word: str) -> tuple[str, str | None]:
 
 def _default(about: About) -> Value:
     value: Value = about.get("default")
-    return float(value) if about["type"] == "number" and isinstance(value, int) else value
+    return float(value) if about["type"] in ("number", "amount") and isinstance(value, int) else value
 
 
 def _near(name: str, known: Mapping[str, object]) -> str:
@@ -173,12 +186,15 @@ def _value(name: str, about: About, text: str | None) -> Value:
         raise FlagsError(f"--{name}={text} is not {_expected(about)}")
     if about.get("choices") and value not in about["choices"]:
         raise FlagsError(f"--{name}={text} is not one of {bounds(about)}")
+    if isinstance(value, Share) and not about.get("or-share"):
+        raise FlagsError(f"--{name}={text} is a share, expected {_expected(about)}")
     if not _allowed(about, value):
         raise FlagsError(f"--{name}={text} is out of range, expected {bounds(about)}{unit(about)}")
     return value
 
 
 def _allowed(about: About, value: Value) -> bool:
+    value = value.of_one if isinstance(value, Share) else value
     if not isinstance(value, int | float):
         return True
     low, high = about.get("minimum"), about.get("maximum")
@@ -190,8 +206,14 @@ def _number(text: str) -> float | None:
     return value if value is not None and value - value == 0.0 else None
 
 
+def _amount(text: str) -> float | Share | None:
+    number = _number(text.removesuffix("%"))
+    return number if number is None or not text.endswith("%") else Share(number / 100)
+
+
 _CONVERTERS: dict[str, Callable[[str], Value]] = {
     "number": _number,
+    "amount": _amount,
     "integer": lambda text: int(text) if _INTEGER.fullmatch(text) else None,
     "boolean": lambda text: _BOOLEANS.get(text.lower()),
     "list": lambda text: [part for part in text.split(",") if part],
@@ -222,6 +244,11 @@ def example_line(manifest: Mapping[str, Any]) -> str:
     return shlex.join([*manifest["process"], *words])
 
 
+def _wanted(name: str, values: Sequence[str | bool]) -> str:
+    """``--drive=kiwi or bicycle``."""
+    return f"--{name}={' or '.join(str(value).lower() for value in values if value != '')}"
+
+
 def _facts(about: About) -> str:
     kind = f"list of {about['of']}s" if "of" in about else about["type"]
     facts = [kind + unit(about), ("one of " if about.get("choices") else "") + bounds(about)]
@@ -229,4 +256,5 @@ def _facts(about: About) -> str:
         facts.append("required")
     elif about.get("default") not in (None, [], ""):
         facts.append(f"default {example({'default': about['default'], 'type': about['type']})}")
+    facts += [f"with {_wanted(other, wanted)}" for other, wanted in (about.get("when") or {}).items()]
     return ", ".join(fact for fact in facts if fact)

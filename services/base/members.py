@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
-from dodo_dsl.opendlv.address import Address, is_of_the_world
+from dodo_dsl.opendlv.address import LINES, Address, is_of_the_world
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE, is_proven, with_proof
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
@@ -40,6 +40,8 @@ class Producers:
     @property
     def reason(self) -> str:
         """Why a test fails in which the application sent the message."""
+        if self.services == (LINES,):
+            return f"the application sent {self.message}, which it declares to print (x-dodo: lines)"
         *others, last = [f"'{name}'" for name in self.services] or [""]
         who = f"only {', '.join(others)} and {last} may send" if others else f"only {last} may send"
         if not self.services:
@@ -89,6 +91,16 @@ class SenderTable:
             return True
         self.report(f"the application sent {name}, which only the runner may send")
         return False
+
+    def is_of(self, service: str, envelope: Envelope, source: Address) -> bool:
+        """Whether a message of the type SENDER proves that its ``source`` is this service's address."""
+        if not is_proven(self.key, envelope.data_type, envelope.payload):
+            return False
+        try:
+            said: Any = self.messages.decode(envelope.data_type, envelope.payload)
+        except MessageError:
+            return False
+        return said.service == service and (said.host, said.port) == source
 
     def report(self, reason: str) -> None:
         """Tell the runner why the test fails."""
@@ -227,7 +239,12 @@ class Members:
         if not self._table.is_of_runner(envelope):
             return False
         producers = self._table.producers(envelope)
-        return producers is None or self._session.source in self._known or self._is_excused(producers)
+        if producers is None:
+            return True
+        if LINES in producers.services or self._session.source != self._addresses.get(LINES):
+            return self._session.source in self._known or self._is_excused(producers)
+        self._table.report(producers.reason)  # printed, and of a service of the test
+        return False
 
     def send(self, envelope: Envelope) -> bytes:
         """Send a message of the world to the test's services alone, and return its frame.

@@ -1,8 +1,9 @@
 """The camera as a service: pictures into shared memory at a fixed rate, and its state for observers of the bus."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
@@ -48,13 +49,12 @@ class RigCameraService(Service):
     def __init__(
         self,
         camera: Grabber | FileCamera,
-        argb: SharedMemory,
-        i420: SharedMemory,
+        memories: Sequence[tuple[SharedMemory, str]],
         freq: float,
         telemetry: CameraTelemetry,
     ) -> None:
         self.period = period_of(freq)
-        self._camera, self._argb, self._i420, self._telemetry = camera, argb, i420, telemetry
+        self._camera, self._memories, self._telemetry = camera, memories, telemetry
         self.shared = 0
         """How many pictures were shared."""
 
@@ -64,8 +64,9 @@ class RigCameraService(Service):
         )
         if picture is not None:
             time = now if picture.time is None else picture.time
-            share(self._argb, picture.argb, time)
-            share(self._i420, picture.i420, time)
+            pictures = pixels.with_copies(picture.argb, picture.i420, (kind for _, kind in self._memories))
+            for memory, kind in self._memories:
+                share(memory, pictures[kind], time)
             self.shared += 1
         return self._telemetry.update(picture is not None, now)
 
@@ -106,8 +107,8 @@ def build(context: Context) -> Service:
     width, height, freq = flags["width"], flags["height"], flags["freq"]
     if width % 2 or height % 2:
         raise ValueError(f"--width={width} and --height={height} must be even for I420")
-    argb = context.memory(flags["name.argb"], width * height * 4)
-    i420 = context.memory(flags["name.i420"], width * height * 3 // 2)
+    names = {kind: flags[f"name.{kind}"] for kind in pixels.FORMATS}
+    memories = [(context.memory(name, pixels.size(kind, width, height)), kind) for kind, name in names.items() if name]
     telemetry = CameraTelemetry(
         context.messages, flags["status-id"], 2 * max(period_of(freq), round(flags["exposure"] * 1e6))
     )
@@ -116,11 +117,11 @@ def build(context: Context) -> Service:
         context.log.warning("%s", note)
     if isinstance(camera, FileCamera):
         context.resources.callback(camera.close)
-        return RigCameraService(camera, argb, i420, freq, telemetry)
+        return RigCameraService(camera, memories, freq, telemetry)
     silence = longest_silence(freq, flags["exposure"])
     grabber, first = Grabber(camera, flags["source"], silence), max(FIRST, silence)
     context.resources.callback(grabber.close)
     with interruptible():
         if not grabber.wait(first):
             raise CameraError(f"the camera {flags['source']} gave no picture for {first:g} s")
-    return RigCameraService(grabber, argb, i420, freq, telemetry)
+    return RigCameraService(grabber, memories, freq, telemetry)

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple, Protocol
 
-from dodo_dsl.opendlv.address import Address
+from dodo_dsl.opendlv.address import LINES, Address
 from dodo_dsl.opendlv.envelope import Envelope, FrameError
 from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.session import Session
 from services.base.clock_link import STEP, STEP_DONE, ClockChannel, EncodedEnvelope, Reassembly, decode, split
-from services.base.members import SenderTable, World
+from services.base.members import SENDER, SenderTable, World
 
 REPEAT_S = 0.2
 _SLICE = 0.05
@@ -70,6 +70,9 @@ class Exchange:
         self._world = World.load(session.messages)
         self._step = session.messages.type(STEP)
         self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
+        self._sender_id = session.messages.id(SENDER)
+        self._printing: Address | None = None
+        """From where the runner sends what the application prints; the first one that proves it."""
         self._number = 0
         self._pending: dict[str, _Pending] = {}
         self._results: dict[str, StepResult] = {}
@@ -135,9 +138,12 @@ class Exchange:
                 self._senders.report(f"the application sent {name}, which only services of the test may send")
             elif envelope.data_type == self._done_id:
                 self._take(envelope, None)
+        elif envelope.data_type == self._sender_id:
+            if self._printing is None and self._senders.is_of(LINES, envelope, source):
+                self._printing = source
         elif source not in self._own and self._senders.is_of_runner(envelope):
             producers = self._senders.producers(envelope)
-            if producers is None:
+            if producers is None or (LINES in producers.services and source == self._printing):
                 self._take_other(envelope)
             else:
                 self._senders.report(producers.reason)

@@ -14,7 +14,7 @@ from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
 from services.base.clock_link import ClockChannel
 from services.base.lockstep_clock import EPOCH
-from services.base.members import SenderTable
+from services.base.members import SENDER, SenderTable
 from services.base.service import Service
 from services.clock.answers import Answers
 from services.clock.application import ResponseTimes, SteppedApplication
@@ -29,7 +29,7 @@ A short test needs them closer, as what was measured by the wall clock is put to
 """
 _SLICE = 0.05
 _MOST_EARLY = 1000
-CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone")
+CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone", SENDER)
 """What the clock consumes beside the application's answers."""
 
 _log = logging.getLogger(__name__)
@@ -50,7 +50,8 @@ class ClockService(Service):
         self._session, self._channel = session, channel
         self._begin_id = session.messages.id("dodo.TestBegin")
         self._senders = senders or SenderTable(session.messages)
-        self._heard: frozenset[int] = frozenset([*(each.data_type for each in answers.filters), *self._senders.ids])
+        answering = (each.data_type for each in answers.filters)
+        self._heard = frozenset([*answering, *self._senders.ids, session.messages.id(SENDER)])
         self._guarded = self._senders.ids | {session.messages.id(name) for name in CONSUMED}
         self._early: list[tuple[Envelope, Address]] = []
         self._exchange = exchange = Exchange(session, channel, answers.take, self._senders)

@@ -12,6 +12,7 @@ from typing import Literal
 import shapely
 
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.collision.bodies import Approach, Footprints, OtherBody
 from services.collision.track import (
     Gates,
     Track,
@@ -33,11 +34,12 @@ MICROSECONDS = 1_000_000
 
 @dataclass
 class DriveMeasures:
-    """Distance driven (m), highest speed (m/s), smallest distance to a wall (m), time to the goal (s)."""
+    """Distance driven (m), highest speed (m/s), smallest distances to a wall and a body (m), time to the goal (s)."""
 
     distance: float = 0.0
     max_speed: float | None = None
     wall_margin: float | None = None
+    body_margin: float | None = None
     time_to_goal: float | None = None
 
     def move(self, start: tuple[int, VehiclePose], end: tuple[int, VehiclePose]) -> float:
@@ -66,10 +68,11 @@ class DriveMeasures:
 
     def wall_check(self, limit: float) -> Check:
         """The margin, at least its limit, or more than a limit of zero: a wall touched is a wall hit."""
-        margin = self.wall_margin
-        is_kept = margin is not None and margin >= limit and margin > 0.0
-        flags = ("min-margin", "walls")
-        return Check("wall-margin", margin, {"min": limit}, "m", is_kept, exclusive=limit <= 0.0, parameters=flags)
+        return _margin_check("wall-margin", self.wall_margin, limit, ("min-margin", "walls"))
+
+    def body_check(self, limit: float) -> Check:
+        """The same of other bodies."""
+        return _margin_check("body-margin", self.body_margin, limit, ("min-body-margin", "bodies"))
 
     @staticmethod
     def gate_check(crossed: int, gates: int) -> Check:
@@ -83,6 +86,11 @@ class DriveMeasures:
         return Check("distance", self.distance, {}, "m", True), Check(
             "max-speed", self.max_speed, speed, "m/s", is_kept
         )
+
+
+def _margin_check(name: str, margin: float | None, limit: float, flags: tuple[str, ...]) -> Check:
+    is_kept = margin is not None and margin >= limit and margin > 0.0
+    return Check(name, margin, {"min": limit}, "m", is_kept, exclusive=limit <= 0.0, parameters=flags)
 
 
 REQUESTS = ("opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest")
@@ -160,7 +168,10 @@ class TrackEvaluator(Evaluator):
 
     period = PERIOD
 
-    def __init__(self, track: Track, box: VehicleBox, requests: Requests | None = None) -> None:
+    def __init__(
+        self, track: Track, box: VehicleBox, requests: Requests | None = None, bodies: Footprints | None = None
+    ) -> None:
+        """``bodies`` are those that the vehicle must not touch, by the sender stamps of their frames."""
         super().__init__(track.max_time)
         self.track = track
         self.box = box
@@ -173,10 +184,16 @@ class TrackEvaluator(Evaluator):
         least = track.min_margin
         self._margins = self.judged.series("Distance to the walls", "m", low=least, exclusive=least <= 0.0)
         self._speeds = self.judged.series("Speed", "m/s", high=track.max_speed)
+        self._bodies = {stamp: OtherBody(*about, box) for stamp, about in (bodies or {}).items()}
+        self._nearest: dict[str, float | str | None] = {}
+        least = track.min_body_margin
+        self._gaps = (
+            self.judged.series("Distance to other bodies", "m", low=least, exclusive=least <= 0.0) if bodies else None
+        )
 
     def forget(self, now: int) -> None:
         self._measures = DriveMeasures()
-        self._closest = {}
+        self._closest, self._nearest = {}, {}
         self._requests.forget(now)
 
     def request(self, name: str) -> None:
@@ -200,6 +217,8 @@ class TrackEvaluator(Evaluator):
         if self.verdict is not None or (self._last is not None and time <= self._last[0]):
             return
         start, self._last = self._last, (time, pose)
+        for body in self._bodies.values():
+            body.take_vehicle(time, pose)
         if start is None:
             fault = fault_of_start(self.track, outline(pose, self.box))
             if fault is not None:
@@ -208,6 +227,47 @@ class TrackEvaluator(Evaluator):
             self.time_is_over()
         elif self.elapsed(time) >= 0:
             self._judge(start, time, pose)
+        self._judge_bodies()
+
+    def look_at_body(self, stamp: int, pose: VehiclePose, time: int) -> None:
+        """Judge how close the vehicle has come to a body, which is now here; raises UnjudgeableError as ``look``."""
+        self._bodies[stamp].take(time, pose)
+        self._judge_bodies()
+
+    def _judge_bodies(self) -> None:
+        for body in self._bodies.values():
+            first, limit = body.first(), self.track.min_body_margin
+            if first is not None and (first <= 0.0 or first < limit):
+                far = "touches the vehicle" if first <= 0.0 else f"is {told(first, limit)} m from the vehicle"
+                raise UnjudgeableError(f"body {body.name} {far} when it is first seen")
+            for approach in body.approaches():
+                if self.verdict is None and self.elapsed(approach.time) >= 0 and not self.is_overdue(approach.time):
+                    self._judge_approach(body.name, approach)
+
+    def _judge_approach(self, name: str, approach: Approach) -> None:
+        """The evidence has the vehicle's newest pose, which is hardly newer than this."""
+        time, margin = approach
+        before, limit = self._measures.body_margin, self.track.min_body_margin
+        if self._gaps:
+            self._gaps.add(time, margin)
+        if before is None or margin < before:
+            self._measures.body_margin = margin
+            self._nearest = {"closest-body": name, **self._moment("closest-body-")}
+        when = f"after {self.elapsed(time):.2f} s {place(self._last[1])}" if self._last else ""
+        if margin <= 0.0:
+            self.verdict = self._verdict("failed", f"hit body {name} {when}", obstacle=name)
+        elif margin < limit:
+            close = f"came within {told(margin, limit)} m of body {name} {when}, expected at least {limit:g} m"
+            self.verdict = self._verdict("failed", close, obstacle=name)
+
+    def _has_failed_by_bodies(self, within: str) -> bool:
+        """Judge bodies up to the vehicle's newest pose; raises UnjudgeableError for one that was not seen."""
+        for body in self._bodies.values():
+            body.hold()
+            if not body.was_seen:
+                raise UnjudgeableError(f"no opendlv.sim.Frame of body {body.name} came {within}")
+        self._judge_bodies()
+        return self.verdict is not None
 
     def _judge(self, start: tuple[int, VehiclePose], time: int, pose: VehiclePose) -> None:
         area, when = swept(start[1], pose, self.box), f"after {self.elapsed(time):.2f} s"
@@ -227,7 +287,7 @@ class TrackEvaluator(Evaluator):
             drove = f"drove {told(speed, self.track.max_speed)} m/s {when} {place(pose)}"
             fast = f"{drove}, expected at most {self.track.max_speed:g} m/s"
             self.verdict = self._verdict("failed", fast)
-        elif goal is not None:
+        elif goal is not None and not self._has_failed_by_bodies(f"before the vehicle {goal}"):
             self._measures.time_to_goal = self.elapsed(time)
             self.verdict = self._arrived(f"{goal} {when}", time)
 
@@ -273,7 +333,10 @@ class TrackEvaluator(Evaluator):
         aside = f"; the application sent no {' and no '.join(missing)}" if missing else ""
         if self.track.goal or self.track.gates:
             return self._verdict("failed", f"{self._missed(self._last[1], span.within)}{aside}")
-        return self._verdict("passed", f"stayed clear of {' and '.join(self.track.walls)} {span.throughout}{aside}")
+        if self._has_failed_by_bodies(span.within) and self.verdict is not None:
+            return self.verdict
+        clear = " and ".join([*self.track.walls, *(body.name for body in self._bodies.values())])
+        return self._verdict("passed", f"stayed clear of {clear} {span.throughout}{aside}")
 
     def _missed(self, pose: VehiclePose, within: str) -> str:
         name, lines = self._gates.next or next(iter(self.track.goal.items()))
@@ -306,7 +369,8 @@ class TrackEvaluator(Evaluator):
         goal = (measures.goal_check(track.max_time), *self._rest()) if track.goal or track.gates else ()
         gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
         walls = (measures.wall_check(track.min_margin),) if track.walls else ()
+        bodies = (measures.body_check(track.min_body_margin),) if self._bodies else ()
         drive = measures.drive_checks(track.max_speed)
-        checks = (*goal, *gates, *walls, *drive, *self._requests.checks())
+        checks = (*goal, *gates, *walls, *bodies, *drive, *self._requests.checks())
         named = {} if obstacle is None else {"obstacle": obstacle}
-        return Verdict(outcome, reason, checks, silent, {**self._moment(), **named, **self._closest})
+        return Verdict(outcome, reason, checks, silent, {**self._moment(), **named, **self._closest, **self._nearest})

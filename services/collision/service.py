@@ -2,16 +2,20 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.assets.map_file import HIGHEST, NO_BODIES
 from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
+from services.collision.bodies import Footprints, load_footprints
 from services.collision.model import Requests, TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
+from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick, pick_walls
 
+FRAME = "opendlv.sim.Frame"
 SILENCE, GAPS = 2.0, 3.0
 """s without a frame, and how often the longest time between two of them, after which their sender hangs."""
 
@@ -23,19 +27,21 @@ class Collision(TrackEvaluator):
         """``wall`` in s: on a rig it is an error when the vehicle vanishes."""
         flags = context.flags
         requests = [_port(text, context) for text in flags["requests"]]
-        names = list(dict.fromkeys(name for name, _ in requests))
+        labels = [_label(name, stamp, requests) for name, stamp in requests]
         box = VehicleBox(flags["length"], flags["width"])
-        super().__init__(track(flags), box, Requests(names, flags["max-silence"]))
+        bodies = _bodies(flags)
+        super().__init__(track(flags), box, Requests(list(dict.fromkeys(labels)), flags["max-silence"]), bodies)
         self._log = context.log
         self._on_rig, self._wall = context.on_rig, wall
         self._seen: float | None = None
         self._gap: float | None = None
         self.rejected = 0
-        self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
-        for name, stamp in requests:
-            self.inputs[name, stamp] = self._request(name)
+        self.inputs = {(FRAME, stamp): partial(self._take_body, stamp) for stamp in bodies}
+        self.inputs[FRAME, flags["frame-id"]] = self._take_frame
+        for label, (name, stamp) in zip(labels, requests, strict=True):
+            self.inputs[name, stamp] = self._request(label)
             self.judged.message(name, stamp)
-        roles = {**dict.fromkeys(flags["walls"], "wall"), **dict.fromkeys(flags["gates"], "gate")}
+        roles = {**dict.fromkeys(self.track.walls, "wall"), **dict.fromkeys(flags["gates"], "gate")}
         roles |= {flags["goal"]: "goal"} if flags["goal"] else {}
         self.judged.way(flags["frame-id"], box.length, box.width, roles)
 
@@ -49,21 +55,31 @@ class Collision(TrackEvaluator):
         if self._gap is not None and silent > max(SILENCE, GAPS * self._gap):
             raise UnjudgeableError(f"no Frame of the vehicle has come for {silent:.0f} s, and they came before")
 
-    def _request(self, name: str) -> Handler:
-        return lambda _message, _sample_time: self.request(name)
+    def _request(self, label: str) -> Handler:
+        return lambda _message, _sample_time: self.request(label)
 
     def _take_frame(self, frame: Any, sample_time: int) -> None:
         now = self._wall()
         if self._seen is not None:
             self._gap = max(self._gap or 0.0, now - self._seen)
         self._seen = now
+        pose = self._pose(frame)
+        if pose is not None:
+            self.look(pose, sample_time)
+
+    def _take_body(self, stamp: int, frame: Any, sample_time: int) -> None:
+        pose = self._pose(frame)
+        if pose is not None:
+            self.look_at_body(stamp, pose, sample_time)
+
+    def _pose(self, frame: Any) -> VehiclePose | None:
         heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
-        if heading is None or not math.isfinite(frame.x + frame.y):
-            self.rejected += 1
-            if self.rejected == 1:
-                self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
-            return
-        self.look(VehiclePose(frame.x, frame.y, heading), sample_time)
+        if heading is not None and math.isfinite(frame.x + frame.y):
+            return VehiclePose(frame.x, frame.y, heading)
+        self.rejected += 1
+        if self.rejected == 1:
+            self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
+        return None
 
 
 def _port(text: str, context: Context) -> tuple[str, int | None]:
@@ -73,6 +89,24 @@ def _port(text: str, context: Context) -> tuple[str, int | None]:
     if stamp and not is_whole(stamp):
         raise ValueError(f"--requests: '{text}' has no whole number as its sender stamp")
     return name, whole(stamp) if stamp else None
+
+
+def _bodies(flags: Flags) -> Footprints:
+    """The bodies that the flags ask for; raises MapError, and ValueError where there are none."""
+    if not flags["bodies"]:
+        if flags["min-body-margin"]:
+            raise ValueError("--min-body-margin needs --bodies")
+        return {}
+    found = load_footprints(Path(flags["map-path"]), flags["frame-id"])
+    if not found:
+        raise ValueError(f"--bodies: {NO_BODIES}")
+    return found
+
+
+def _label(name: str, stamp: int | None, requests: Sequence[tuple[str, int | None]]) -> str:
+    """How a request is called: with its sender stamp where others have the same name."""
+    is_one = sum(other == name for other, _ in requests) == 1
+    return name if is_one or stamp is None else f"{name}/{stamp}"
 
 
 def track(flags: Flags) -> Track:
@@ -92,12 +126,13 @@ def track(flags: Flags) -> Track:
     obstacles = load_obstacles(path)
     picked = pick(obstacles, gates, "gates", path)
     return Track(
-        walls=pick(obstacles, walls, "walls", path),
+        walls=pick_walls(obstacles, walls, {goal, *gates}, path, flags["height"] or HIGHEST),
         goal=pick(obstacles, [goal] if goal else [], "goal", path),
         max_time=flags["max-time"],
         gates=tuple((name, picked[name]) for name in gates),
         min_margin=flags["min-margin"],
         max_speed=flags["max-speed"],
+        min_body_margin=flags["min-body-margin"] or 0.0,
     )
 
 

@@ -6,10 +6,11 @@ the vehicle's centre has to cross in order. A vehicle is a rectangle on the grou
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import TypeVar
 
 import shapely
 
@@ -129,7 +130,8 @@ def _is_left(start: VehiclePose, end: VehiclePose, x: float, y: float) -> bool:
     return (end.x - start.x) * (y - start.y) - (end.y - start.y) * (x - start.x) >= 0
 
 
-Obstacles = Mapping[str, shapely.MultiLineString]
+Obstacles = Mapping[str, shapely.Geometry]
+"""Lines, or the ground that blocks stand on, by name."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ class Track:
     """Walls must not be touched, and the goal be reached; ``gates`` have to be crossed before, in order.
 
     Obstacles by name in m, `max_time` in s. The vehicle keeps ``min_margin`` m away from walls; with 0 it only
-    must not touch them. ``max_speed`` in m/s, None for no limit.
+    must not touch them. ``min_body_margin`` is the same of other bodies. ``max_speed`` in m/s, None for no limit.
     """
 
     walls: Obstacles
@@ -146,6 +148,7 @@ class Track:
     gates: tuple[Gate, ...] = ()
     min_margin: float = 0.0
     max_speed: float | None = None
+    min_body_margin: float = 0.0
 
 
 def touched(obstacles: Obstacles, area: shapely.Geometry) -> str | None:
@@ -204,9 +207,22 @@ def load_obstacles(path: Path) -> dict[str, shapely.MultiLineString]:
     return {name: shapely.MultiLineString(lines) for name, lines in found.items()}
 
 
-def pick(
-    known: dict[str, shapely.MultiLineString], names: Sequence[str], parameter: str, path: Path
-) -> dict[str, shapely.MultiLineString]:
+def load_blocks(path: Path, height: float) -> dict[str, shapely.Geometry]:
+    """The ground that the blocks of each name stand on, as far as a vehicle of ``height`` m may touch them.
+
+    Raises ObstaclesError.
+    """
+    try:
+        found = map_file.read_footprints(path, height)
+    except MapError as error:
+        raise ObstaclesError(str(error)) from None
+    return {name: shapely.union_all([shapely.Polygon(each) for each in outlines]) for name, outlines in found.items()}
+
+
+Shape = TypeVar("Shape", bound=shapely.Geometry)
+
+
+def pick(known: Mapping[str, Shape], names: Sequence[str], parameter: str, path: Path) -> dict[str, Shape]:
     """Those obstacles that a parameter names, prepared for many queries; MapError for an unknown name."""
     chosen = {}
     for name in names:
@@ -215,6 +231,31 @@ def pick(
         shapely.prepare(known[name])
         chosen[name] = known[name]
     return chosen
+
+
+EVERY, BLOCKS = "*", "blocks"
+"""As a wall: all obstacles that are neither goal nor gate, and all blocks in the vehicle's way."""
+
+
+def pick_walls(
+    known: Obstacles, names: Sequence[str], others: Collection[str], path: Path, height: float
+) -> dict[str, shapely.Geometry]:
+    """Obstacles, and blocks by their names, that a vehicle of ``height`` m must not touch; ``others`` are no walls.
+
+    Raises ObstaclesError for a name that is neither, and where nothing stands in the vehicle's way.
+    """
+    blocks = {} if all(name in known or name == EVERY for name in names) else load_blocks(path, height)
+    standing = {name: area for name, area in blocks.items() if not area.is_empty}
+    groups = {EVERY: [name for name in known if name not in others], BLOCKS: list(standing)}
+    shapes = {**standing, **known}
+    for name in names:
+        if name not in shapes and (name in blocks or groups.get(name) == []):
+            what = (
+                "obstacle" if name == EVERY else f"block between {map_file.LOWEST:g} and {height:g} m above the ground"
+            )
+            raise ObstaclesError(f"--walls: {name!r} is no {what} in the map {path}")
+    found = [each for name in names for each in ([name] if name in shapes else groups.get(name, [name]))]
+    return pick(shapes, found, "walls", path)
 
 
 def _unknown(name: str, known: list[str], path: Path) -> str:

@@ -114,6 +114,8 @@ def _mean_distance(target: Target, times: Times, values: Values) -> float:
 
 
 _DIGITS = 12
+_ROUNDING = 1e-12
+"""By which a sample at the edge of a relative band may be outside of it."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,8 @@ class SignalLimits:
     `start` and `until` are the window of time that is judged, both included; at least `samples` have to be judged.
     A sample holds until the next one and at most for `hold`: of the judged time a share of `coverage` has to be
     held, and no time without a sample may be longer than `gap`. A sample whose time is more than `delay` from its
-    arrival is late. Until the first sample nothing has to be held if that comes within `start_up` of the target's time.
+    arrival is late. A `relative` band is a share of the target's size, and no less than `floor`; the target has a sign
+    beyond that. Until the first sample nothing has to be held if that comes within `start_up` of the target's time.
     All times in microseconds, but for `lag` in seconds, by which the signal may follow its target late. It may keep
     one value for `repeats` samples.
     """
@@ -143,6 +146,17 @@ class SignalLimits:
     start_up: int = 0
     lag: float | None = None
     repeats: int | None = None
+    relative: bool = False
+    floor: float = 0.0
+    frame_share: float | None = None
+    sign_share: float | None = None
+
+    def band_at(self, expected: Values) -> Values:
+        """The distance from each of these targets up to which a sample is inside the band; without a band any is."""
+        if self.band is None or not self.relative:
+            return np.full(len(expected), np.inf if self.band is None else self.band)
+        widths: Values = np.maximum(self.band * np.abs(expected), self.floor) * (1 + _ROUNDING)
+        return widths
 
 
 @dataclass(frozen=True)
@@ -161,7 +175,7 @@ class SignalMeasures:
     `broken` holds the times (s) of those in the window that are not finite. `mean`, `std` and `distance` are over
     samples, `mean_over_time`, `std_over_time` and `share` over the time that these hold. `repeats` is the
     longest run of samples with the same value, `likeness` what the signal is of its target, where that is simple.
-    Without a sample all else is None.
+    `frame_share` and `sign_share` are over samples and the `unanswered` frames. Without a sample all else is None.
     """
 
     received: int
@@ -179,10 +193,18 @@ class SignalMeasures:
     lag: float | None = None
     repeats: RepeatedValue | None = None
     likeness: str = ""
+    frame_share: float | None = None
+    sign_share: float | None = None
+    unanswered: int = 0
 
     def checks(self, limits: SignalLimits) -> tuple[Check, ...]:
         """Each measure with its limit; one that has no value does not keep a limit."""
-        share = () if limits.band is None else (_check("share", self.share, "min", limits.share),)
+        shares = [("share", self.share, limits.share)] if limits.band is not None else []
+        frames = (
+            ("frame-share", self.frame_share, limits.frame_share),
+            ("sign-share", self.sign_share, limits.sign_share),
+        )
+        shares += [each for each in frames if each[2] is not None]
         held, gap = (self.coverage.share, self.coverage.gap) if self.coverage else (None, None)
         longest = None if limits.gap is None else limits.gap / MICROSECONDS
         lag = () if limits.lag is None else (_check("lag", self.lag, "max", limits.lag, "s"),)
@@ -194,7 +216,7 @@ class SignalMeasures:
             _check("distance", self.distance, "max", limits.distance),
             _check("mean-over-time", self.mean_over_time, "max", limits.mean, parameters=("max-mean",)),
             _check("std-over-time", self.std_over_time, "max", limits.std, parameters=("max-std",)),
-            *share,
+            *(_check(name, value, "min", limit) for name, value, limit in shares),
             *lag,
             *repeats,
             _check("samples", self.samples, "min", limits.samples),
@@ -215,11 +237,17 @@ class SignalMeasures:
 
 
 def measure(
-    target: Target, times: Times, values: Values, limits: SignalLimits, judged: tuple[int, int] | None = None
+    target: Target,
+    times: Times,
+    values: Values,
+    limits: SignalLimits,
+    judged: tuple[int, int] | None = None,
+    frames: Times | None = None,
 ) -> SignalMeasures:
     """The measures of samples in any order, their times in microseconds on the target's own scale.
 
-    ``judged`` is the part of the target's time that they have to cover; by default all of it.
+    ``judged`` is the part of the target's time that they have to cover; by default all of it. ``frames`` are the times
+    of the pictures that have to be answered, ascending; by default each sample answers one.
     """
     inside = times >= limits.start
     if limits.until is not None:
@@ -238,10 +266,12 @@ def measure(
     if not samples:
         return SignalMeasures(len(times), 0, outside, broken, coverage=coverage)
     times, values, expected = times[known], values[known], expected[known]
+    missed = np.empty(0) if frames is None else _unanswered(target, frames[(frames >= begin) & (frames <= end)], times)
     distances: Values = np.abs(values - expected)
     at = int(np.argmax(distances))
     weights = holds(times, max(end, int(times[-1])), limits.hold)
     weights = weights if weights.any() else np.ones(samples)
+    inside = distances <= limits.band_at(expected)
     mean = _average(distances, weights)
     return SignalMeasures(
         received=len(known),
@@ -251,7 +281,7 @@ def measure(
         mean=float(distances.mean()),
         std=float(distances.std()),
         distance=float(distances[at]),
-        share=None if limits.band is None else _average(distances <= limits.band, weights),
+        share=None if limits.band is None else _average(inside, weights),
         worst=WorstSample(float(times[at]) / MICROSECONDS, float(values[at]), float(expected[at])),
         mean_over_time=mean,
         std_over_time=round(float(np.sqrt(np.average((distances - mean) ** 2, weights=weights))), _DIGITS),
@@ -259,7 +289,29 @@ def measure(
         lag=None if limits.lag is None else lag(target, times, values),
         repeats=None if limits.repeats is None else longest_run(times, values),
         likeness=likeness(target, times, values),
+        frame_share=None if limits.band is None else _share(inside, len(missed)),
+        sign_share=_sign_share(values, expected, missed, limits.floor),
+        unanswered=len(missed),
     )
+
+
+def _unanswered(target: Target, frames: Times, times: Times) -> Values:
+    """The targets of the frames that have no sample from their own time to that of the next."""
+    edges = np.append(frames, np.iinfo(np.int64).max)
+    expected = target.at(frames[np.diff(np.searchsorted(times, edges)) == 0])
+    known: Values = expected[~np.isnan(expected)]
+    return known
+
+
+def _sign_share(values: Values, expected: Values, missed: Values, floor: float) -> float | None:
+    """The share of frames with the sign of their target, where that is farther than ``floor`` from 0; else None."""
+    signed = np.abs(expected) > floor
+    right, wrong = (values * expected > 0)[signed], int((np.abs(missed) > floor).sum())
+    return _share(right, wrong) if len(right) + wrong else None
+
+
+def _share(right: NDArray[np.bool_], others: int) -> float:
+    return round(float(right.sum()) / (len(right) + others), _DIGITS)
 
 
 def judged_time(target: Target, limits: SignalLimits) -> tuple[int, int]:

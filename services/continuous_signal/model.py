@@ -26,7 +26,7 @@ _NAMES = {
     "mean-over-time": "the mean distance over time",
     "std-over-time": "the standard deviation over time",
 }
-_KEPT = ("mean", "std", "distance", "share")
+_KEPT = ("mean", "std", "distance", "share", "frame-share", "sign-share")
 _AT_ONCE = {"mean-over-time": "mean", "std-over-time": "std"}
 """Not told when the same over samples broke the limit, too."""
 
@@ -81,10 +81,22 @@ def _fault(check: Check, measures: SignalMeasures, limits: SignalLimits) -> str:
         )
         return f"{value} samples in a row have the same value{which} ({bound})"
     if check.name == "share":
-        return f"the share of time within {_number(limits.band)} of the target is {value} ({bound})"
+        return f"the share of time within {_width(limits)} of the target is {value} ({bound})"
+    if check.name in ("frame-share", "sign-share"):
+        what = (
+            f"within {_width(limits)} of the target" if check.name == "frame-share" else "with the sign of the target"
+        )
+        aside = f", and {measures.unanswered} had no sample" if measures.unanswered else ""
+        return f"the share of frames {what} is {value} ({bound}){aside}"
     if check.name in ("gap", "coverage"):
         return _hole(check, measures.coverage)
     return f"{_NAMES[check.name]} is {value} ({bound})"
+
+
+def _width(limits: SignalLimits) -> str:
+    if limits.band is None or not limits.relative:
+        return _number(limits.band)
+    return f"{limits.band * 100:.4g} %" + (f" or {_number(limits.floor)}" if limits.floor else "")
 
 
 def _hole(check: Check, coverage: Coverage | None) -> str:
@@ -165,15 +177,24 @@ class SignalEvaluator(Evaluator):
     """
 
     def __init__(
-        self, signal: str, target: Target | None, limits: SignalLimits, max_time: float, from_begin: bool
+        self,
+        signal: str,
+        target: Target | None,
+        limits: SignalLimits,
+        max_time: float,
+        from_begin: bool,
+        frames: Times | None = None,
     ) -> None:
-        """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the begin."""
+        """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the begin.
+
+        ``frames`` are the times of the pictures that samples answer, on the target's own scale.
+        """
         super().__init__(max_time)
-        self._signal, self._target, self._limits = signal, target, limits
+        self._signal, self._target, self._limits, self._frames = signal, target, limits, frames
         self._from_begin = from_begin or target is None
         self._samples, self._targets = Samples(), Samples()
         self._late = LateSamples(limits.delay, self._from_begin)
-        self.plot = self.judged.series(signal, distance=limits.distance, band=limits.band)
+        self.plot = self.judged.series(signal, distance=limits.distance, band=None if limits.relative else limits.band)
 
     def take(self, value: float, time: int) -> None:
         """A sample of the signal; a value that is not finite is a fault of the application."""
@@ -201,7 +222,9 @@ class SignalEvaluator(Evaluator):
         start = begin if self._from_begin else target.start
         times, values = self._samples.since(start)
         judged = self._judged(target, span.is_complete)
-        measures = measure(target, times, values, self._limits, judged)
+        measures = measure(target, times, values, self._limits, judged, self._frames)
+        if self._limits.sign_share is not None and measures.samples and measures.sign_share is None:
+            raise UnjudgeableError(f"the target is nowhere farther than {self._limits.floor:g} from 0: it has no sign")
         said = verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
         return replace(said, evidence=measures.evidence())
 
@@ -210,9 +233,10 @@ class SignalEvaluator(Evaluator):
         target = self._target or in_order(*self._targets.since(self.zero))
         start = self.zero if self._from_begin else target.start
         times, values = self._samples.since(start)
-        away, limits = np.abs(values - target.at(times)), self._limits
+        expected, limits = target.at(times), self._limits
+        away = np.abs(values - expected)
         marks = np.select([away > (np.inf if limits.distance is None else limits.distance),
-                           away > (np.inf if limits.band is None else limits.band)], [FAILED, WARNED])  # fmt: skip
+                           away > limits.band_at(expected)], [FAILED, WARNED])  # fmt: skip
         marks[~np.isfinite(values)] = FAILED
         marks[(times < limits.start) | (times > (np.inf if limits.until is None else limits.until))] = 0
         if abs(start - self.zero) > _DAY:  # of another day: from the begin of the test on

@@ -4,13 +4,22 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.base import Context, Flags
+from services.base import Context, Flags, Share
 from services.continuous_signal.measures import SignalLimits
 from services.continuous_signal.model import SignalEvaluator
-from services.continuous_signal.target import MICROSECONDS, Signal, Target, check, read_recording, read_table
+from services.continuous_signal.target import (
+    MICROSECONDS,
+    Signal,
+    Target,
+    Times,
+    check,
+    picture_times,
+    read_recording,
+    read_table,
+)
 
 RECORDING = ".rec"
-REQUIRED = ("max-mean", "max-std", "max-distance", "min-share")
+REQUIRED = ("max-mean", "max-std", "max-distance", "min-share", "min-frame-share", "min-sign-share")
 
 
 class ContinuousSignal(SignalEvaluator):
@@ -28,7 +37,8 @@ class ContinuousSignal(SignalEvaluator):
         if target is not None and from_begin and target.span[0] >= flags["max-time"]:
             first = f"{flags['target']}: the target begins {target.span[0]:,.1f} s after the begin"
             raise ValueError(f"{first}, when --max-time={flags['max-time']:g} is over: nothing could be judged")
-        super().__init__(name, target, _limits(flags), flags["max-time"], from_begin)
+        frames = None if target is None or from_begin else _frames(flags, target)
+        super().__init__(name, target, _limits(flags), flags["max-time"], from_begin, frames)
         self._source, self._target_source = signal, other
         self.plot.name = f"{signal.field} of {signal.message.rpartition('.')[2]}/{signal.sender}"
         self.inputs = {(signal.message, signal.sender): self._take}
@@ -67,11 +77,23 @@ def _target(flags: Flags, signal: Signal, messages: MessageSet) -> Target | None
     return read_table(path, signal.field, flags["align"] == "sample-time")
 
 
+def _frames(flags: Flags, target: Target) -> Times | None:
+    """The pictures of a recorded target, where it has some; in us on the target's own scale."""
+    path, is_asked = Path(flags["target"]), flags["min-frame-share"] is not None or flags["min-sign-share"] is not None
+    if path.suffix != RECORDING or not is_asked:
+        return None
+    return picture_times(path, flags["video-sender"] or 0, target.start)
+
+
 def _limits(flags: Flags) -> SignalLimits:
     if all(flags[name] is None for name in REQUIRED):
         raise ValueError(f"there is no limit: give one or more of --{', --'.join(REQUIRED)}")
-    if flags["min-share"] is not None and flags["band"] is None:
-        raise ValueError("--min-share needs --band, the distance that counts as inside")
+    for name in ("min-share", "min-frame-share"):
+        if flags[name] is not None and flags["band"] is None:
+            raise ValueError(f"--{name} needs --band, the distance that counts as inside")
+    band = flags["band"]
+    if flags["band-floor"] and not isinstance(band, Share) and flags["min-sign-share"] is None:
+        raise ValueError("--band-floor needs a --band that is a share of the target, such as 25%, or --min-sign-share")
     until = flags["until"]
     if until is not None and until <= flags["from"]:
         raise ValueError(f"--until={until:g} is not after --from={flags['from']:g}")
@@ -79,7 +101,11 @@ def _limits(flags: Flags) -> SignalLimits:
         mean=flags["max-mean"],
         std=flags["max-std"],
         distance=flags["max-distance"],
-        band=flags["band"],
+        band=band.of_one if isinstance(band, Share) else band,
+        relative=isinstance(band, Share),
+        floor=flags["band-floor"] or 0.0,
+        frame_share=flags["min-frame-share"],
+        sign_share=flags["min-sign-share"],
         share=flags["min-share"],
         samples=flags["min-samples"],
         lag=flags["max-lag"],

@@ -127,6 +127,15 @@ def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
         raise TargetError(str(error)) from None
 
 
+def picture_times(path: Path, sender: int, start: int) -> Times | None:
+    """When the pictures of a camera in a ``.rec`` file were taken, in us from ``start``; None where it has none."""
+    with Recording(path) as recording:
+        times: Times = np.unique(
+            recording.index["time"][recording.rows([recording_times.IMAGE], sender_stamps=[sender])]
+        )
+    return times - start if len(times) else None
+
+
 def _values(path: Path, envelopes: list[Envelope], signal: Signal, messages: MessageSet) -> Values:
     values = np.empty(len(envelopes))
     for number, envelope in enumerate(envelopes):

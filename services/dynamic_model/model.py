@@ -6,11 +6,15 @@ explicit Euler. SI units; body frame x forward, y left, yaw rate positive to the
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
 
 from dodo_dsl.opendlv.assets.car import KIWI, Car
 
 MICROSECONDS = 1_000_000
+STEERING, PEDAL = "steering", "pedal"
+"""Actuators of the Kiwi car."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,9 @@ class Condition:
     """How a car differs from its data sheet: worn tyres, a weak battery, a bent steering rod, slow actuators."""
 
     grip: float = 1.0
-    """Factor of both axles' cornering stiffness"""
+    """Factor of both axles' cornering stiffness, and of the friction"""
     power: float = 1.0
-    """Factor of the pedal's force, forward and in reverse"""
+    """Factor of what the motor gives, forward and in reverse"""
     steering_offset: float = 0.0
     """rad, added to the front wheel's angle whatever is requested; positive is to the left"""
     latency: float = 0.0
@@ -74,42 +78,127 @@ class Condition:
 AS_NEW = Condition()
 
 
+class Drive(Protocol):
+    """What moves: a drive holds what its actuators were asked for, in SI units, and goes on in time."""
+
+    @property
+    def rest(self) -> Mapping[str, float]:
+        """Its actuators, each with what it is asked for at rest."""
+
+    def accepted(self, actuator: str, request: float) -> float:
+        """What an actuator makes of a request: scaled and limited."""
+
+    def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
+        """The motion `dt` seconds later, with the actuators asked for the same all the time."""
+
+    def reset(self) -> None:
+        """Forget all that moves beside the body."""
+
+    def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple["Reading", ...]:
+        """What its own sensors read."""
+
+
+class Reading(NamedTuple):
+    """A message of odometry with one field, in SI units."""
+
+    message: str
+    field: str
+    sender_stamp: int
+    value: float
+
+
+def speed_and_steering(speed: float, wheel: float) -> tuple[Reading, Reading]:
+    """The odometry of a car that steers: m/s over ground, and the front wheel's angle in rad."""
+    return Reading(SPEED_READING, "groundSpeed", 0, speed), Reading(STEERING_READING, "groundSteering", 0, wheel)
+
+
+SPEED_READING, STEERING_READING = "opendlv.proxy.GroundSpeedReading", "opendlv.proxy.GroundSteeringReading"
+
+
+@dataclass(frozen=True)
+class KiwiDrive:
+    """The single track of the public Kiwi simulation."""
+
+    car: Car = KIWI
+    offset: float = 0.0
+    """rad, at the front wheel"""
+
+    @property
+    def rest(self) -> Mapping[str, float]:
+        return {STEERING: self.offset, PEDAL: 0.0}
+
+    def accepted(self, actuator: str, request: float) -> float:
+        if actuator == STEERING:
+            return wheel_angle(request, self.car) + self.offset
+        return pedal_position(request, self.car)
+
+    def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
+        return step(motion, asked[STEERING], asked[PEDAL], dt, self.car)
+
+    def reset(self) -> None:
+        """Nothing but the body moves."""
+
+    def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple[Reading, ...]:
+        return speed_and_steering(motion.vx, asked[STEERING])
+
+
 class Vehicle:
     """The car through test time: it holds its last requests and advances only in `update`."""
 
-    def __init__(self, freq: float, car: Car = KIWI, steps: int = 1, condition: Condition = AS_NEW) -> None:
-        """`freq` in Hz: the equations are stepped `steps` times or more in each of its periods."""
+    def __init__(
+        self,
+        freq: float,
+        car: Car = KIWI,
+        steps: int = 1,
+        condition: Condition = AS_NEW,
+        drive: Drive | None = None,
+    ) -> None:
+        """`freq` in Hz: the equations are stepped `steps` times or more in each of its periods.
+
+        Without a `drive` it is that of the Kiwi car, with the parameters of `car`.
+        """
         self.motion = BodyMotion()
         self.rejected = 0
         self.car = condition.of(car)
-        self._offset = condition.steering_offset
+        self.drive: Drive = drive or KiwiDrive(self.car, condition.steering_offset)
         self._latency = round(condition.latency * MICROSECONDS)
-        self._coming: deque[tuple[int, float | None, float | None]] = deque()
-        """When a request takes effect (us), and the wheel's angle or the pedal that it sets."""
+        self._coming: deque[tuple[int, str, float]] = deque()
+        """When a request takes effect (us), and what it asks of which actuator."""
         self._longest = math.ceil(MICROSECONDS / (freq * steps))
-        self._wheel = self._offset
-        self._pedal = 0.0
+        self._asked = dict(self.drive.rest)
         self._now: int | None = None
 
-    def steer(self, request: float) -> bool:
-        """Take a ground steering request in rad; False, and nothing changes, when it is not finite."""
-        if not self._accepts(request):
+    def request(self, actuator: str, value: float) -> bool:
+        """Take a request to an actuator of the drive; False, and nothing changes, when it is not finite."""
+        if not math.isfinite(value):
+            self.rejected += 1
             return False
-        self._take(wheel_angle(request, self.car) + self._offset, None)
+        accepted = self.drive.accepted(actuator, value)
+        if self._latency and self._now is not None:
+            self._coming.append((self._now + self._latency, actuator, accepted))
+        else:
+            self._asked[actuator] = accepted
         return True
+
+    def steer(self, request: float) -> bool:
+        """Take a ground steering request in rad."""
+        return self.request(STEERING, request)
 
     def press(self, request: float) -> bool:
-        """Take a pedal position request; False, and nothing changes, when it is not finite."""
-        if not self._accepts(request):
-            return False
-        self._take(None, pedal_position(request, self.car))
-        return True
+        """Take a pedal position request."""
+        return self.request(PEDAL, request)
+
+    @property
+    def odometry(self) -> tuple[Reading, ...]:
+        """What the car's own sensors read now."""
+        return self.drive.odometry(self.motion, self._asked)
 
     def reset(self) -> None:
-        """Stand still, with the wheel straight and the pedal let go."""
+        """Stand still, with nothing asked of the actuators."""
         self.motion = BodyMotion()
         self._coming.clear()
-        self._wheel, self._pedal = self._offset, 0.0
+        self.drive.reset()
+        self._asked = dict(self.drive.rest)
 
     def update(self, now: int) -> BodyMotion:
         """Advance to `now` (microseconds) with the requests held; the first call only takes the time.
@@ -120,34 +209,19 @@ class Vehicle:
         if elapsed < 0:
             raise ValueError(f"time ran backwards by {-elapsed} us")
         while self._coming and self._coming[0][0] <= now:
-            due, wheel, pedal = self._coming.popleft()
+            due, actuator, accepted = self._coming.popleft()
             self._advance(due - (now - elapsed))
             elapsed = now - due
-            self._apply(wheel, pedal)
+            self._asked[actuator] = accepted
         self._advance(elapsed)
         self._now = now
         if not math.isfinite(self.motion.vx + self.motion.vy + self.motion.yaw_rate):
-            raise ArithmeticError("the single-track model ran out of bounds: choose a higher freq or more steps")
+            raise ArithmeticError("the vehicle's model ran out of bounds: choose a higher freq or more steps")
         return self.motion
 
-    def _take(self, wheel: float | None, pedal: float | None) -> None:
-        """Sets the wheel or the pedal, now or after the latency."""
-        if self._latency and self._now is not None:
-            self._coming.append((self._now + self._latency, wheel, pedal))
-        else:
-            self._apply(wheel, pedal)
-
-    def _apply(self, wheel: float | None, pedal: float | None) -> None:
-        self._wheel = self._wheel if wheel is None else wheel
-        self._pedal = self._pedal if pedal is None else pedal
-
     def _advance(self, elapsed: int) -> None:
-        """Steps through `elapsed` us with the wheel and the pedal held."""
+        """Steps through `elapsed` us with what is asked of the actuators held."""
         steps = -(-elapsed // self._longest)
         for index in range(steps):
             dt = elapsed * (index + 1) // steps - elapsed * index // steps
-            self.motion = step(self.motion, self._wheel, self._pedal, dt / MICROSECONDS, self.car)
-
-    def _accepts(self, request: float) -> bool:
-        self.rejected += not math.isfinite(request)
-        return math.isfinite(request)
+            self.motion = self.drive.step(self.motion, self._asked, dt / MICROSECONDS)

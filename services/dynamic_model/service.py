@@ -1,55 +1,128 @@
-"""The single-track model on the bus."""
+"""The vehicle on the bus: requests in, velocities of its body out."""
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv.assets.car import KIWI, read_car
-from services.base import Context, Output, Service, period_of
-from services.dynamic_model.model import Condition, Vehicle
+from services.base import Context, Flags, Handler, Output, Service, period_of
+from services.dynamic_model.drives import (
+    ACCELERATION,
+    LEFT,
+    RIGHT,
+    SPEED,
+    BicycleDrive,
+    DifferentialDrive,
+    SingleTrack,
+    TwoWheels,
+)
+from services.dynamic_model.model import PEDAL, STEERING, Condition, Drive, Vehicle
 
 RESET = "reset"
+_PEDAL = ("opendlv.proxy.PedalPositionRequest", "position")
+_AXLE = ("opendlv.proxy.AxleAngularVelocityRequest", "axleAngularVelocity")
+_STEERING = ("opendlv.proxy.GroundSteeringRequest", "groundSteering")
+_SPEED = ("opendlv.proxy.GroundSpeedRequest", "groundSpeed")
+_ACCELERATION = ("opendlv.proxy.GroundAccelerationRequest", "groundAcceleration")
+_YAW_RATE = "opendlv.proxy.AngularVelocityReading"
 
 
 class DynamicModel(Service):
-    """Takes requests of any sender and sends the body's velocities, under the sender stamp ``frame-id``."""
+    """Takes requests and sends the body's velocities, under the sender stamp ``frame-id``."""
 
     def __init__(self, context: Context) -> None:
         self._log = context.log
+        self._messages = context.messages
         flags = context.flags
         self.period = period_of(flags["freq"])
+        condition = Condition(
+            flags["grip"], flags["power"], math.radians(flags["steering-offset"] or 0), flags["latency"]
+        )
         car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
-        condition = Condition(flags["grip"], flags["power"], math.radians(flags["steering-offset"]), flags["latency"])
-        self.vehicle = Vehicle(flags["freq"], car, flags["steps"], condition)
-        stable = self.vehicle.car.stable_above(flags["freq"] * flags["steps"])
-        self._log.debug("the steps are stable above %.3f m/s; sideways the car moves above %g", stable, car.slip_speed)
-        self.inputs = {
-            ("opendlv.proxy.GroundSteeringRequest", None): self._steer,
-            ("opendlv.proxy.PedalPositionRequest", None): self._press,
-            ("opendlv.sim.Command", None): self._command,
-        }
+        drive = _drive(flags, condition)
+        self.vehicle = Vehicle(flags["freq"], car, flags["steps"], condition, drive)
+        if drive is None:
+            stable = self.vehicle.car.stable_above(flags["freq"] * flags["steps"])
+            self._log.debug(
+                "the steps are stable above %.3f m/s; sideways the car moves above %g", stable, car.slip_speed
+            )
+        self.inputs = {**self._requests(flags), ("opendlv.sim.Command", None): self._command}
         self._state = context.messages.type("opendlv.sim.KinematicState")
         self._frame_id = flags["frame-id"]
+        self._yaw_rate_id: int | None = flags["yaw-rate-id"] if flags["odometry"] else None
 
-    def update(self, now: int) -> tuple[Output]:
+    def update(self, now: int) -> list[Output]:
         motion = self.vehicle.update(now)
-        return (Output(self._state(vx=motion.vx, vy=motion.vy, yawRate=motion.yaw_rate), self._frame_id),)
+        state = Output(self._state(vx=motion.vx, vy=motion.vy, yawRate=motion.yaw_rate), self._frame_id)
+        return [state] if self._yaw_rate_id is None else [state, *self._odometry(motion.yaw_rate, self._yaw_rate_id)]
 
-    def _steer(self, message: Any, _sample_time: int) -> None:
-        if not self.vehicle.steer(message.groundSteering):
-            self._ignored("GroundSteeringRequest", message.groundSteering)
+    def _odometry(self, yaw_rate: float, stamp: int) -> Iterator[Output]:
+        for name, field, sender_stamp, value in self.vehicle.odometry:
+            yield Output(self._messages.type(name)(**{field: value}), sender_stamp)
+        yield Output(self._messages.type(_YAW_RATE)(angularVelocityZ=yaw_rate), stamp)
 
-    def _press(self, message: Any, _sample_time: int) -> None:
-        if not self.vehicle.press(message.position):
-            self._ignored("PedalPositionRequest", message.position)
+    def _requests(self, flags: Flags) -> dict[tuple[str, int | None], Handler]:
+        """The requests that drive this vehicle, by message and sender stamp."""
+        if flags["drive"] == "differential":
+            name, field = _AXLE if flags["wheel-input"] == "axle" else _PEDAL
+            return {(name, stamp): self._handler(name, field, wheel) for stamp, wheel in enumerate((LEFT, RIGHT))}
+        driving, actuator = _PEDAL, PEDAL
+        if flags["drive"] == "bicycle":
+            by_speed = flags["speed-input"] == "speed"
+            driving, actuator = (_SPEED, SPEED) if by_speed else (_ACCELERATION, ACCELERATION)
+        both = ((_STEERING, STEERING), (driving, actuator))
+        return {(name, None): self._handler(name, field, each) for (name, field), each in both}
+
+    def _handler(self, name: str, field: str, actuator: str) -> Handler:
+        def take(message: Any, _sample_time: int) -> None:
+            value = getattr(message, field)
+            if not self.vehicle.request(actuator, value) and self.vehicle.rejected == 1:
+                short = name.rpartition(".")[2]
+                self._log.warning("ignored a %s of %s, and will ignore all that are not finite", short, value)
+
+        return take
 
     def _command(self, message: Any, _sample_time: int) -> None:
         if message.command == RESET:
             self.vehicle.reset()
 
-    def _ignored(self, name: str, value: float) -> None:
-        if self.vehicle.rejected == 1:
-            self._log.warning("ignored a %s of %s, and will ignore all that are not finite", name, value)
+
+def _drive(flags: Flags, condition: Condition) -> Drive | None:
+    """The drive of the flags, None for that of the Kiwi car; raises ValueError for a car that cannot be."""
+    friction = condition.grip * (flags["friction"] or 0)
+    if flags["drive"] == "differential":
+        wheels = TwoWheels(
+            wheel_radius=flags["wheel-radius"],
+            track=flags["track"],
+            top_wheel_speed=flags["top-wheel-speed"],
+            motor_lag=flags["motor-lag"],
+            dead_zone=flags["dead-zone"],
+            axle_offset=flags["axle-offset"],
+            wheel_offset=flags["wheel-offset"],
+            friction=friction,
+        )
+        return DifferentialDrive(wheels, flags["wheel-input"] == "axle", condition.power)
+    if flags["drive"] != "bicycle":
+        return None
+    car = SingleTrack(
+        mass=flags["mass"],
+        inertia=flags["inertia"],
+        wheel_base=flags["wheel-base"],
+        cg=flags["cg"],
+        cornering_front=flags["cornering-front"] * condition.grip,
+        cornering_rear=flags["cornering-rear"] * condition.grip,
+        friction=friction,
+        max_steering=math.radians(flags["max-steering"]),
+        steering_rate=math.radians(flags["steering-rate"]),
+        speed_lag=flags["speed-lag"],
+        max_acceleration=flags["max-acceleration"],
+        max_braking=flags["max-braking"],
+        top_speed=flags["top-speed"],
+        blend_speed=flags["blend-speed"],
+    )
+    has_tyres, by_speed = flags["tyres"] == "dynamic", flags["speed-input"] == "speed"
+    return BicycleDrive(car, has_tyres, by_speed, condition.power, condition.steering_offset)
 
 
 def build(context: Context) -> Service:

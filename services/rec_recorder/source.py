@@ -15,8 +15,8 @@ COMMON_SIZES = (
     (320, 240), (640, 360), (640, 480), (800, 600), (1024, 768), (1280, 720), (1280, 960), (1280, 1024),
     (1640, 1232), (1920, 1080), (2592, 1944), (3280, 2464),
 )  # fmt: skip
-HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3}  # twice the bytes per pixel
 
+HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3, "rgb": 6}  # twice the bytes per pixel
 _WRITTEN = re.compile(r"(?P<name>[^:]+)(:(?P<width>[1-9][0-9]{0,4})x(?P<height>[1-9][0-9]{0,4}))?")
 _log = logging.getLogger(__name__)
 
@@ -35,13 +35,13 @@ class MemorySpec:
 
     def layout(self, size: int) -> tuple[str, int, int]:
         """Format, width and height of the pictures in a memory of `size` bytes; raises SourceError."""
+        kinds = sorted(HALF_BYTES, key=lambda kind: not re.search(f"(?<!a){kind}", self.name))  # one in the name first
         if self.width:
-            for kind, half in HALF_BYTES.items():
-                if self.width * self.height * half // 2 == size:
+            for kind in kinds:
+                if self.width * self.height * HALF_BYTES[kind] // 2 == size:
                     return kind, self.width, self.height
             text = f"not those of a picture of {self.width} x {self.height} pixels"
             raise SourceError(f"memory '{self.name}' has {size} bytes, {text}")
-        kinds = sorted(HALF_BYTES, key=lambda kind: kind not in self.name)  # a format in the name comes first
         for kind in kinds:
             for width, height in COMMON_SIZES:
                 if width * height * HALF_BYTES[kind] // 2 == size:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv import message_versions, pixels
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.recording import Recording
 from services.base import Context, Service
@@ -175,11 +175,13 @@ def _memories(context: Context, recording: Recording, part: Part) -> PictureMemo
         _log.warning("%s has no pictures in the selected part: no shared memory is created", recording.path)
         return None
     frame = first_frame(recording, part.rows[part.shown])
-    argb = context.memory(flags["name.argb"], frame.width * frame.height * 4)
-    if frame.width % 2 or frame.height % 2:
-        _log.warning("pictures of %d x %d pixels cannot be converted to I420", frame.width, frame.height)
-        return PictureMemories(argb, None)
-    return PictureMemories(argb, context.memory(flags["name.i420"], frame.width * frame.height * 3 // 2))
+    width, height = frame.width, frame.height
+    names = {kind: flags[f"name.{kind}"] for kind in pixels.FORMATS}
+    if width % 2 or height % 2:
+        _log.warning("pictures of %d x %d pixels cannot be converted to I420", width, height)
+        del names["i420"]
+    sized = ((kind, name, pixels.size(kind, width, height)) for kind, name in names.items() if name)
+    return PictureMemories([(context.memory(name, size), kind) for kind, name, size in sized])
 
 
 def _refuse_other_senders(recording: Recording, sender: int) -> None:

@@ -1,7 +1,7 @@
 """The entries of a part in order, read in blocks; pictures decoded ahead and put into shared memory."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.pixels import with_copies
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from dodo_dsl.opendlv.video import DecodedFrame, VideoDecoder, VideoError, has_key_frame, refuse_large
@@ -98,21 +99,23 @@ class PictureMemories:
     A picture of another size than the first is skipped, and counted in ``misfits``.
     """
 
-    def __init__(self, argb: SharedMemory, i420: SharedMemory | None) -> None:
+    def __init__(self, memories: Sequence[tuple[SharedMemory, str]]) -> None:
+        """Each memory with the format of its pictures, that in argb first."""
         self.shown = self.misfits = 0
-        self._argb, self._i420 = argb, i420
+        self._memories = memories
 
     def show(self, picture: RecordedPicture, sample_time: int) -> None:
         """Publish a picture; raises SharedMemoryError when a reader keeps the lock."""
-        if picture.argb.nbytes != self._argb.size:
+        if picture.argb.nbytes != self._memories[0][0].size:
             if not self.misfits:
                 _log.warning("skipped the picture of %d us, which has another size than the first", sample_time)
             self.misfits += 1
             return
-        for memory, array in ((self._argb, picture.argb), (self._i420, picture.i420)):
-            if memory is not None and array is not None:
+        pictures = with_copies(picture.argb, picture.i420, (kind for _, kind in self._memories))
+        for memory, kind in self._memories:
+            if kind in pictures:
                 with memory.lock():
-                    memory.buffer[: array.nbytes] = np.ascontiguousarray(array).data.cast("B")
+                    memory.buffer[: pictures[kind].nbytes] = np.ascontiguousarray(pictures[kind]).data.cast("B")
                     memory.stamp(sample_time)
                     memory.notify_all()
         self.shown += 1

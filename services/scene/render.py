@@ -17,7 +17,7 @@ from services.scene.camera import NEAR, Array, CameraPose, Pinhole, View
 from services.scene.raster import SHIFT, Colour, Fixed, Image, fill_fixed
 from services.scene.scene import Scene
 from services.scene.shading import Piece
-from services.scene.surfaces import Face, cover_face, draw_backdrop, draw_face
+from services.scene.surfaces import Face, FaceTable, cover_face, draw_backdrop
 
 _ONE = 1 << SHIFT
 
@@ -64,6 +64,7 @@ class Renderer:
         self.camera = Pinhole(width, height, fovy)
         self.scene = scene
         self._tree = Tree(list(scene.faces))
+        self._faces = FaceTable(self._tree.faces)
         self.bodies = Bodies(scene.models, self._tree, scene.light, scene.faces)
         self._latest: tuple[bytes, list[Face | Drawn]] = b"", []
         """What was drawn last, from back to front, and the pose that it was drawn from."""
@@ -101,10 +102,13 @@ class Renderer:
             yield out
 
     def _draw(self, image: Image, view: View, items: Iterable[Face | Drawn]) -> None:
+        items = list(items)
+        shown = self._faces.shown(view, [item for item in items if isinstance(item, Face)])
         draw_backdrop(image, view, self.scene.sky, self.scene.ground)
         for item in items:
             if isinstance(item, Face):
-                draw_face(image, view, item)
+                for patch in shown.get(item, ()):
+                    patch.draw(image)
             else:
                 for points, colour in item[1]:
                     fill_fixed(image, points, colour)
@@ -114,9 +118,12 @@ class Renderer:
         view = self.camera.view(pose)
         image = np.full((self.camera.height, self.camera.width), -1, np.int32)
         bodies: dict[int, list[Piece]] = {}
-        for item in self._back_to_front(view):
+        items = self._back_to_front(view)
+        shown = self._faces.shown(view, [item for item in items if isinstance(item, Face)])
+        for item in items:
             if isinstance(item, Face):
-                cover_face(image, view, item, -1)
+                if item in shown:
+                    cover_face(image, view, item, -1)
             else:
                 bodies.setdefault(item[0], []).extend(item[1])
                 for points, _ in item[1]:

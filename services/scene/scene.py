@@ -31,7 +31,7 @@ from services.scene.raster import Colour
 from services.scene.shading import Light
 from services.scene.shape import Shape, make_shape
 from services.scene.surfaces import Covering, Face, TextureMap, box_faces
-from services.scene.textures import Texture, default_ground, load_picture
+from services.scene.textures import CANVAS, Texture, default_ground, load_picture
 
 TAPE: Colour = (235.0, 235.0, 235.0, 255.0)
 THICKNESS = 0.0002
@@ -214,14 +214,20 @@ def _shape(file: Path) -> tuple[Shape, int]:
     return make_shape(*mesh), len(mesh[1])
 
 
-def _cover(entry: BlockEntry, memory: _Budget) -> Colour | Covering:
+Textures = dict[tuple[Path, int], Texture]
+"""By file and repeats: blocks of many sizes often have one."""
+
+
+def _cover(entry: BlockEntry, memory: _Budget, known: Textures) -> Colour | Covering:
     if not isinstance(entry.paint, Path):
         return (*_bgr(entry.paint).tolist(), 255.0)
     tile = entry.tile
     repeats = math.ceil(max(entry.dimension) / min(tile)) if tile else 1
-    texture = Texture(load_picture(entry.paint), repeats)
-    memory.take(texture.size)
-    return Covering(texture, tile)
+    key = entry.paint, min(repeats, CANVAS)
+    if key not in known:
+        known[key] = Texture(load_picture(entry.paint), repeats)
+        memory.take(known[key].size)
+    return Covering(known[key], tile)
 
 
 def _default_floor() -> Face:
@@ -232,14 +238,15 @@ def _default_floor() -> Face:
     return Face(points, np.array([0.0, 0.0, 1.0]), 0.0, lie)
 
 
-def _block_faces(entry: BlockEntry, memory: _Budget) -> list[Face]:
-    cover = _cover(entry, memory)
+def _block_faces(entry: BlockEntry, memory: _Budget, known: Textures) -> list[Face]:
+    cover = _cover(entry, memory, known)
     return [face for i in entry.instances for face in box_faces(entry.dimension, i, cover)]
 
 
 def _faces(entries: MapFile, options: SceneOptions) -> Iterator[Face]:
     memory = _Budget(entries.path, MAX_TEXTURE_BYTES, "bytes of textures")
-    blocks = [face for block in entries.blocks for face in _block_faces(block, memory)]
+    known: Textures = {}
+    blocks = [face for block in entries.blocks for face in _block_faces(block, memory, known)]
     lines = picked_lines(entries.path, options.lines)
     for face in [*(blocks or [_default_floor()]), *line_faces(lines, options.line_width)]:
         yield face.shaded(options.light.on(face.normal))

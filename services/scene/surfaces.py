@@ -4,6 +4,7 @@ Faces are those of the surroundings: floors, walls, boxes.
 """
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -13,7 +14,7 @@ import numpy.typing as npt
 
 from dodo_dsl.opendlv.assets.map_file import Instance
 from services.scene.camera import NEAR, Array, Pinhole, View, clip
-from services.scene.raster import OVERLAPPING, Colour, Image, fill, fill_fixed, fixed, inset
+from services.scene.raster import OVERLAPPING, Colour, Fixed, Image, fill, fill_fixed, fixed, inset
 from services.scene.textures import Texture
 
 
@@ -125,19 +126,111 @@ def draw_backdrop(image: Image, view: View, sky: Colour, ground: Colour) -> None
         fill(image, camera.project(below), ground)
 
 
-def draw_face(image: Image, view: View, face: Face) -> None:
-    """Draws what of a face lies in the picture, over what is there."""
+Window = tuple[int, int, int, int]
+"""The first and last-but-one columns and rows of some pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A part of a face as it is drawn: within a window of the picture, in one colour or one level of a texture.
+
+    ``outline`` is what is filled of the window, None for all of it. ``spot`` is the part in picture coordinates;
+    ``inverse`` leads from there to tiles of a texture.
+    """
+
+    window: Window
+    outline: Fixed | None
+    paint: Colour | TextureMap
+    spot: Array
+    inverse: Array
+    level: int = 0
+
+    def cover(self, covered: Image) -> bool:
+        """Marks the pixels (height, width) that are drawn; False where all of them were marked before."""
+        left, right, top, bottom = self.window
+        window = covered[top:bottom, left:right]
+        if cv2.countNonZero(window) == window.size:
+            return False
+        if self.outline is None:
+            window[:] = 255
+        else:
+            fill_fixed(window if isinstance(self.paint, TextureMap) else covered, self.outline, (255,))
+        return True
+
+    def draw(self, image: Image) -> None:
+        """Draws over what is there."""
+        if isinstance(self.paint, TextureMap):
+            _draw_texture(image, self, self.paint)
+        elif self.outline is not None:
+            fill_fixed(image, self.outline, self.paint)
+
+
+def patches(view: View, face: Face) -> Iterator[Patch]:
+    """What of a face lies in the picture, in the order in which it is drawn."""
     visible = view.visible_part(view.to_camera(face.points))
     if len(visible) < 3:
         return
     if isinstance(face.paint, TextureMap):
-        _draw_texture(image, view, visible, face.paint)
-    else:
-        fill(image, view.camera.project(visible), face.paint, OVERLAPPING)
+        yield from _bands(view, visible, face.paint)
+        return
+    polygon = view.camera.project(visible)
+    left, right, top, bottom = _window(view.camera, polygon)
+    around = max(left - 1, 0), min(right + 1, view.camera.width), max(top - 1, 0), min(bottom + 1, view.camera.height)
+    yield Patch(around, fixed(inset(polygon, OVERLAPPING)), face.paint, polygon, np.eye(3))
+
+
+_FEW = 24
+"""So many faces are drawn in less time than it takes to find out which are hidden."""
+_NEARLY = 1e-9
+
+
+class FaceTable:
+    """Faces as one array, to tell which of them are not hidden by others, and so have to be drawn."""
+
+    def __init__(self, faces: Sequence[Face]) -> None:
+        most = max((len(face.points) for face in faces), default=0)
+        self._rows = {face: row for row, face in enumerate(faces)}
+        self._points = np.array([[*face.points, *[face.points[-1]] * (most - len(face.points))] for face in faces])
+
+    def shown(self, view: View, faces: Sequence[Face]) -> dict[Face, list[Patch]]:
+        """Those of ``faces``, which are sorted from back to front, that show, each with what is to be drawn of it."""
+        if len(faces) <= _FEW:
+            return {face: list(patches(view, face)) for face in faces}
+        covered = np.zeros((view.camera.height, view.camera.width), np.uint8)
+        windows, found = self._windows(view), dict[Face, list[Patch]]()
+        for face in reversed(faces):
+            window = windows[self._rows[face]]
+            if window is None or _is_covered(covered, window):
+                continue
+            if parts := [patch for patch in patches(view, face) if patch.cover(covered)]:
+                found[face] = parts
+        return found
+
+    def _windows(self, view: View) -> list[Window | None]:
+        """Pixels that hold each face, by its row; all of them where it is partly behind the camera, None for none."""
+        camera, (count, most) = view.camera, self._points.shape[:2]
+        points = view.to_camera(self._points.reshape(-1, 3))
+        is_inside = (points @ camera.planes + camera.offsets >= -_NEARLY).reshape(count, most, -1)
+        inside = np.asarray(np.asarray(is_inside.any(axis=1)).all(axis=1))
+        depth = points[:, 2].reshape(count, most)
+        is_before = np.all(depth > NEAR, axis=1, keepdims=True)
+        points[:, 2] = np.maximum(points[:, 2], NEAR)
+        spots = camera.project(points).reshape(count, most, 2)
+        size = np.array([camera.width, camera.height])
+        low = np.where(is_before, np.clip(np.floor(spots.min(axis=1)) - 1, 0, size - 1), 0).astype(int)
+        high = np.where(is_before, np.clip(np.ceil(spots.max(axis=1)) + 2, 1, size), size).astype(int)
+        rows = zip(inside.tolist(), low.tolist(), high.tolist(), strict=True)
+        return [(left, right, top, bottom) if seen else None for seen, (left, top), (right, bottom) in rows]
+
+
+def _is_covered(covered: Image, window: Window) -> bool:
+    left, right, top, bottom = window
+    part = covered[top:bottom, left:right]
+    return cv2.countNonZero(part) == part.size
 
 
 def cover_face(labels: npt.NDArray[np.int32], view: View, face: Face, label: int) -> None:
-    """Writes a number wherever ``draw_face`` would draw."""
+    """Writes a number wherever the face would be drawn."""
     visible = view.visible_part(view.to_camera(face.points))
     if len(visible) > 2:
         fill(labels, view.camera.project(visible), (label,), OVERLAPPING)
@@ -159,7 +252,8 @@ def _band_limits(inverse: Array, texels: int, levels: int) -> list[float]:
     return [0.0, *inner, math.inf]
 
 
-def _draw_texture(image: Image, view: View, visible: Array, paint: TextureMap) -> None:
+def _bands(view: View, visible: Array, paint: TextureMap) -> Iterator[Patch]:
+    """The parts of a face's visible part, by the level of its texture."""
     forward = _texture_to_picture(view, paint)
     if abs(float(np.linalg.det(forward))) < 1e-12:
         return
@@ -172,15 +266,23 @@ def _draw_texture(image: Image, view: View, visible: Array, paint: TextureMap) -
             band = clip(visible, _DEPTH, -near)
             band = clip(band, -_DEPTH, far) if math.isfinite(far) else band
             if len(band) > 2:
-                _draw_band(image, view.camera.project(band), inverse, paint, level)
+                yield from _band(view.camera, view.camera.project(band), inverse, paint, level)
 
 
-def _window(image: Image, polygon: Array) -> tuple[int, int, int, int]:
-    """The first and last-but-one columns and rows of the pixels whose centres a polygon may cover."""
+def _band(camera: Pinhole, polygon: Array, inverse: Array, paint: TextureMap, level: int) -> Iterator[Patch]:
+    left, right, top, bottom = window = _window(camera, polygon)
+    if left < right and top < bottom:
+        is_whole = _fills_window(polygon, left, right, top, bottom)
+        outline = None if is_whole else fixed(inset(polygon, OVERLAPPING) - [left, top])
+        yield Patch(window, outline, paint, polygon, inverse, level)
+
+
+def _window(camera: Pinhole, polygon: Array) -> Window:
+    """The pixels whose centres a polygon may cover."""
     columns, rows = polygon.T.tolist()
     left, right = math.ceil(min(columns) - 1e-6), math.floor(max(columns) + 1e-6) + 1
     top, bottom = math.ceil(min(rows) - 1e-6), math.floor(max(rows) + 1e-6) + 1
-    return max(left, 0), min(right, image.shape[1]), max(top, 0), min(bottom, image.shape[0])
+    return max(left, 0), min(right, camera.width), max(top, 0), min(bottom, camera.height)
 
 
 def _fills_window(polygon: Array, left: int, right: int, top: int, bottom: int) -> bool:
@@ -196,23 +298,21 @@ def _fills_window(polygon: Array, left: int, right: int, top: int, bottom: int) 
     return is_left or is_right
 
 
-def _draw_band(image: Image, polygon: Array, inverse: Array, paint: TextureMap, level: int) -> None:
-    left, right, top, bottom = _window(image, polygon)
-    if left >= right or top >= bottom:
-        return
-    warp, canvas, border = _lookup(polygon, inverse, paint, level)
+def _draw_texture(image: Image, patch: Patch, paint: TextureMap) -> None:
+    left, right, top, bottom = patch.window
+    warp, canvas, border = _lookup(patch, paint)
     warp = warp @ np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
     window = image[top:bottom, left:right]
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     size = (right - left, bottom - top)
-    if _fills_window(polygon, left, right, top, bottom):
+    if patch.outline is None:
         cv2.warpPerspective(canvas, warp, size, dst=window, flags=flags, borderMode=border)
         _shade(window, paint.shade)
         return
     picture = np.asarray(cv2.warpPerspective(canvas, warp, size, flags=flags, borderMode=border), np.uint8)
     _shade(picture, paint.shade)
     mask = np.zeros(window.shape[:2], np.uint8)
-    fill_fixed(mask, fixed(inset(polygon, OVERLAPPING) - [left, top]), (255,))
+    fill_fixed(mask, patch.outline, (255,))
     cv2.copyTo(picture, mask, window)
 
 
@@ -221,13 +321,14 @@ def _shade(picture: Image, shade: float) -> None:
         cv2.multiply(picture, np.array([shade, shade, shade, 1.0]), dst=picture)
 
 
-def _lookup(polygon: Array, inverse: Array, paint: TextureMap, level: int) -> tuple[Array, Image, int]:
+def _lookup(patch: Patch, paint: TextureMap) -> tuple[Array, Image, int]:
     """From picture coordinates to texels: the homography, the picture that holds them, the border's mode.
 
     Whole tiles are taken off so that the polygon falls into the repeated canvas; where it is too
     large for that, a single tile is wrapped around, which is slower.
     """
-    tile, canvas = paint.texture.tiles[level], paint.texture.canvases[level]
+    polygon, inverse = patch.spot, patch.inverse
+    tile, canvas = paint.texture.tiles[patch.level], paint.texture.canvases[patch.level]
     height, width = tile.shape[:2]
     spots = np.column_stack([polygon, np.ones(len(polygon))]) @ inverse.T
     spots = spots[:, :2] / spots[:, 2:]

@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 
 import cv2
-import numpy as np
 
+from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Context, Flags, Output, Service, period_of
 from services.scene.camera import CameraPose, Pinhole, mount
@@ -21,7 +21,7 @@ from services.virtual_camera.model import Publish, VirtualCamera
 from services.virtual_camera.optics import Optics, Sensor, load_overlays
 
 Memories = list[tuple[SharedMemory, str]]
-"""Shared memory and what it holds: argb, i420 or bgr."""
+"""Shared memory and what it holds: a format of ``pixels``."""
 
 
 class VirtualCameraService(Service):
@@ -42,9 +42,7 @@ def publisher(memories: Memories) -> Publish:
     """Writes all pictures as OpenDLV's readers expect: copied and stamped under the lock, then announced."""
 
     def publish(argb: Image, i420: Image, sample_time: int) -> None:
-        pictures = {"argb": argb, "i420": i420}
-        if any(kind == "bgr" for _, kind in memories):
-            pictures["bgr"] = np.asarray(cv2.cvtColor(argb, cv2.COLOR_BGRA2BGR), np.uint8)
+        pictures = pixels.with_copies(argb, i420, (kind for _, kind in memories))
         for memory, kind in memories:
             with memory.lock():
                 memory.buffer[: pictures[kind].nbytes] = pictures[kind].data.cast("B")
@@ -92,16 +90,16 @@ def _start(flags: Flags) -> CameraPose | None:
     return CameraPose.at(x, y, 0.0, yaw=math.radians(yaw))
 
 
-def _memories(context: Context, pixels: int) -> Memories:
-    sizes = {"argb": pixels * 4, "i420": pixels * 3 // 2, "bgr": pixels * 3}
-    names = {kind: context.flags[f"name.{kind}"] for kind in sizes}
-    return [(context.memory(name, sizes[kind]), kind) for kind, name in names.items() if name is not None]
+def _memories(context: Context) -> Memories:
+    size = context.flags["width"] * context.flags["height"]
+    names = {kind: context.flags[f"name.{kind}"] for kind in pixels.FORMATS}
+    return [(context.memory(name, size * pixels.HALF_BYTES[kind] // 2), kind) for kind, name in names.items() if name]
 
 
 def build(context: Context) -> Service:
     """The service from its flags; raises MapError, ValueError and SharedMemoryError."""
     flags = context.flags
     renderer, optics = open_scene(flags)
-    publish = publisher(_memories(context, flags["width"] * flags["height"]))
+    publish = publisher(_memories(context))
     camera = mounted_camera(flags, renderer, optics, publish)
     return VirtualCameraService(camera, flags["freq"], flags["frame-id"], truth_sender(context, renderer, optics.lens))

@@ -18,7 +18,7 @@ dodo.map = (function () {
 
   // Equal axes around way and lines; far cones may fall outside.
   function fit(width, height) {
-    const points = [...way.poses, ...way.before].map((pose) => [pose.x, pose.y]);
+    const points = [...way.poses, ...way.before, ...way.bodies.flatMap((body) => body.poses)].map((pose) => [pose.x, pose.y]);
     for (const each of test.scene.lines) for (const [a, b, c, d] of each.lines) points.push([a, b], [c, d]);
     const [xs, ys] = [0, 1].map((n) => points.map((point) => point[n]));
     const [left, right, low, high] = [Math.min, Math.max].flatMap((f) => [xs, ys].map((all) => all.reduce((a, b) => f(a, b))))
@@ -120,6 +120,28 @@ dodo.map = (function () {
     context.fill();
   }
 
+  // Other vehicles, by the outlines of their models: where they have been, and are.
+  function others(context, time) {
+    for (const body of way.bodies) {
+      const colour = `rgb(${body.colour.map((part) => Math.round(255 * part)).join(" ")})`;
+      driven(context, body.poses.slice(0, dodo.data.at(body.times, time) + 1), "soft", 1.2);
+      if (time < body.times[0]) continue;
+      const pose = body.pose(time);
+      const [cos, sin] = [Math.cos(pose.heading), Math.sin(pose.heading)];
+      trace(context, body.outline.map(([x, y]) => view.to(pose.x + cos * x - sin * y, pose.y + sin * x + cos * y)));
+      context.closePath();
+      context.fillStyle = colour;
+      context.fill();
+      context.strokeStyle = context.fillStyle = dodo.canvas.colour("ink");
+      context.lineWidth = 1.2;
+      context.stroke();
+      context.font = "11px system-ui, sans-serif";
+      context.textAlign = "left";
+      const [x, y] = view.to(pose.x, pose.y);
+      context.fillText(body.name, x + 12, y - 8);
+    }
+  }
+
   // Where the test failed: a ring and a cross that print well, too.
   function failure(context) {
     const { time, x, y } = test.moment;
@@ -155,6 +177,7 @@ dodo.map = (function () {
     earlier(context, time);
     driven(context, way.poses, "faint", 2);
     driven(context, way.poses.slice(0, dodo.data.at(way.times, time) + 1), "way", 2.5);
+    others(context, time);
     if (test.test.outcome !== "passed") failure(context);
     vehicle(context, way.pose(time), "vehicle");
     scaleBar(context, height);

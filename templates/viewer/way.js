@@ -6,10 +6,16 @@ dodo.way = (function () {
   const { frame, length, width } = test.scene;
   const found = channel(frame.message, frame.sender) || dodo.data.channels.find((c) => c.message === frame.message);
   const poses = found ? read(found) : [];
+  // Other vehicles of which frames were on the bus.
+  const bodies = (test.scene.bodies || []).flatMap((body) => {
+    const list = read(channel(frame.message, body.sender) || { times: [], fields: [] });
+    const listed = timesOf(list);
+    return list.length ? [{ ...body, poses: list, times: listed, pose: (time) => between(list, listed, time) }] : [];
+  });
   const before = window.dodoBefore ? read(dodo.data.unpacked(window.dodoBefore)) : [];
 
   function read(source) {
-    const [x, y, qx, qy, qz, qw] = ["x", "y", "qx", "qy", "qz", "qw"].map((name) => field(source, name).values);
+    const [x, y, qx, qy, qz, qw] = ["x", "y", "qx", "qy", "qz", "qw"].map((name) => (field(source, name) || {}).values);
     const list = [];
     for (let n = 0; n < source.times.length; n++) {
       const heading = Math.atan2(2 * (qw[n] * qz[n] + qx[n] * qy[n]), qw[n] ** 2 + qx[n] ** 2 - qy[n] ** 2 - qz[n] ** 2);
@@ -18,7 +24,10 @@ dodo.way = (function () {
     return list;
   }
 
-  const timesOf = (list) => Float32Array.from(list, (pose) => pose.time);
+  function timesOf(list) {
+    return Float32Array.from(list, (pose) => pose.time);
+  }
+
   const [times, timesBefore] = [timesOf(poses), timesOf(before)];
   const pose = (time) => between(poses, times, time);
   const poseBefore = (time) => between(before, timesBefore, time);
@@ -42,5 +51,5 @@ dodo.way = (function () {
     return best && best.time;
   }
 
-  return { poses, times, pose, before, poseBefore, nearest, length, width };
+  return { poses, times, pose, before, poseBefore, bodies, nearest, length, width };
 })();

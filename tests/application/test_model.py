@@ -56,6 +56,14 @@ def test_declarations() -> None:
     assert (empty.inputs, empty.done, empty.readers) == ((), None, 0)
 
 
+def test_what_is_printed_is_declared_as_sent_once() -> None:
+    lines = "[{match: 'a(?P<x>.)$$', message: a.B}, {match: 'b(?P<x>.)$', message: a.B, sender: 3}]"
+    found = declared(mapping(f"x-dodo: {{out: [a.B/0, a.C], lines: {lines}}}"))
+    assert found is not None
+    assert [name for name, _ in found.outputs] == ["a.B/0", "a.C", "a.B/3"]
+    assert [(line.match, line.port) for line in found.lines] == [("a(?P<x>.)$", "a.B"), ("b(?P<x>.)$", "a.B/3")]
+
+
 def test_strings_of_a_list_or_a_single_one() -> None:
     assert [s.text for s in scalars(value("[a, 3, {b: c}, d]"))] == ["a", "d"]
     assert [s.text for s in scalars(value("a"))] == ["a"]

@@ -112,7 +112,7 @@ trees = st.recursive(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(deadline=None)
 @given(st.dictionaries(keys, trees, max_size=4), trees, st.sampled_from([True, False, None]), st.booleans())
 @pytest.mark.thorough
 def test_whatever_the_style_all_else_stays(rig: "dict[str, object]", after: object, flow: bool, last: bool) -> None:

@@ -42,6 +42,16 @@ services:
       in: [opendlv.logic.perception.DetectionType, opendlv.sim.Frame]
       out: [opendlv.proxy.GroundSteeringRequest]
 """
+PRINTED = """\
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=111
+    x-dodo:
+      lines: [{match: 'steer (?P<groundSteering>.+)', message: opendlv.proxy.GroundSteeringRequest}]
+      out: [opendlv.proxy.PedalPositionRequest]
+"""
 VARY = """\
 vary:
   yaw: {from: 80 deg, to: 100 deg, nominal: 90 deg}
@@ -50,7 +60,15 @@ environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, exp
 action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {yaw: "${vary.yaw}"}}}
 """
 PLACE = "tests/example/example.dodo.yml:{}"
-CASES = {"plain": "", "hil": HIL, "matrix": MATRIX, "vary": VARY, "variables": VARIABLES, "declared": DECLARED}
+CASES = {
+    "plain": "",
+    "hil": HIL,
+    "matrix": MATRIX,
+    "vary": VARY,
+    "variables": VARIABLES,
+    "declared": DECLARED,
+    "printed": PRINTED,
+}
 
 
 def explained(*words: str) -> tuple[int, str, str]:

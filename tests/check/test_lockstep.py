@@ -76,3 +76,27 @@ def test_a_name_alone_means_all_sender_stamps() -> None:
         End(f"s{n}", "action", message(name, None), Span("x.yml")) for n, name in enumerate(("a.B/3", "a.B", "a.C/1"))
     ]
     assert answers(Wiring((), tuple(ends))) == ["a.B", "a.C/1"]
+
+
+def printing(messages: str, more: str = "") -> str:
+    lines = [f"{{match: '(?P<x>.)', message: {name}}}" for name in messages.split()]
+    return f"""\
+# docker-compose.yml
+services:
+  driver: {{image: driver, x-dodo: {{lines: [{", ".join(lines)}]{more}}}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("example", "expected"),
+    [
+        (printing(STEERING), [STEERING, PEDAL]),
+        (printing("opendlv.proxy.DistanceReading"), ["opendlv.proxy.DistanceReading/0", STEERING, PEDAL]),
+        (printing("opendlv.logic.perception.DetectionType"), [STEERING, PEDAL]),
+        (printing(f"{STEERING} opendlv.proxy.DistanceReading", f", answers: [{PEDAL}]"), [PEDAL]),
+    ],
+)
+def test_what_the_application_prints_answers_beside_what_is_driven_by(
+    tmp_path: Path, example: str, expected: list[str]
+) -> None:
+    assert answers(resolved(example, tmp_path).wiring) == expected

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.check.senders import senders, truth
-from tests.check.contexts import resolved
+from dodo_dsl.check.wiring_rules import check_producers
+from tests.check.contexts import found, resolved
 from tests.run.recorded.made import message, write
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
@@ -90,3 +91,36 @@ def test_a_recorded_target_is_never_the_producer_of_what_the_application_sends(
     assert said == [guarded] * bool(guarded)
     assert truth(test) == tuple(word.partition("=")[0] for word in said)
     assert list(test.left_out["drive"]) == left_out
+
+
+PRINTED = """\
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=1
+    x-dodo:
+      lines:
+        - {match: 'steer (?P<groundSteering>[-.0-9]+)', message: opendlv.proxy.GroundSteeringRequest}
+        - {match: 'seen (?P<type>[0-9]+)', message: opendlv.logic.perception.DetectionType, sender: 9}
+      out: [opendlv.proxy.PedalPositionRequest]
+"""
+
+
+def test_what_is_printed_is_nothing_by_which_it_is_judged(tmp_path: Path) -> None:
+    folder = tmp_path / "tests" / "example"
+    folder.mkdir(parents=True)
+    write(folder / "drive.rec", *(message(STEERING, 1_700_000_000_000_000)._replace(sender_stamp=s) for s in (0, 9)))
+    replay = REPLAY.replace("  camera: null\n", "").replace("action: null\n", "").replace("TARGET", "target-sender: 9")
+    replay += PRINTED.replace(
+        "opendlv.proxy.GroundSteeringRequest}", "opendlv.proxy.GroundSteeringRequest, sender: 9}", 1
+    )
+    (problem,) = [p for p in found(check_producers, replay, tmp_path) if p[0] == "two-producers"]
+    assert problem[1] == f"the application's 'driver' prints {STEERING}/9, by which 'track' judges it"
+    assert f"{STEERING}/9=drive" in senders(resolved(replay, tmp_path))
+
+
+def test_what_is_printed_comes_from_the_runner_alone(tmp_path: Path) -> None:
+    words = senders(resolved(PRINTED, tmp_path))
+    assert {f"{STEERING}/0=dodo-lines", "opendlv.logic.perception.DetectionType/9=dodo-lines"} <= set(words)
+    assert not any(word.startswith("opendlv.proxy.PedalPositionRequest") for word in words)

@@ -112,7 +112,7 @@ def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
     assert (driven > 17, search.driven) == (True, [])
 
 
-@pytest.mark.parametrize("sweep", [[], ["--sweep"]])
+@pytest.mark.parametrize("sweep", [[], pytest.param(["--sweep"], marks=pytest.mark.proof)])
 def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) -> None:
     code, out = search("example", "--runs", "24", "--until-failure", *sweep)
     early = result()
@@ -126,7 +126,10 @@ def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) 
     assert {**result(), "shrunk": []} == {**result("whole"), "shrunk": []}, "it goes on from there"
 
 
-@pytest.mark.parametrize("words", [[], ["--until-failure"]], ids=["all", "first"])
+@pytest.mark.parametrize(
+    "words",
+    [pytest.param([], id="all"), pytest.param(["--until-failure"], id="first", marks=pytest.mark.proof)],
+)
 def test_a_failure_that_does_not_repeat_is_none(search: Search, words: list[str]) -> None:
     """It ends no search, is shrunk no further, and does not count in the rate."""
     search.once, search.runs = 0.02, 24

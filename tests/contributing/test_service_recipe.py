@@ -114,6 +114,7 @@ def test_its_commands_show_the_service_and_pass_the_test(checkout: Path) -> None
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("recipe")
+@pytest.mark.proof
 def test_what_checks_every_service_has_nothing_to_say(checkout: Path) -> None:
     run(checkout, "ruff", "format", "--check", "services/odometer", "tests/services/odometer")
     run(checkout, "ruff", "check", "services/odometer", "tests/services/odometer")

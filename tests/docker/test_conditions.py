@@ -127,7 +127,8 @@ FEW = {"docker": ("come-true", "unhealthy", "own-health"), "mixed": ("come-true"
 )
 def test_conditions(backend: str, names: tuple[str, ...], crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that cannot come true ends the test, and names who waits for what."""
-    monkeypatch.setattr(start_order, "LONGEST_S", 9.0)
+    if "never-ends" in names:
+        monkeypatch.setattr(start_order, "LONGEST_S", 9.0)
     chosen = {name: TABLE[name] for name in names}
     scripts = Path("/scripts") if backend == "docker" else crate.bench.folder
     jobs = [waiting(crate, slug, scripts, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]

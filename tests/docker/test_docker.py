@@ -22,8 +22,10 @@ import yaml
 from dodo_dsl import __version__
 from dodo_dsl.opendlv.address import group
 from dodo_dsl.outcome import differs_each_run
+from tests.docker.compose import Crate
 from tests.realtime import wait_for_nobody
 from tests.run.desk import wait_for
+from tests.run.helpers import WAIT
 
 ROOT = Path(__file__).parents[2]
 HOSTILE = Path(__file__).parent / "hostile"
@@ -102,9 +104,50 @@ def lockstep(folder: Path, out: Path, names: tuple[str, ...], backend: str) -> d
     return {name: results(folder / backend / name)[name] for name in names}
 
 
-@pytest.mark.parametrize(
-    "names", [DRIVES, pytest.param(LOCKSTEP, marks=pytest.mark.proof)], ids=["a drive", "a recording beside it"]
-)
+FEELS = """
+import socket
+from dodo_dsl.opendlv.address import group
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+bus = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+bus.bind(group(110))
+bus.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group(110)[0]) + bytes(4))
+bus.settimeout(2)
+with SharedMemory.create("video0.argb", 1000) as memory:
+    memory.buffer[:1000] = b"x" * 1000
+    print('{"dodo": "ready"}', flush=True)
+    while not os.path.exists("/tmp/app-began"):
+        time.sleep(0.02)
+    felt = []
+    try:
+        felt.append(f"heard {bus.recv(1000)[:20]}")
+    except TimeoutError:
+        pass
+    if bytes(memory.buffer[:1000]) != b"x" * 1000:
+        felt.append("written over")
+    felt += [name for name in os.listdir("/tmp") if name.startswith("filler")]
+outcome = "failed" if felt else "passed"
+print(f'{{"dodo": "verdict", "outcome": "{outcome}", "reason": "felt {len(felt)}", "checks": []}}', flush=True)
+"""
+
+
+def test_a_hostile_neighbour_is_neither_heard_nor_felt(crate: Crate) -> None:
+    """It sends to all groups, writes into all shared memory and fills its /tmp, as long as another test takes."""
+    shutil.copy(HOSTILE / "hostile.py", crate.bench.folder)
+    words = ["--cid=111", "--name=video0.argb", "--harm=groups,memory,tmp", "--stop=/scripts/stop"]
+    hostile = crate.start(crate.job("hostile", entrypoint=["python3", "-u", "/scripts/hostile.py"], command=words))
+    try:
+        wait_for(hostile, "running")
+        (outcome,) = crate.run(crate.job("quiet", FEELS, "open('/tmp/app-began', 'w').close()\n" + WAIT)).values()
+        assert hostile.poll() is None
+    finally:
+        (crate.bench.folder / "stop").touch()
+        said, _ = hostile.communicate(timeout=600)
+    assert (outcome.outcome, outcome.reason) == ("passed", "felt 0")
+    assert re.search(r"^FAILED .*application service 'app' ended with exit code 0", said, re.MULTILINE), said
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize("names", [DRIVES, LOCKSTEP], ids=["a drive", "a recording beside it"])
 def test_hostile_neighbours_change_nothing_of_what_processes_give(tmp_path: Path, names: tuple[str, ...]) -> None:
     """Beside a flood, traffic on all groups, memory scribbling and a full /tmp in another test."""
     (tmp_path / "stop").mkdir()
@@ -166,8 +209,9 @@ def hurry_emulators(until: threading.Event) -> None:
             begun.add(process)
 
 
+@pytest.mark.proof
 def test_the_emulated_rig_in_containers(tmp_path: Path) -> None:
-    """A machine that is too busy for the emulated rig gets two more tries."""
+    """A machine that is too busy for the emulated rig gets two more tries; test_images tries the image's emulator."""
     if not (ROOT / "build" / "firmware" / "rig-emulator").exists():
         pytest.skip("the emulated rig is not built: make firmware")
     report, ended = tmp_path / "report", threading.Event()
@@ -242,7 +286,10 @@ def hostile_test(folder: Path) -> tuple[Path, Path]:
 
 
 def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
-    """``cd DIR/<slug> && docker compose up``: the verdict stands in the log, whatever lies above."""
+    """``cd DIR/<slug> && docker compose up``: the verdict stands in the log, whatever lies above.
+
+    It is that of processes: what the two clocks of lockstep give is the same.
+    """
     out = tmp_path / "generated"
     (tmp_path / "docker-compose.yml").write_text("services: {stranger: {image: stranger}}\n")
     subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", *DRIVES, "-o", str(out)], cwd=ROOT, check=True)
@@ -254,24 +301,39 @@ def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
         subprocess.run(["docker", "compose", "down", "-v"], cwd=folder, env=variables, capture_output=True, check=True)
         if "Pool overlaps" not in result.stderr:
             break
-    assert '"outcome": "passed"' in result.stdout, result.stdout[-3000:] + result.stderr[-3000:]
-    assert result.returncode == 0
+    said = [line[line.index("{") :] for line in result.stdout.splitlines() if '"dodo": "verdict"' in line]
+    assert result.returncode == 0 and said, result.stdout[-3000:] + result.stderr[-3000:]
+    verdict = json.loads(said[0])
+    assert verdict["outcome"] == "passed"
+    ours = lockstep(tmp_path, out, DRIVES, "process")[DRIVES[0]]
+    assert ours["clock"] == "lockstep"
+    values = ({c["name"]: c["value"] for c in checks} for checks in (verdict["checks"], ours["checks"]))
+    of_hand, of_processes = ({n: v for n, v in each.items() if not differs_each_run(n)} for each in values)
+    assert len(of_hand) > 3 and of_hand == pytest.approx({n: of_processes[n] for n in of_hand}, rel=1e-3)
 
 
-def test_host_isolation_leases_and_refuses_foreign_traffic(tmp_path: Path) -> None:
-    words = ["sil-closed-left-curve", "--isolation", "host", "--report", str(tmp_path / "report")]
-    process = start(tmp_path, *words)
+ON_HOST = ("sil-closed-left-curve", "--isolation", "host")
+
+
+@pytest.mark.proof
+def test_host_isolation(tmp_path: Path) -> None:
+    process = start(tmp_path, *ON_HOST, "--report", str(tmp_path / "report"))
     out, _ = process.communicate(timeout=900)
     assert process.returncode == 0, out
-    (test,) = results(tmp_path / "report").values()
+
+
+def test_host_isolation_refuses_foreign_traffic(tmp_path: Path) -> None:
+    out = tmp_path / "generated"
+    subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", ON_HOST[0], "-o", str(out)], cwd=ROOT, check=True)
+    cid = json.loads((out / ON_HOST[0] / "test.json").read_text())["cid"]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        stranger.connect(group(test["cid"]))
+        stranger.connect(group(cid))
         port = stranger.getsockname()[1]
-        second = start(tmp_path, *words)
-        while second.poll() is None:
+        process = start(tmp_path, *ON_HOST, "--report", str(tmp_path / "report"))
+        while process.poll() is None:
             stranger.send(b"\x0d\xa4\x00\x00\x00")
             time.sleep(0.02)
-    out, _ = second.communicate()
-    assert second.returncode == 3, out
+    said, _ = process.communicate()
+    assert process.returncode == 3, said
     (test,) = results(tmp_path / "report").values()
     assert f":{port}; end it" in str(test["reason"])

@@ -51,6 +51,7 @@ def test_service_that_never_gets_ready(crate: Crate, book: Book, monkeypatch: py
     book.record("A service never gets ready", "docker", outcome.outcome, outcome.reason)
 
 
+@pytest.mark.proof
 def test_disk_with_the_report_is_full(crate: Crate, small_disk: Path, book: Book) -> None:
     """A recording that does not fit is left out as a whole, so that the report has room; its volume goes."""
     writes = 'open("/dodo/report/test.rec", "wb").write(bytes(200_000))\n'

@@ -20,7 +20,7 @@ SWAPS = {
     "turns": "cd /app && while mv data data.old && ln -s /etc data && rm data && mv data.old data; do :; done",
 }
 LOOK = """
-for turn in 1 2 3 4 5 6; do
+for turn in 1 2 3; do
   echo "sees $(ls /z | tr '\\n' ' ')of $(cat /file)"
   touch /z/of-{0} /to-read/of-{0} /file 2> /dev/null
   sleep 0.3

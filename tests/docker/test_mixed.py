@@ -18,6 +18,7 @@ from dodo_dsl.run.mixed import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.docker.compose import SUBNETS, Crate
+from tests.docker.test_started_anywhere import WITHOUT_COLON
 from tests.faults import Book
 from tests.run.desk import ROOT
 from tests.run.faults import Fault, as_told, faults_on
@@ -101,8 +102,10 @@ def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate)
 def test_default_without_images_of_dodo(tmp_path: Path) -> None:
     """A drive in lockstep in a deployment whose images are nowhere, and whose application is only an image.
 
-    It writes into a copy of its folder.
+    It writes into a copy of its folder, whose name is odd.
     """
+    tmp_path /= WITHOUT_COLON
+    tmp_path.mkdir()
     for name in (TEST, "maps"):
         shutil.copytree(ROOT / "tests_registry" / name, tmp_path / "tests" / name)
     shutil.copytree(ROOT / "examples" / "kiwi", tmp_path / "kiwi")

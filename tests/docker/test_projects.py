@@ -52,7 +52,9 @@ def test_a_strangers_container_on_a_leftover_network_blocks_nothing_else(client:
     assert list(leases.lease_folder().glob("*.json")) == []
 
 
-def test_files_of_a_container_come_out(client: Any, base_image: str, tmp_path: Path) -> None:
+def test_files_of_a_container_come_out_whole_or_not_at_all(
+    client: Any, base_image: str, tmp_path: Path, small_disk: Path
+) -> None:
     fills = "mkdir -p /report/sub && head -c 3000000 /dev/zero > /report/test.rec && ln -s /etc/passwd /report/link"
     container = client.containers.run(base_image, ["sh", "-c", fills], detach=True)
     try:
@@ -60,7 +62,9 @@ def test_files_of_a_container_come_out(client: Any, base_image: str, tmp_path: P
         copy_out(container, "/report/.", tmp_path / "out")
         with pytest.raises(OSError, match="more than 1,000,000 bytes"):
             copy_out(container, "/report/.", tmp_path / "less", max_bytes=1_000_000)
+        with pytest.raises(OSError, match="No space left on device"):
+            copy_out(container, "/report/.", small_disk)
     finally:
         container.remove(force=True)
     assert {p.name: p.stat().st_size for p in (tmp_path / "out").iterdir()} == {"test.rec": 3_000_000}
-    assert list((tmp_path / "less").iterdir()) == []
+    assert [*(tmp_path / "less").iterdir(), *small_disk.iterdir()] == []

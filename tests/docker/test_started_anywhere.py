@@ -1,6 +1,6 @@
 """Where and how a command is started does not matter on an engine either: the cases in which its paths and users do.
 
-Each by itself is for ``make proof``.
+They are for ``make proof``; ``make test`` has an odd path on both backends: test_builds and test_mixed.
 """
 
 import os
@@ -56,7 +56,8 @@ READ_ONLY = Case(
     umask=0o077,
     environment={"TMPDIR": "/dev/shm"},
 )
-CASES = parameters((IN_ASCII, FROM_OUTSIDE), DOCKER, "docker") + parameters((READ_ONLY,), MIXED, "mixed")
+TOGETHER = (IN_ASCII, FROM_OUTSIDE)
+CASES = parameters((), (*TOGETHER, *DOCKER), "docker") + parameters((), (READ_ONLY, *MIXED), "mixed")
 
 
 @pytest.mark.parametrize(("backend", "case"), CASES)

@@ -60,6 +60,7 @@ def test_verdict_clock_and_test_time_are_in_the_results(plain: tuple[dict[str, A
     assert test["sim_s"] * 10 - 1 <= len(pictures) <= test["sim_s"] * 10 + 1
 
 
+@pytest.mark.proof
 def test_manners_and_the_host_s_bus_change_neither_values_nor_pictures(
     plain: tuple[dict[str, Any], list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

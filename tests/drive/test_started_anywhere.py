@@ -118,13 +118,12 @@ ODD = "-a b#c%20d%'\"`$HOME${b}$(c){{d}}{%e:,=\\n\n[b]*?<i>&amp;größe"
 """All that is odd in ``PATHS``."""
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 TOGETHER = (
-    Case("odd path in ASCII without HOME", ODD, environment={**ASCII, "HOME": None}),
     Case(
-        "odd path of a user without HOME, umask 077, TMPDIR",
+        "odd path in ASCII of a user without HOME, umask 077, TMPDIR",
         ODD,
         umask=0o077,
         is_user=True,
-        environment={"HOME": None, "TMPDIR": "{scratch}/tmp"},
+        environment={**ASCII, "HOME": None, "TMPDIR": "{scratch}/tmp"},
     ),
     Case(
         "deep subfolder of a symlink, umask 077, memories of POSIX",
@@ -144,22 +143,16 @@ TOGETHER = (
         environment={"HOME": "/usr"},
     ),
     Case(
-        "read-only checkout of a user, TMPDIR in memory",
-        made="read-only",
-        report="{scratch}/out",
-        is_user=True,
-        environment={"TMPDIR": "/dev/shm"},
-    ),
-    Case(
-        "read-only checkout, HOME and XDG folders",
+        "read-only checkout, HOME and XDG folders of a user, TMPDIR in memory",
         made="read-only",
         report="{scratch}/a/b",
-        environment={"HOME": "/proc", "XDG_STATE_HOME": "/proc/a", "XDG_CACHE_HOME": "/proc/b"},
-    ),
-    Case(
-        "worktree, relative folders, POSIX in UTF-8",
-        made="worktree",
-        environment={"HOME": "relative", "TMPDIR": ".", "LC_ALL": "POSIX", "PYTHONUTF8": "1"},
+        is_user=True,
+        environment={
+            "HOME": "/proc",
+            "TMPDIR": "/dev/shm",
+            "XDG_STATE_HOME": "/proc/a",
+            "XDG_CACHE_HOME": "/proc/b",
+        },
     ),
     Case(
         "nothing is UTF-8 but the checkout",
@@ -167,10 +160,14 @@ TOGETHER = (
         environment={"HOME": f"{{scratch}}/{NOT_UTF8}", "TMPDIR": f"{{scratch}}/{NOT_UTF8}"},
     ),
     Case(
-        "subfolder, TMPDIR among the tests, blanks in XDG folders",
+        "subfolder of a worktree, HOME relative, TMPDIR among the tests, blanks in XDG folders, POSIX in UTF-8",
+        made="worktree",
         at="{checkout}/tests",
         environment={
+            "HOME": "relative",
             "TMPDIR": "{checkout}/tests",
+            "LC_ALL": "POSIX",
+            "PYTHONUTF8": "1",
             "XDG_STATE_HOME": "{scratch}/st ate",
             "XDG_CACHE_HOME": "{scratch}/ca che",
         },

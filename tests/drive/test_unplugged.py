@@ -121,7 +121,7 @@ WAYS = (
     killed("kill_model", MODEL, "service 'vehicle' of layer action was killed by SIGKILL"),
     stopped("stop_model", MODEL, "no KinematicState of the vehicle has come for 1 s"),
     killed("kill_sandbox", SANDBOX, "the test's sandbox ended unexpectedly"),
-    Way("kill_runner", kill_runner, "", short=True),
+    Way("kill_runner", kill_runner, ""),  # in short in tests/run/rigs/test_rig.py
     Way("kill_runner", kill_runner, "", isolation="network"),
 )
 

@@ -43,7 +43,7 @@ def test_it_finds_what_a_person_sees(perception: Any, shared_data: Callable[[str
         assert frame is not None
         if number % EVERY:
             continue
-        cones = perception.find_cones(np.ascontiguousarray(frame.pixels("bgr")))
+        cones = perception.find(np.ascontiguousarray(frame.pixels("bgr")))
         counts.append(len(cones))
         for colour, x, y in SEEN.get(number, ()):
             assert any(c.colour == colour and 0 <= x - c.x <= c.width and 0 <= y - c.y <= c.height for c in cones), (

@@ -23,7 +23,7 @@ Driving = Callable[[float, float], tuple[float, float]]
 """Steering request (rad) and pedal of a frame, as they should be and as they are sent."""
 
 Cones = list[Any]
-"""Of ``perception.Cone``: colour and box in fractions of the image."""
+"""Of ``perception.Patch``: colour and box in fractions of the image."""
 
 Sent = tuple[Any, int | None, int]
 """A message with its sample time (us, None is now) and its sender stamp."""
@@ -45,27 +45,27 @@ def driving(begin: Callable[[], Driving]) -> Make:
 
     def make(steering: Program) -> None:
         change, drive = begin(), steering.Driver.drive
-        steering.Driver.drive = lambda self, yellow, blue: change(*drive(self, yellow, blue))
+        steering.Driver.drive = lambda self, *found: change(*drive(self, *found))
 
     return make
 
 
 def finding(begin: Callable[[], Callable[[Cones], Cones]]) -> Make:
-    """Changes which cones ``find_cones`` finds."""
+    """Changes which cones ``find`` finds."""
 
     def make(perception: Program) -> None:
-        change, find = begin(), perception.find_cones
-        perception.find_cones = lambda image: change(find(image))
+        change, find = begin(), perception.find
+        perception.find = lambda image: change(find(image))
 
     return make
 
 
 def seeing(begin: Callable[[], Callable[[Any], Any]]) -> Make:
-    """Changes the image in which ``find_cones`` looks, an array of height x width x 4 bytes."""
+    """Changes the image in which ``find`` looks, an array of height x width x 4 bytes."""
 
     def make(perception: Program) -> None:
-        change, find = begin(), perception.find_cones
-        perception.find_cones = lambda image: find(change(image))
+        change, find = begin(), perception.find
+        perception.find = lambda image: find(change(image))
 
     return make
 
@@ -106,7 +106,7 @@ def framing(begin: Callable[[], Callable[[], None]]) -> Make:
 
     def make(module: Program) -> None:
         act = begin()
-        owner, name = (module.Driver, "drive") if module.__name__ == STEERING else (module, "find_cones")
+        owner, name = (module.Driver, "drive") if module.__name__ == STEERING else (module, "find")
         process = getattr(owner, name)
 
         def act_and_process(*words: Any) -> Any:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from tests.faulty.kiwi import Cones, Make, Program, Sent, announcing, framing, sending
+from tests.faulty.kiwi import Cones, Make, Program, Sent, announcing, finding, framing, sending
 
 OWN_CID = 111
 LATER = 30
@@ -47,6 +47,25 @@ def every_second() -> Callable[[Sent], Iterable[Sent]]:
         return [sent] if len(times) % 2 else []
 
     return change
+
+
+def before() -> Callable[[Sent], Iterable[Sent]]:
+    """Each message of the frame before in place of that of this one, with its sample time."""
+    last: dict[str, Sent] = {}
+
+    def change(sent: Sent) -> Iterable[Sent]:
+        name = sent[0].DESCRIPTOR.full_name
+        held, last[name] = last.get(name, sent), sent
+        return [held]
+
+    return change
+
+
+def at_nothing(cones: Cones) -> Cones:
+    """An exception where no cone was found."""
+    if not cones:
+        crash()
+    return cones
 
 
 def readings(program: Program) -> None:
@@ -141,6 +160,7 @@ PERCEPTION_CONDUCT: dict[str, Make] = {
     "ends-1": at_frame(LATER, ends(1)),
     "crashes-at-start": crash_at_start,
     "crashes-at-first": at_frame(0, crash),
+    "crashes-at-nothing": finding(lambda: at_nothing),
 }
 STEERING_CONDUCT: dict[str, Make] = {
     "stamp-steering": stamped(7),
@@ -150,5 +170,6 @@ STEERING_CONDUCT: dict[str, Make] = {
     "silent-later": silent_after(2 * LATER),
     "floods": repeated(200),
     "every-second": sending(every_second),
+    "answer-before": sending(before),
     "crashes-later": at_frame(LATER, crash),
 }

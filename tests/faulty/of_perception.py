@@ -91,7 +91,7 @@ def ghosts(count: int) -> Make:
 
         def ghost() -> Any:
             colour = draw.choice(("yellow", "blue"))
-            return perception.Cone(colour, draw.uniform(0.1, 0.8), draw.uniform(0.55, 0.8), 0.03, 0.07)
+            return perception.Patch(colour, draw.uniform(0.1, 0.8), draw.uniform(0.55, 0.8), 0.03, 0.07)
 
         finding(lambda: lambda cones: [*cones, *(ghost() for _ in range(count))])(perception)
 

@@ -48,8 +48,10 @@ class Recorder:
 
 
 def picture(number: int) -> Any:
-    """A yellow and a blue cone that move, a small one behind the yellow one."""
+    """A yellow and a blue cone that move, a small one behind the yellow one; nothing in the last picture."""
     image = np.full((HEIGHT, WIDTH, 4), GREY, np.uint8)
+    if number == FRAMES - 1:
+        return image
     for colour, x, y, height in ((YELLOW, 20, 70, 20), (BLUE, 130, 80, 24), (YELLOW, 50, 60, 6)):
         left = x - (number * 7) % 20
         image[y : y + height, left : left + height // 2] = colour
@@ -67,7 +69,7 @@ def seen(make: Make | None) -> Recorder:
     source = SimpleNamespace(name="video0.argb", width=WIDTH, height=HEIGHT)
     with noted(session):
         for number in range(FRAMES):
-            cones = module.find_cones(picture(number))
+            cones = module.find(picture(number))
             module.announce(session, cones, number, BEGIN + number * PERIOD, source)
     return session
 

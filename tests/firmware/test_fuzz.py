@@ -31,7 +31,7 @@ lines = st.one_of(
 speeds = st.one_of(st.sampled_from([-1.0, 1.0]), st.floats(-1, 1))
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=ONE_BENCH)
+@settings(max_examples=4 * settings.default.max_examples, deadline=None, suppress_health_check=ONE_BENCH)
 @given(data=lines)
 @pytest.mark.thorough
 def test_only_valid_commands_move_the_core(bench: Bench, data: bytes) -> None:

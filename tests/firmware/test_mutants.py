@@ -14,7 +14,7 @@ MUTANTS = [row["name"] for row in yaml.safe_load((ROOT / "firmware" / "mutants.y
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("names", [MUTANTS[::25], pytest.param(MUTANTS, marks=pytest.mark.proof)], ids=["few", "all"])
+@pytest.mark.parametrize("names", [MUTANTS[::60], pytest.param(MUTANTS, marks=pytest.mark.proof)], ids=["few", "all"])
 def test_each_safety_rule_has_a_test_that_notices_when_it_is_weak(bench_program: object, names: list[str]) -> None:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
     words = [sys.executable, str(ROOT / "scripts" / "mutate-firmware"), *names]

@@ -108,7 +108,7 @@ def jobs(folder: Path, **variables: str) -> dict[str, dict[str, Any]]:
     return {job["name"]: job for job in listed if job["when"] != "never"}
 
 
-FEW = ("both", "components with inputs", "a monorepo")
+FEW = ("both", "components with inputs")
 
 
 @pytest.mark.parametrize("case", [c if c in FEW else pytest.param(c, marks=pytest.mark.proof) for c in CASES])
@@ -127,7 +127,7 @@ def test_gitlab_accepts_them(tmp_path: Path, accepted: Callable[..., None]) -> N
     accepted(*tmp_path.iterdir())
 
 
-SHORT = [("nightly", "schedule"), ("pre-post", "merge request"), ("multi-project", "another project's pipeline")]
+SHORT = [("nightly", "schedule"), ("multi-project", "another project's pipeline")]
 OTHERS = [(name, kind) for name in FOREIGN for kind in KINDS if (name, kind) not in SHORT]
 UNREAD = "include:\n  - template: Workflows/MergeRequest-Pipelines.gitlab-ci.yml\n"
 

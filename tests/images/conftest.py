@@ -1,5 +1,6 @@
 """All images, built once for all tests from the base image that needs no registry."""
 
+import contextlib
 import functools
 import shutil
 import subprocess
@@ -96,9 +97,16 @@ def built(base_image: str) -> dict[str, str]:
     return _all_images(with_programs(base_image))
 
 
-@pytest.fixture
-def volume() -> Iterator[str]:
-    """A volume of the test's own."""
+@contextlib.contextmanager
+def own_volume() -> Iterator[str]:
+    """A volume that nobody else has."""
     name = docker("volume", "create")
     yield name
     docker("volume", "rm", "--force", name)
+
+
+@pytest.fixture
+def volume() -> Iterator[str]:
+    """A volume of the test's own."""
+    with own_volume() as name:
+        yield name

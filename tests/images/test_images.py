@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import yaml
 from dodo_dsl import __version__
 from dodo_dsl.images import build_context
 from dodo_dsl.spec.manifest import Manifest, load_manifests
-from tests.images.conftest import build, docker, with_programs
+from tests.images.conftest import build, docker, own_volume, with_programs
 from tests.images.dockerfile import ROOT, stages
 from tests.images.layers import layers
 from tests.images.service_folders import folders_of
@@ -107,22 +108,40 @@ def holds_its_own_service(told: str, folders: list[str]) -> None:
     assert [s for s in sources if f"{s.parent}/__pycache__/{s.stem}" not in compiled] == []
 
 
-@each_service
-def test_service_starts_from_an_image_that_holds_all_it_needs(
-    built: dict[str, str], volume: str, manifest: Manifest
-) -> None:
-    """It gets healthy with its example, so the libraries are there that it loads late, such as the video decoder."""
+@pytest.fixture(scope="module")
+def tried(built: dict[str, str]) -> Iterator[dict[str, Future[None]]]:
+    """What becomes of each service by name, three at a time, as one alone mostly waits for the engine."""
+    with ThreadPoolExecutor(3) as pool:
+        yield {m.name: pool.submit(starts_with_all_it_needs, built[m.image], m) for m in MANIFESTS.values()}
+
+
+def starts_with_all_it_needs(image: str, manifest: Manifest) -> None:
     inside = ("python3", "-c", INSIDE, f"services.{manifest.folder.name}")
-    holds_its_own_service(run(built[manifest.image], *inside), folders_of(manifest))
+    holds_its_own_service(run(image, *inside), folders_of(manifest))
     about = yaml.safe_load((manifest.folder / "service.yml").read_text())
     if "example" not in about or manifest.devices == ("{serial}",):  # which needs a rig, or the clock of a test
-        out = docker("run", "--rm", "--network", "none", *HARDENED, built[manifest.image], "--help")
+        out = docker("run", "--rm", "--network", "none", *HARDENED, image, "--help")
         assert out.startswith(f"{manifest.name}: {manifest.description}")
         return
     files = ("--volume", f"{ROOT / 'tests_registry'}:/opt/dodo/tests_registry:ro")
     words = (manifest.name, "--cid=131", *about["example"])
-    with started(built[manifest.image], volume, *words, flags=files) as container:
+    with own_volume() as volume, started(image, volume, *words, flags=files) as container:
         assert await_health(container) == "healthy"
+
+
+@each_service
+def test_service_starts_from_an_image_that_holds_all_it_needs(
+    tried: dict[str, Future[None]], manifest: Manifest
+) -> None:
+    """It gets healthy with its example, so the libraries are there that it loads late, such as the video decoder."""
+    tried[manifest.name].result()
+
+
+def test_the_gantry_s_image_has_an_emulated_rig_that_runs(built: dict[str, str]) -> None:
+    if not (ROOT / "build" / "firmware" / "rig-emulator").exists():
+        pytest.skip("the emulated rig is not built: make firmware")
+    look = "cd /opt/dodo/firmware && test -r gantry.elf -a -r gantry-circle.elf && ./rig-emulator --help"
+    assert run(built["gantry"], "sh", "-c", look).startswith("usage: rig-emulator ")
 
 
 @pytest.mark.proof

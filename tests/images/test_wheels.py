@@ -21,6 +21,7 @@ def test_platforms_go_from_the_base_images_glibc_down_to_manylinux2014() -> None
 
 
 @pytest.mark.slow
+@pytest.mark.proof
 def test_every_requirement_has_a_wheel_for_64_bit_arm(tmp_path: Path) -> None:
     folder = build_context.provide_wheels(ARM, tmp_path)
     names = [path.name for path in folder.iterdir()]

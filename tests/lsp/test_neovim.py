@@ -27,6 +27,7 @@ def block(language: str, after: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.skipif(NVIM is None, reason="neovim is not installed (scripts/install-test-tools)")
+@pytest.mark.proof
 def test_a_session_goes_as_the_docs_show(tmp_path: Path) -> None:
     repository = Repository(tmp_path.resolve() / "repository")
     repository.write()

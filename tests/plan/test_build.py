@@ -97,6 +97,16 @@ def test_more_tests_than_cids(tmp_path: Path) -> None:
     assert (problem.rule, Path(problem.span.file).name) == ("out-of-cids", "dodo.yml")
 
 
+def test_a_cid_that_is_built_in_is_that_of_each_test(tmp_path: Path) -> None:
+    example = (
+        "name: example\nmatrix: {light: [1, 2]}\n# dodo.yml\ncids: 128-128\n# docker-compose.yml\n"
+        "services: {driver: {image: driver, x-dodo: {cid: 111}}}\n"
+    )
+    compiled, problems = built(example, tmp_path)
+    assert [each.cid for each in compiled.suite.plans] == [111, 111]
+    assert not has_errors(problems)
+
+
 def test_files_that_leave_the_registry(tmp_path: Path) -> None:
     (tmp_path / "secret").touch()
     (tmp_path / "tests/maps/plain").mkdir(parents=True)

@@ -24,6 +24,7 @@ def test_an_emulated_camera_is_drawn() -> None:
             **{
                 "width": "640",
                 "freq": "10",
+                "name.bgr": "video0.bgr",
                 "exposure": "0.02",
                 "scene.light": "0.5",
                 "file": "x",
@@ -39,6 +40,7 @@ def test_an_emulated_camera_is_drawn() -> None:
     assert {flag.name: flag.value for flag in found.flags} == {
         "width": "640",
         "freq": "10",
+        "name.bgr": "video0.bgr",
         "cid": "140",
         "shutter": "0.02",
         "exposure": "0.5",

@@ -18,7 +18,7 @@ from services.scene.scene import load_scene
 MAPS = package_data.registry() / "maps"
 OPEN = ["left-curve", "rig-straight", "straight"]
 TRACKS = [*OPEN, "kiwi-track"]
-NAMES = sorted([*TRACKS, "rig-oval", "static-rig"])
+NAMES = sorted([*TRACKS, "rig-oval", "static-rig", "two-cars"])
 STARTS = {"rig-straight": (-0.75, 0.0, 0.0), "rig-oval": (-0.2, -0.6, 0.0)}
 """Where a car starts: x, y (m) and heading (rad)."""
 
@@ -186,6 +186,18 @@ def test_the_cone_is_closed_and_of_the_size_of_the_real_one():
     assert len(copies.shape.faces) < 60
     outwards = np.einsum("fi,fi->f", copies.shape.normals, copies.shape.centres - copies.shape.middle)
     assert (outwards > 0).mean() > 0.7
+
+
+def test_two_cars_are_on_the_straight_track():
+    """The car is as long and as wide as the one that is judged, and points along -y."""
+    ours, straight = (json.loads((MAPS / name / "map.json").read_text()) for name in ("two-cars", "straight"))
+    car = ours["model"].pop()
+    assert ours == straight
+    assert (car["name"], car["frames"]) == ("kiwi", [0, 1])
+    shape = load_scene(MAPS / "two-cars").models[-1].shape
+    assert np.ptp(shape.vertices, axis=0) == pytest.approx([0.16, 0.36, 0.11])
+    top = shape.vertices[shape.vertices[:, 2] > 0.1]
+    assert abs(top[:, 1].min()) < abs(top[:, 1].max())
 
 
 def test_no_file_of_a_map_names_a_place_on_a_machine():

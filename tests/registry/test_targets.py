@@ -55,7 +55,7 @@ def parameters(test: str, service: str) -> dict:
 def seen(image) -> dict[str, list]:
     """The cones of an image by colour, on the ground."""
     places = {"yellow": [], "blue": []}
-    for cone in perception.find_cones(image):
+    for cone in perception.find(image):
         places[cone.colour].append(steering.on_the_ground(cone.x, cone.y, cone.width, cone.height))
     return places
 

@@ -13,7 +13,7 @@ from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockste
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot, Times
-from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, VerdictEvent
+from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
 
 T = TypeVar("T")
 Events = Sequence[tuple[float, Event]]
@@ -96,6 +96,7 @@ class ScriptedBackend:
     """What services of the application have used, as ``loads``."""
     listens: Mapping[str, float] | None = None
     """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
+    printed: tuple[Unmatched, ...] = ()
 
     def __post_init__(self) -> None:
         self.cid = self.plan.cid + 1
@@ -136,6 +137,9 @@ class ScriptedBackend:
         if self.close_problem:
             raise self.close_problem
         return ["look inside"] if keep else []
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        return self.printed
 
     def tail(self, service: str) -> list[str]:
         return self.tails.get(service, [])

@@ -9,6 +9,7 @@ import pytest
 
 from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Plan
+from dodo_dsl.run import listeners
 from dodo_dsl.run.engine import (
     BEGIN_PATIENCE_S,
     LAST_TIME_PATIENCE_S,
@@ -38,12 +39,13 @@ from dodo_dsl.run.protocol import (
     Ready,
     Stopped,
     Time,
+    Unmatched,
     Unstartable,
     VerdictEvent,
 )
 from dodo_dsl.run.run_state import MEMORY_KILL, Standing
 from dodo_dsl.run.start_order import LONGEST_S
-from dodo_dsl.spec.model import ResourceLimits
+from dodo_dsl.spec.model import RecordedValue, ResourceLimits
 from tests.run.scripted import BUSY, FAILED, PASSED, READY, Events, ScriptedBackend, drives, load, plan, run
 
 ENDED = Exited("track", 0)
@@ -193,6 +195,33 @@ def test_limits_of_what_the_application_uses_are_judged_before_it_has_passed() -
     assert (found.outcome, told) == ("failed", [])
     assert found.reason == "application service 'app' used 500 MB of memory, at most 200 MB"
     assert [(check["name"], check["ok"]) for check in found.checks] == [("peak-memory-app", False)]
+
+
+def test_a_check_worse_than_the_baseline_fails_a_test_that_evaluators_pass() -> None:
+    """By more than the tolerance, on the side of its limit; those at the edge, and those that are gone, do not."""
+    checks = tuple(
+        {"name": name, "value": value, "limit": limit, "unit": "m", "ok": True}
+        for name, value, limit in (
+            ("mean", 0.21, {"max": 0.5}), ("share", 0.8, {"min": 0.5}), ("mean", 0.1, {"max": 0.5}), ("late", 9, {}),
+        )
+    )  # fmt: skip
+    passed = replace(PASSED, checks=checks)
+    before = [RecordedValue("share", 0.9, 0.1), RecordedValue("mean", 0.2, 0.05), RecordedValue("gone", 1.0, 0.0)]
+    events = [(5.0, passed), (5.0, ENDED)]
+    found = begun(*events, tested=plan(baseline=(*before, RecordedValue("late", 1.0, 0.0))))
+    assert (found.outcome, found.reason) == (
+        "failed", "share is 0.8 m, worse than 0.9 in the baseline (at least 0.81)",
+    )  # fmt: skip
+    compared = [(c["name"], c["limit"], c["ok"]) for c in found.checks[4:]]
+    assert compared == [
+        ("baseline-share", {"min": pytest.approx(0.81)}, False), ("baseline-mean", {"max": pytest.approx(0.21)}, True),
+    ]  # fmt: skip
+    assert [c["margin"] for c in found.checks[4:]] == pytest.approx([-0.01, 0.0])
+    again = (RecordedValue("mean", 0.2, 0.1), RecordedValue("mean", 0.05, 0.1, number=1))
+    assert begun(*events, tested=plan(baseline=again)).reason.startswith("mean is 0.1 m, worse than 0.05 in the")
+    assert begun(*events, tested=plan(baseline=again[:1])).outcome == "passed"
+    hit = begun((5.0, FAILED), (5.0, ENDED), tested=plan(baseline=again))
+    assert hit.reason == FAILED.reason
 
 
 def test_a_crash_has_figures_too() -> None:
@@ -696,3 +725,48 @@ def test_a_lower_limit_of_the_shell_is_noted_at_an_early_end(monkeypatch: pytest
     found = begun((1.0, Exited("app", 1)))
     assert (found.outcome, text in found.notes) == ("failed", True)
     assert text not in begun((1.0, FAILED), (1.0, ENDED)).notes
+
+
+@pytest.mark.parametrize(
+    ("joined", "said", "told"),
+    [
+        (
+            {130, 111},
+            "nothing came; the test is on CID 130",
+            "; the application talks on CID 111; write x-dodo: {cid: 111}",
+        ),
+        ({130}, "nothing came; the test is on CID 130", ""),
+        ({130, 111}, "hit wall left", ""),
+    ],
+)
+def test_the_bus_of_an_application_that_is_silent_on_the_test_s(
+    joined: set[int], said: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(listeners, "buses", lambda processes: joined if list(processes) == [17] else set())
+    assert begun((3.0, VerdictEvent("track", False, said, ())), (3.1, ENDED)).reason == said + told
+
+
+def test_nobody_looks_for_buses_on_the_machine_s_own_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listeners, "buses", lambda _: {111})
+    said = "nothing came; the test is on CID 130"
+    events = {**READY, "begin": [(3.0, VerdictEvent("track", False, said, ())), (3.1, ENDED)]}
+    assert outcome(ScriptedBackend(plan(), events, is_on_host=True)).reason == said
+
+
+@pytest.mark.parametrize(
+    ("event", "never", "reason", "notes"),
+    [
+        (Stopped("unanswered", "no answer to frame 3"), False, "no answer to frame 3; 'app' printed no line", ()),
+        (Stopped("stuck", "service 'camera' is stuck"), True, "service 'camera' is stuck", ()),
+        (FAILED, True, FAILED.reason, ("'app' printed no line",)),
+        (FAILED, False, FAILED.reason, ()),
+        (PASSED, False, PASSED.reason, ()),
+    ],
+)
+def test_what_an_application_printed_in_place_of_an_answer_is_told(
+    event: Event, never: bool, reason: str, notes: tuple[str, ...]
+) -> None:
+    backend = clocked((0.1, Time(0.0, False)), (5.0, event), (5.0, ENDED))
+    backend.printed = (Unmatched("app", "'app' printed no line", never),)
+    found = outcome(backend)
+    assert (found.reason, found.notes) == (reason, notes)

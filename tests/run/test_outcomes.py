@@ -18,6 +18,7 @@ from dodo_dsl.run.outcomes import (
     how_it_ended,
     lost_messages,
     unstartable,
+    windowless,
     worst,
 )
 from dodo_dsl.run.protocol import BackendError, VerdictEvent
@@ -97,6 +98,7 @@ def test_what_losses_mean(service: PlannedService, meaning: str) -> None:
         ("build/lane", "build/lane: Permission denied", ""),
         ("build/lane", "own.env: No such file or directory", ""),
         ("lane", "lane: No such file or directory", ""),
+        ("xvfb-run", "xvfb-run: No such file or directory", "; its 'display' needs Xvfb: apt install xvfb xauth"),
         ("/opt/lane", "/opt/lane: No such file or directory", ""),
     ],
 )
@@ -137,3 +139,17 @@ def test_the_outcome_of_a_test_that_never_began() -> None:
         130,
     )
     assert (found.setup_s, found.execution_s, found.sim_s) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "(template:7): Gtk-WARNING **: 10:00:00.000: cannot open display: ",
+        "qt.qpa.xcb: could not connect to display ",
+        "This application failed to start because no Qt platform plugin could be initialized.",
+        "cv2.error: (-2:Unspecified error) Can't initialize GTK backend in function 'cvInitSystem'",
+    ],
+)
+def test_a_program_that_has_no_display(line: str) -> None:
+    assert windowless(["frame 1", line]).startswith("cannot open display: this program draws a window; ")
+    assert windowless(["frame 1"]) == ""

@@ -4,12 +4,15 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+import shapely
 import yaml
 
 from services.base import Check
 from services.collision.model import DriveMeasures, Requests
 from services.continuous_signal.measures import SignalLimits, SignalMeasures
+from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint
 from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score
+from services.responds.model import ResponseEvaluator, ResponseLimits, at_rate
 
 SERVICES = Path(__file__).parents[2] / "services"
 
@@ -33,13 +36,23 @@ def compare(service: str, checks: Iterable[Check]) -> None:
 def test_collision() -> None:
     measures = DriveMeasures()
     goals = (measures.goal_check(1.0), measures.rest_check(0.0), measures.gate_check(0, 1))
-    drive = (*goals, measures.wall_check(0.0), *measures.drive_checks())
+    drive = (*goals, measures.wall_check(0.0), measures.body_check(0.0), *measures.drive_checks())
     compare("collision", (*drive, *Requests(max_silence=2.0).checks()))
 
 
 def test_continuous_signal() -> None:
-    limits = SignalLimits(band=1.0, lag=1.0, repeats=3, gap=1)
+    limits = SignalLimits(band=1.0, lag=1.0, repeats=3, gap=1, frame_share=0.5, sign_share=0.5)
     compare("continuous_signal", (*SignalMeasures(0, 0, 0, ()).checks(limits), Check("late", 0)))
+
+
+def test_coverage() -> None:
+    grid = CoverageGrid(shapely.box(0, 0, 1, 1), 0.5, Footprint(1, 1))
+    compare("coverage", CoverageEvaluator("a", grid, 0.5, 1).checks())
+
+
+def test_responds() -> None:
+    judge = ResponseEvaluator("a", "b", at_rate(1, 1), ResponseLimits(1, 1, 1, 1, low=0, high=1), 1)
+    compare("responds", judge.checks(1, 1))
 
 
 def test_object_detection() -> None:

@@ -62,7 +62,14 @@ def until(is_so: Callable[[], bool]) -> None:
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("module", CAMERAS)
+@pytest.mark.parametrize(
+    "module",
+    [
+        pytest.param("camera", marks=pytest.mark.proof),
+        "virtual_camera",
+        pytest.param("rec_replay", marks=pytest.mark.proof),
+    ],
+)
 def test_readers_and_the_recorder_survive_a_restart_of_a_camera(module: str, cid: int, tmp_path: Path) -> None:
     name, rec = f"dodo-test-{uuid.uuid4().hex[:8]}", tmp_path / "test.rec"
     width, height = (640, 480) if module == "rec_replay" else (320, 240)

@@ -98,7 +98,7 @@ def test_lines_of_any_system_are_fine(ends: str) -> None:
 CHARACTERS = "\t \n:-{}[]'\",#&*!|>%@`=;\u00a0" + string.ascii_lowercase[:3]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(deadline=None)
 @given(st.integers(0, len(GOOD) - 1), st.integers(0, 3), st.text(CHARACTERS, max_size=3))
 def test_no_change_of_a_few_characters_is_more_than_a_sentence(place: int, gone: int, new: str) -> None:
     """Whatever is typed, there is a file or a place within it, and a message of one line."""

@@ -43,6 +43,13 @@ def test_then_another_service_or_the_rig() -> None:
     assert written(test, one, RATE, RIG) is None
 
 
+def test_a_service_that_shares_may_be_named() -> None:
+    """So that another service's parameter of the same name, with another meaning, is left alone."""
+    one, other = use("one", "{}"), use("other", "{start: 3}")
+    for shared, entry in (("eye", other.parameters["start"]), ("ear", None)):
+        assert written(spec(one, other), one, Parameter("start", "string", "Begin.", shared=shared), None) is entry
+
+
 def test_values_defaults_and_problems() -> None:
     one = use("one", "{freq: 0.5 kHz}")
     given = argument(spec(one), one, RATE, None)

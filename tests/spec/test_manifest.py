@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.spec.manifest import Ports, load_manifest, load_manifests
+from dodo_dsl.spec.manifest import Ports, in_words, load_manifest, load_manifests
 
 OWN = """\
 name: {name}
@@ -45,6 +45,47 @@ def test_manifests_with_problems(tmp_path: Path) -> None:
     assert (manifest, [p.rule for p in problems]) == (None, ["unknown-key"])
     manifest, problems = load_manifest(write(tmp_path, "wrong", OWN.format(name="own").replace("[a.B]", "['a.B/{x}']")))
     assert (manifest, [p.rule for p in problems]) == (None, ["wrong-manifest"])
+
+
+CASES = """
+name: own
+layers: [action]
+image: own
+process: [own]
+description: Moves.
+parameters:
+  kind: {type: string, choices: [a, b], help: Kind.}
+  fast: {type: boolean, default: false, help: Speed.}
+  size: {type: number, help: Size., when: {kind: [b], fast: [true]}}
+messages:
+  in: [a.Always]
+  cases:
+    - {when: {kind: ["", a]}, in: [a.First, a.Second]}
+    - {when: {kind: [b], fast: [true]}, in: ["b.One/{size}"], out: [b.Out]}
+"""
+
+
+def test_messages_and_parameters_depend_on_other_parameters(tmp_path: Path) -> None:
+    manifest, problems = load_manifest(write(tmp_path, "own", CASES))
+    assert manifest is not None and problems == []
+    first, second = Ports(("a.First", "a.Second", "a.Always")), Ports(("b.One/{size}", "a.Always"), ("b.Out",))
+    assert manifest.messages_with({}) == manifest.messages_with({"kind": "a", "fast": "true"}) == first
+    assert manifest.messages_with({"kind": "b", "fast": "true"}) == second
+    assert manifest.messages_with({"kind": "b", "fast": "false"}) == Ports(("a.Always",))
+    assert manifest.all_messages.outputs == ("b.Out",)
+    assert in_words(manifest.parameters["size"].when) == "with kind: b and fast: true"
+
+
+def test_what_depends_on_unknown_parameters(tmp_path: Path) -> None:
+    text = CASES.replace("{kind: [b], fast: [true]}", "{kin: [b]}").replace(
+        "default: false", "default: false, driving: true"
+    )
+    manifest, problems = load_manifest(write(tmp_path, "own", text))
+    assert manifest is None
+    assert sorted(problem.message for problem in problems) == [
+        "'driving' is for lists, but 'fast' is of type boolean",
+        *["'when' names the unknown parameter 'kin'"] * 2,
+    ]
 
 
 def test_own_manifests_beside_the_shipped_ones(tmp_path: Path) -> None:

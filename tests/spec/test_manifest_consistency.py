@@ -23,7 +23,7 @@ PARAMETERS = {
     "{type: list, of: number, unit: m, default: [true]}": "the default of 'a' is not of type list",
     "{type: list, unit: m}": "'unit' is for numbers, but 'a' is of type list",
     "{type: list, per: map}": "'per' names 'map', expected a parameter of type list",
-    "{type: string, among: b.names}": "'among' begins with 'b', expected a parameter of type path",
+    "{type: string, among: b.names}": "'among' names 'b', expected a parameter of type path",
 }
 GOOD = [
     "{type: integer, default: 1, minimum: 0, maximum: 1}",

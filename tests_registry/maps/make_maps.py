@@ -6,7 +6,8 @@ lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it says 
 the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
 the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that backs up to the finish.
 An oval has ``far`` instead, the line half-way round.
-``static-rig`` is no track but a board with eight cones, seen from x = 0, y = 0 along +x.
+``two-cars`` is the straight track with another car, at the frames of sender stamp 1; the car of the test
+has stamp 0. ``static-rig`` is no track but a board with eight cones, seen from x = 0, y = 0 along +x.
 """
 
 import json
@@ -100,6 +101,11 @@ TRACKS = {
     "rig-oval": Track(oval(), x=-0.2, y=-0.6, heading=0.0, lap=True, far=True),
     "rig-straight": Track([Section(1.3)], x=-0.75, heading=0.0),
 }
+CAR = [
+    [(-0.08, -0.18, 0.0), (0.08, -0.18, 0.0), (0.08, 0.18, 0.0), (-0.08, 0.18, 0.0)],
+    [(-0.06, -0.06, 0.11), (0.06, -0.06, 0.11), (0.06, 0.16, 0.11), (-0.06, 0.16, 0.11)],
+]
+"""The lower and the upper corners of a car in m; its front is at -y, as that of all models at frames."""
 BOARD = {
     "yellow": [(0.30, 0.172), (0.36, 0.07), (0.52, 0.13), (0.56, -0.05)],
     "blue": [(0.30, -0.08), (0.42, 0.072), (0.44, -0.18), (0.58, 0.04)],
@@ -139,6 +145,10 @@ def model(name: str, file: str, color: list[float], places: list[Point]) -> dict
     return {"name": name, "file": file, "color": color, "instances": [[x, y, 0.0, 0.0] for x, y in places]}
 
 
+def car(frames: list[int]) -> dict[str, object]:
+    return {"name": "kiwi", "file": "kiwi.obj", "color": [0.75, 0.1, 0.6], "frames": frames}
+
+
 def wall(name: str, places: list[Point]) -> dict[str, object]:
     return {"name": name, "lines": [[*start, *end] for start, end in pairwise(places)]}
 
@@ -175,6 +185,13 @@ def track_map(track: Track) -> dict[str, object]:
         rows = {side: places[:-1] for side, places in rows.items()}
     red = model("cone_red", "finish-cone.obj", [0.9, 0.05, 0.05], across(finish, LANE / 2 + BESIDE))
     return {"model": [*cones(rows[1], rows[-1]), red], "block": [floor()], "obstacles": lines}
+
+
+def two_cars_map() -> dict[str, object]:
+    found = track_map(TRACKS["straight"])
+    models = found["model"]
+    assert isinstance(models, list)
+    return {**found, "model": [*models, car([0, 1])]}
 
 
 def board_map() -> dict[str, object]:
@@ -217,6 +234,14 @@ def cone_obj(scale: float) -> str:
     return "\n".join(["# A traffic cone, in metres", "o cone", *corners, *lines]) + "\n"
 
 
+def car_obj() -> str:
+    """A car that is narrower above than below, with its flat back at +y."""
+    corners = [f"v {x:.3f} {y:.3f} {z:.3f}" for ring in CAR for x, y, z in ring]
+    quads = [[4, 3, 2, 1], [5, 6, 7, 8], *([n, n % 4 + 1, n % 4 + 5, n + 4] for n in range(1, 5))]
+    lines = ["f " + " ".join(map(str, face)) for face in quads]
+    return "\n".join(["# A car of the size of a Kiwi, in metres", "o kiwi", *corners, *lines]) + "\n"
+
+
 def _around(field: Pixels, reach: int) -> Pixels:
     """The sum over a square around each pixel, on a tile that repeats."""
     for axis in (0, 1):
@@ -233,12 +258,15 @@ def floor_picture() -> Pixels:
 
 
 def make(folder: Path) -> None:
-    for name, content in {**{n: track_map(t) for n, t in TRACKS.items()}, "static-rig": board_map()}.items():
+    maps = {name: track_map(track) for name, track in TRACKS.items()}
+    for name, content in {**maps, "two-cars": two_cars_map(), "static-rig": board_map()}.items():
         target = folder / name
         target.mkdir(parents=True, exist_ok=True)
         (target / "map.json").write_text(as_json(content) + "\n")
         (target / "cone.obj").write_text(cone_obj(1.0))
-        if name in TRACKS:
+        if name == "two-cars":
+            (target / "kiwi.obj").write_text(car_obj())
+        if name != "static-rig":
             (target / "finish-cone.obj").write_text(cone_obj(2.0))
         packed = cv2.imencode(".png", floor_picture(), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1]
         (target / "floor.png").write_bytes(packed.tobytes())

@@ -86,8 +86,10 @@ def _picture(file: Path) -> Iterator[InputError]:
             yield InputError(file, problem, hint="save the picture again as PNG or JPEG")
 
 
-def _obstacles(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
+def _obstacles(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     file = map_file.find_map(path)
+    if settings.get("bodies") == "true" and not {*map(str, map_file.read_frames(path))} - {settings["frame-id"]}:
+        yield InputError(file, map_file.NO_BODIES, hint='give the model of another vehicle "frames": [1]')
     try:
         found = list(map_file.unread_keys(Node.load(file)))
     except MapError as error:
@@ -187,6 +189,7 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
     "target": ("field", "message", "sender", "target-field", "target-message", "target-sender"),
     "way-points": ("speed",),
     "recording": ("video", "video-sender"),
+    "obstacles": ("bodies", "frame-id"),
 }
 """The parameters that say how a file of a format is read."""
 HELP: Mapping[str, str] = {

@@ -4,11 +4,12 @@ Models and textures are not loaded yet.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+from dodo_dsl.opendlv.assets import mesh_text
 from dodo_dsl.opendlv.assets.json_file import MAX_NUMBER, MapError, Node, of_keys, read_bytes, unread
 
 MAX_INSTANCES = 100_000
@@ -19,6 +20,7 @@ MAX_FRAMES = 100
 MAX_STAMP = 2**32 - 1
 FRAME_TURN = math.pi / 2
 """A model at a frame is turned by the frame's yaw and this, in rad about z: it looks along its own -y."""
+NO_BODIES = "no model of the map has 'frames' of other sender stamps than the vehicle's"
 MAX_OVERLAYS = 50
 """Places of overlays, each of which takes the memory of a picture."""
 
@@ -44,6 +46,11 @@ class ModelEntry:
     paint: Paint
     instances: tuple[Instance, ...]
     frames: tuple[int, ...] = ()
+
+    def footprint(self) -> list[tuple[float, float]]:
+        """The model's convex outline from above, at a frame at the origin that looks along x; raises MapError."""
+        cos, sin = math.cos(FRAME_TURN), math.sin(FRAME_TURN)
+        return [(cos * x - sin * y, sin * x + cos * y) for x, y in mesh_text.outline(self.file)]
 
 
 @dataclass(frozen=True)
@@ -167,6 +174,16 @@ def read_map(path: Path) -> MapFile:
     """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
     file = find_map(path)
     return _collected(file, Node.load(file), _raised)
+
+
+def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, ModelEntry]]:
+    """Name and model at each frame but the vehicle's ``own``; the frame tells those of one name apart."""
+    found = {stamp: model for model in models for stamp in model.frames if stamp != own}
+    names = [model.name for model in found.values()]
+    return {
+        stamp: (model.name if names.count(model.name) == 1 else f"{model.name}/{stamp}", model)
+        for stamp, model in found.items()
+    }
 
 
 def read_frames(path: Path) -> tuple[int, ...]:
@@ -315,16 +332,52 @@ MAX_LINES = 10_000
 def read_obstacles(path: Path) -> dict[str, list[Line]]:
     """The lines of each obstacle of the map in a folder (its `map.json`) or of the map file itself, in metres.
 
-    Obstacles of one name are one. Raises MapError.
+    Obstacles of one name are one; one without a name is named by its number. Raises MapError.
     """
     file = path if path.suffix == ".json" else path / "map.json"
     root = Node.load(file)
     require_few_lines(root)
     found: dict[str, list[Line]] = {}
-    for entry in root.items("obstacles"):
-        name, lines = _named_lines(entry)
+    for number, entry in enumerate(root.items("obstacles"), 1):
+        name, lines = _named_lines(entry, numbered(number))
         found.setdefault(name, []).extend(lines)
     return found
+
+
+def numbered(number: int) -> str:
+    """What an obstacle without a name is called, the map's first being number 1."""
+    return f"obstacle-{number}"
+
+
+LOWEST, HIGHEST = 0.01, 0.15
+"""m above the ground: a block that is lower is driven over; the Kiwi car is as high."""
+Outline = tuple[tuple[float, float], ...]
+
+
+def read_footprints(path: Path, height: float = HIGHEST) -> dict[str, list[Outline]]:
+    """As ``footprints``, of the map in a folder or of a ``map.json``; raises MapError."""
+    return footprints(_entries(Node.load(find_map(path)), "block", _block, _raised), height)
+
+
+def footprints(blocks: Iterable[BlockEntry], height: float = HIGHEST) -> dict[str, list[Outline]]:
+    """Each block entry's name, and the four corners (m) of its blocks in the way of a vehicle of ``height`` m.
+
+    A name without such a block has an empty list.
+    """
+    found: dict[str, list[Outline]] = {}
+    for block in blocks:
+        reach = block.dimension[2] / 2
+        standing = [i for i in block.instances if i.position[2] + reach > LOWEST and i.position[2] - reach < height]
+        found.setdefault(block.name, []).extend(_outline(block, instance) for instance in standing)
+    return found
+
+
+def _outline(block: BlockEntry, instance: Instance) -> Outline:
+    cos, sin = math.cos(math.pi - instance.angle), math.sin(math.pi - instance.angle)
+    (x, y, _), along, across = instance.position, block.dimension[0] / 2, block.dimension[1] / 2
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    corners = ((f * along, s * across) for f, s in signs)
+    return tuple((x + u * cos - v * sin, y + u * sin + v * cos) for u, v in corners)
 
 
 def require_few_lines(root: Node) -> None:
@@ -335,19 +388,22 @@ def require_few_lines(root: Node) -> None:
         raise MapError(root.file, what, "$.obstacles", hint="write long lines in the place of many short ones")
 
 
-def _named_lines(entry: Node) -> tuple[str, list[Line]]:
+def _named_lines(entry: Node, default: str) -> tuple[str, list[Line]]:
     value = entry.value
-    if not isinstance(value, dict) or not isinstance(value.get("name"), str) or not value["name"].strip():
-        raise MapError(entry.file, "expected an object with a name", entry.place)
-    if value["name"] != value["name"].strip():
-        what = f"the name '{value['name']}' has blanks around it, with which a test does not find it"
-        raise MapError(entry.file, what, f"{entry.place}.name", hint=f'write "{value["name"].strip()}"')
+    if not isinstance(value, dict):
+        raise MapError(entry.file, "expected an object with lines", entry.place)
+    name = value.get("name", default)
+    if not isinstance(name, str) or not name.strip():
+        raise MapError(entry.file, "expected a text that is not empty", f"{entry.place}.name")
+    if name != name.strip():
+        what = f"the name '{name}' has blanks around it, with which a test does not find it"
+        raise MapError(entry.file, what, f"{entry.place}.name", hint=f'write "{name.strip()}"')
     lines, place = value.get("lines"), f"{entry.place}.lines"
     if not isinstance(lines, list) or not lines:
         raise MapError(entry.file, "expected a list of lines [x1, y1, x2, y2]", place)
     if not isinstance(lines[0], list):
-        return value["name"], [_line(Node(entry.file, place, lines))]
-    return value["name"], [_line(Node(entry.file, f"{place}[{index}]", line)) for index, line in enumerate(lines)]
+        return name, [_line(Node(entry.file, place, lines))]
+    return name, [_line(Node(entry.file, f"{place}[{index}]", line)) for index, line in enumerate(lines)]
 
 
 def _line(node: Node) -> Line:

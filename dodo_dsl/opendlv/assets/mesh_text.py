@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from dodo_dsl.opendlv.assets.json_file import MapError
+from dodo_dsl.opendlv.assets.json_file import MapError, read_bytes
 
 MAX_BYTES = 16 << 20
 MAX_TRIANGLES = 50_000
@@ -57,14 +57,52 @@ def problem_of(data: bytes) -> Problem | None:
     return None
 
 
-def _read(data: bytes) -> None:
+def outline(path: Path) -> list[tuple[float, float]]:
+    """The convex outline of an OBJ file's faces from above, counter-clockwise in m; raises MapError."""
+    points = sorted({(x, y) for x, y, *_ in _corners(path)})
+    return [*_lower_half(points), *_lower_half(points[::-1])]
+
+
+def _lower_half(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """From the first point to the last but one (Andrew 1979)."""
+    kept: list[tuple[float, float]] = []
+    for x, y in points:
+        while len(kept) > 1 and _turn(kept[-2], kept[-1], (x, y)) <= 0.0:
+            kept.pop()
+        kept.append((x, y))
+    return kept[:-1]
+
+
+def _turn(a: Vertex, b: Vertex, c: Vertex) -> float:
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _corners(path: Path) -> list[Vertex]:
+    """The places (x, y, z) of the vertices that an OBJ file's faces have, each once; raises MapError."""
+    data = read_bytes(path)
+    check(path, data)
+    try:
+        vertices, faces = _parsed(data.replace(_CONTINUED, b" "))
+        used = {corner for face in faces for corner in face}
+    except _Wrong as wrong:
+        line, what, hint = wrong.args
+        raise MapError(path, what, line=line, hint=hint) from None
+    return [vertices[corner] for corner in sorted(used)]
+
+
+def _parsed(data: bytes) -> tuple[list[Vertex], Iterator[list[int]]]:
+    """The vertices, and the corners of each face."""
     lines = [(number, line.split()) for number, line in enumerate(data.split(b"\n"), 1) if line.strip()]
     vertices = [_vertex(number, words) for number, words in lines if words[0] == b"v"]
-    faces = ((number, _face(number, words, len(vertices))) for number, words in lines if words[0] == b"f")
+    return vertices, (_face(number, words, len(vertices)) for number, words in lines if words[0] == b"f")
+
+
+def _read(data: bytes) -> None:
+    vertices, faces = _parsed(data)
     count, has_area = 0, False
-    for _, corners in faces:
+    for face in faces:
         count += 1
-        has_area = has_area or any(_has_area([vertices[corner] for corner in part]) for part in _fan(corners))
+        has_area = has_area or any(_has_area([vertices[corner] for corner in part]) for part in _fan(face))
     if not count:
         raise _Wrong(0, "the OBJ file has no faces", "save the mesh with its faces, lines that begin with f")
     if not has_area:

@@ -14,13 +14,14 @@ from dodo_dsl.application.access.secret_variables import is_steering
 from dodo_dsl.application.compose_files import text_of
 from dodo_dsl.application.model import KEYS, ApplicationSource, ComposeService, Word, environment, plain, text
 from dodo_dsl.application.variables import with_variables
-from dodo_dsl.plan.model import STARTED, Application, ApplicationService
+from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
 from dodo_dsl.plan.rewrite import confinement, service_copy, service_namespaces, volumes
 from dodo_dsl.plan.rewrite.service_copy import ComposeProject, ServiceCopy, Setting
 from dodo_dsl.source import Node, Scalar
 
 _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
     service_copy.assign_image,
+    service_copy.draw_nowhere,
     confinement.remove_machine_settings,
     confinement.remove_hardware,
     confinement.confine,
@@ -77,7 +78,10 @@ def plan_application(application: ApplicationSource, setting: Setting) -> Applic
 def _project(application: ApplicationSource, setting: Setting, services: Iterable[Any], named: Any) -> ComposeProject:
     """What the copies of the services share; their paths and those of the ``named`` volumes are as the copies have."""
     paths = replace(application.paths, folder=setting.folder)
-    look = Look(paths, containers=application.containers, ports=application.access.ports, limits=setting.limits)
+    access = application.access
+    look = Look(
+        paths, containers=application.containers, ports=access.ports, limits=setting.limits, passed=access.passed
+    )
     copies = volumes.FileCopies(paths, application.known, services, named)
     return ComposeProject(setting, frozenset(application.services), look, application.known, copies)
 
@@ -93,6 +97,9 @@ def _copied(service: ComposeService, node: Node, project: ComposeProject, change
     service_copy.assign_cid(copy, service.cid_variables)
     for step in _STEPS:
         step(copy)
+    if service.declared and service.declared.lines and copy.service.get("tty") is not True:
+        copy.service["tty"] = True
+        copy.note("tty: true, as programs print each line at once to a terminal")
     _note_others(copy, _with_values(plain(service.node)), _with_values(plain(node)))
     return copy.service
 
@@ -115,20 +122,21 @@ def _planned(service: ComposeService, cid: int, application: ApplicationSource) 
     for name in opendlv_flags.CID_VARIABLES:
         if name in variables or name in service.cid_variables:
             variables[name] = str(cid)
-    process = raw.get("x-dodo-process")
+    process, own = raw.get("x-dodo-process"), service.declared
     words = (*(process or ()), *command)
     return ApplicationService(
         name=service.name,
-        process=tuple(str(w) for w in process) if process else None,
+        process=(*(DISPLAY_SERVER if service.has_display else ()), *map(str, process)) if process else None,
         command=opendlv_flags.with_cid(command, cid),
         environment=variables,
         takes_cid=opendlv_flags.takes_cid((*words, *(v for v in variables.values() if v)), variables),
         takes_memory=opendlv_flags.takes_memory(words),
         env_files=tuple(file.path for file in service.env_files),
-        inputs=_names(service.declared.inputs) if service.declared else (),
-        outputs=_names(service.declared.outputs) if service.declared else (),
+        inputs=_names(own.inputs) if own else (),
+        outputs=_names(own.outputs) if own else (),
         after=(after := _after(raw, application)),
         optional=_optional(raw, after),
+        lines=tuple(Line(line.match, line.message, line.sender) for line in own.lines) if own else (),
     )
 
 

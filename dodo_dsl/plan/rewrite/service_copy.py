@@ -12,10 +12,13 @@ from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.access.model import Look
 from dodo_dsl.application.interpolation import interpolated
 from dodo_dsl.application.model import image_variable, text
+from dodo_dsl.plan.model import OFFSCREEN
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 if TYPE_CHECKING:
     from dodo_dsl.plan.rewrite.volumes import FileCopies
+
+_DISPLAY = "DISPLAY"
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,17 @@ def assign_image(copy: ServiceCopy) -> None:
         return
     service["image"] = f"${{{variable}:-{service.get('image') or ''}}}"
     copy.note(f"image from {variable}, where it is set")
+
+
+def draw_nowhere(copy: ServiceCopy) -> None:
+    """Qt draws offscreen where the file names a display, which a test has only if ``dodo.yml`` passes it."""
+    raw = copy.service.get("environment") or {}
+    names = {str(item).partition("=")[0] for item in raw}
+    (variable, value), *_ = OFFSCREEN.items()
+    if _DISPLAY not in names or variable in names or _DISPLAY in copy.project.look.passed:
+        return
+    copy.service["environment"] = [*raw, f"{variable}={value}"] if isinstance(raw, list) else {**raw, variable: value}
+    copy.note(f"environment: {variable}={value}, as a test has no display")
 
 
 def assign_cid(copy: ServiceCopy, in_files: tuple[str, ...]) -> None:

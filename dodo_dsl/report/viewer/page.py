@@ -8,6 +8,8 @@ from typing import Any
 from dodo_dsl import atomic, package_data
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.assets import map_file
+from dodo_dsl.opendlv.assets.json_file import MapError
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.outcome import (
@@ -22,12 +24,13 @@ from dodo_dsl.outcome import (
 from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
 from dodo_dsl.plan.model import Place, Plan, PlannedService
 from dodo_dsl.report import comparison
-from dodo_dsl.report.trajectory import Way, ground_of
+from dodo_dsl.report.trajectory import Ground, Way, colour_of, ground_of
 from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded
 from dodo_dsl.report.viewer.encoded import packed, script, shown
 from dodo_dsl.report.viewer.names import BEFORE, DATA, LOGS, PAGE, SHARED
 from dodo_dsl.report.viewer.record import read
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
+from dodo_dsl.spec.model import BASELINE
 
 _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
 """Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
@@ -91,6 +94,8 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
 def _places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
     if check in _OF_THE_TEST and "response" in plan.source_map:
         yield _OF_THE_TEST[check], plan.source_map["response"]
+    if check.startswith(BASELINE) and "baseline" in plan.source_map:
+        yield "", plan.source_map["baseline"]
     for name, flag in _OF_USE.items():
         if check.startswith(f"{name}-") and "resources" in plan.source_map:
             yield flag, plan.source_map["resources"]
@@ -186,10 +191,21 @@ def scene(plan: Plan, folder: Path, way: Way) -> dict[str, Any]:
             {"name": shown(name, 80), "role": way.roles.get(name, "other"), "lines": lines[:_MOST]}
             for name, lines in ground.lines
         ],
+        "bodies": list(_bodies(ground, way.frame)),
         "length": way.length,
         "width": way.width,
         "frame": {"message": FRAME, "sender": way.frame},
     }
+
+
+def _bodies(ground: Ground, own: int) -> Iterator[dict[str, Any]]:
+    """Other vehicles: each stamp's model from above, in m about its place and along its heading."""
+    for stamp, (name, model) in map_file.bodies(ground.moving, own).items():
+        try:
+            outline = model.footprint()
+        except MapError:
+            continue  # told by the service that draws it
+        yield {"name": shown(name, 80), "sender": stamp, "colour": list(colour_of(model)), "outline": outline[:_MOST]}
 
 
 def _sources() -> Path:

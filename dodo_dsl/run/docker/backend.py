@@ -13,6 +13,8 @@ from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.opendlv.address import Address
+from dodo_dsl.opendlv.relay import Relay
+from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import hearers, that_hear
@@ -22,10 +24,12 @@ from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerProcesses, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch, announce_begin
+from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, copy_into
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
-from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unstartable
+from dodo_dsl.run.printed_lines import PrintedLines
+from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, one_off, optional
 
@@ -77,6 +81,9 @@ class DockerBackend:
         self._containers: dict[str, Any] = {}
         self._processes = ContainerProcesses({})
         self._use = ContainerUse({})
+        self.lines = PrintedLines(plan, folder, lambda text: self._events.put_nowait(Noted(text)))
+        """What the application's containers print."""
+        self._relay: Relay | ContainerRelay | None = None
         self._outputs: dict[str, ServiceOutput] = {}
         self._addresses: dict[str, Address] = {}
         """Where services of the test hear what the bus must not carry."""
@@ -237,10 +244,14 @@ class DockerBackend:
         if layer == "application":
             names = [s.name for s in self.plan.application.services if s.name in self._containers]
             await self._wait_for_copies()
+            if self.lines:
+                await self._connect()
         evaluators = {s.name for s in self.plan.services if s.judge}
         for name in names:
             self._outputs[name] = ServiceOutput(
-                self.report / "logs" / f"{layer}.{name}.log", self._line_reader(layer, name, evaluators)
+                self.report / "logs" / f"{layer}.{name}.log",
+                self._line_reader(layer, name, evaluators),
+                is_cooked=self._prints(name),
             )
         waiting = [name for name in names if self._conditions.of(name)]
         await asyncio.gather(*(self._start(name) for name in names if name not in waiting))
@@ -248,6 +259,23 @@ class DockerBackend:
         reports = {name for name in names if layer != "application" or self._compose.has_healthcheck(name)}
         ready = ({*waiting} | reports) - self._may_be_ill
         return {name: name in ready for name in names}
+
+    async def _connect(self) -> None:
+        """Lets the lines that containers print be sent on the test's bus; raises BackendError."""
+        from docker.errors import DockerException
+
+        try:
+            if self.is_on_host:
+                self._relay = Relay(self.cid)
+            else:
+                self._relay = await asyncio.to_thread(ContainerRelay, self._containers[RECORDER], self.cid)
+        except (DockerException, OSError, ValueError) as error:
+            raise BackendError(f"what the application prints cannot be sent: {engine_error(error)}") from error
+        self.lines.connect(self._relay.send, self._relay.address, self._key)
+
+    def _prints(self, name: str) -> bool:
+        """Whether what a container prints becomes messages."""
+        return name in self.lines.services
 
     async def _start_in_turn(self, name: str) -> None:
         """Starts a service of the application when what it waits for is so, and then waits for its own health."""
@@ -276,6 +304,8 @@ class DockerBackend:
 
     def _line_reader(self, layer: str, name: str, evaluators: set[str]) -> Callable[[bytes], bool]:
         def on_line(line: bytes) -> bool:
+            if layer == "application" and self._prints(name):
+                self.lines.take(name, line)
             event = None if layer == "application" else service_protocol.read_line(name, name in evaluators, line)
             if isinstance(event, Ready) and event.address:
                 self._addresses[name] = event.address
@@ -290,12 +320,15 @@ class DockerBackend:
 
         container, output = self._containers[name], self._outputs[name]
         try:
+            # before its start, as it may end at once; a log comes later than what is attached, and by single bytes
+            stream = await asyncio.to_thread(attached, container) if self._prints(name) else None
             await asyncio.to_thread(container.start)
         except (DockerException, OSError) as error:
             self._not_started(name, engine_error(error))
             return
         self._conditions.started(name)
-        threading.Thread(target=self._follow, args=(container, output.writer), daemon=True).start()
+        follow, source = (self._follow, container) if stream is None else (copy_into, stream)
+        threading.Thread(target=follow, args=(source, output.writer), daemon=True).start()
 
     @staticmethod
     def _follow(container: Any, writer: int) -> None:
@@ -357,6 +390,8 @@ class DockerBackend:
         else:
             await asyncio.to_thread(self._take_down)
         self._watch.close()
+        if self._relay is not None:
+            self._relay.close()
         for output in self._outputs.values():
             output.close()
         return kept
@@ -381,6 +416,9 @@ class DockerBackend:
     def tail(self, service: str) -> list[str]:
         output = self._outputs.get(service)
         return output.tail() if output else []
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        return self.lines.unmatched({name: output.unfinished for name, output in self._outputs.items()})
 
 
 def healthcheck(container: Any) -> dict[str, Any]:

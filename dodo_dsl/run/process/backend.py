@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import functools
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,14 @@ from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.application_files import Found, application_paths, files_of_tests, hidden_paths, in_few
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
-from dodo_dsl.run.protocol import Event, Exited, Lost, Noted, Ready, Unstartable
+from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off
 
@@ -67,6 +68,7 @@ class ProcessBackend:
         self._folder = folder
         self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue() if events is None else events
+        self._lines = PrintedLines(plan, folder, self._note)
         self._outputs: dict[str, ServiceOutput] = {}
         self._addresses: dict[str, Address] = {}
         """Where services of the test hear what the bus must not carry."""
@@ -154,6 +156,8 @@ class ProcessBackend:
             self._events.put_nowait(Noted(f"{text}; 'sandbox: read' in dodo.yml shows what is the application's own"))
 
     async def start(self, layer: str) -> dict[str, bool]:
+        if layer == "application" and self._lines:
+            await self.connect(self._lines)
         if layer == "application" and self._is_confined and not self.is_on_host:
             problem = (await asyncio.to_thread(lambda: self._found)).problem
             if problem:
@@ -174,6 +178,20 @@ class ProcessBackend:
         ready = {*self._turns} - one_off(self.plan.application.services)
         return {name: layer != "application" or name in ready for name in by_name}
 
+    async def connect(self, lines: PrintedLines) -> None:
+        """Lets ``lines`` send on the test's bus; raises BackendError."""
+        address = await self._ask("relay", cid=self.slot.cid)
+        if address is None:
+            raise BackendError("what the application prints cannot be sent: the sandbox has no way to the test's bus")
+        lines.connect(
+            lambda frame: self._sandbox.send({"do": "line", "data": frame.hex()}),
+            (str(address[0]), int(address[1])),
+            self.slot.key,
+        )
+
+    def _note(self, text: str) -> None:
+        self._events.put_nowait(Noted(text))
+
     def _not_started(self, name: str, why: str) -> None:
         self._events.put_nowait(Unstartable(name, why))
         self._conditions.failed(name)
@@ -191,7 +209,10 @@ class ProcessBackend:
     def _start(self, command: Command) -> None:
         def on_line(line: bytes) -> bool:
             event = None
-            if command.layer != "application":
+            if command.layer == "application":
+                if command.name in self._lines.services:
+                    self._lines.take(command.name, line)
+            else:
                 event = service_protocol.read_line(command.name, command.is_evaluator, line)
             if isinstance(event, Ready) and event.address:
                 self._addresses[command.name] = event.address
@@ -200,7 +221,7 @@ class ProcessBackend:
             return event is not None
 
         self._starts.setdefault(command.name, []).append(command)
-        output = ServiceOutput(self.report / "logs" / f"{command.layer}.{command.name}.log", on_line)
+        output = self._output(command, on_line)
         self._outputs[command.name] = output
         self._pids[command.name] = asyncio.get_running_loop().create_future()
         hidden = command.masked if self.isolation == "host" and self.is_apart else ()
@@ -211,6 +232,17 @@ class ProcessBackend:
         except ValueError as error:
             self._events.put_nowait(Unstartable(command.name, str(error)))
         output.release_writer()
+
+    def _output(self, command: Command, on_line: Callable[[bytes], bool]) -> ServiceOutput:
+        """On a terminal where its lines are messages: into a pipe, programs write many lines at once, and late."""
+        log = self.report / "logs" / f"{command.layer}.{command.name}.log"
+        if command.layer == "application" and command.name in self._lines.services:
+            try:
+                return ServiceOutput(log, on_line, terminal=True)
+            except OSError as error:
+                why = f"there is no pseudo terminal ({error.strerror}), and into a pipe programs often print late"
+                self._note(f"'{command.name}' prints into a pipe: {why}")
+        return ServiceOutput(log, on_line)
 
     @property
     def _is_confined(self) -> bool:
@@ -316,3 +348,6 @@ class ProcessBackend:
     def tail(self, service: str) -> list[str]:
         output = self._outputs.get(service)
         return output.tail() if output else []
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        return self._lines.unmatched({name: output.unfinished for name, output in self._outputs.items()})

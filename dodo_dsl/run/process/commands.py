@@ -11,7 +11,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, 
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
-from dodo_dsl.plan.model import ApplicationService, Flag, Plan, PlannedService
+from dodo_dsl.plan.model import DISPLAY_SERVER, OFFSCREEN, ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.process.environment import (
     application_environment,
@@ -104,7 +104,7 @@ class Commands:
         pairs = ((word, interpolate(word, variables)) for word in service.command)
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.slot.cid), self.slot.memory_prefix)
-        environment = {**inherited, **own, SLOT_VARIABLE: self.slot.name}
+        environment = {**_without_windows(argv, {**inherited, **own}), SLOT_VARIABLE: self.slot.name}
         broken = [f"variable {name.partition(_NUL)[0]}" for name, value in own.items() if _NUL in name + value]
         if broken or _NUL in "".join(argv):
             what = (*broken, "the command")[0]
@@ -113,6 +113,12 @@ class Commands:
             )
         hidden = tuple(masked(self.plan, None))
         return Command(service.name, "application", argv, environment, folder, masked=hidden)
+
+
+def _without_windows(argv: Sequence[str], environment: dict[str, str]) -> dict[str, str]:
+    """The environment of a program that has no display: one that draws with Qt draws nowhere instead of ending."""
+    has_display = bool(environment.get("DISPLAY")) or argv[:1] == DISPLAY_SERVER[:1]
+    return environment if has_display else {**OFFSCREEN, **environment}
 
 
 def import_paths(plan: Plan, folder: Path) -> list[Path]:

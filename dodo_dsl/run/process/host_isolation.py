@@ -24,6 +24,7 @@ from dodo_dsl.run.process.leftovers import end_slot, remove_memories
 from dodo_dsl.run.process.sandbox import MAX_MESSAGE
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.spec.deployment import RESERVED_CIDS
 
 PROBE_S = 0.3
 
@@ -120,6 +121,11 @@ async def host_slot(
     With ``keep`` the leases pass on to the sandbox, which holds them until it is taken down. Raises BackendError when
     no slot comes free, or when its CID carries foreign traffic.
     """
+    if plan.cid in RESERVED_CIDS:
+        raise BackendError(
+            f"the application has the CID {plan.cid} built in, which real cars use: on the host's network its tests do "
+            "not run; run them without --isolation host"
+        )
     name = f"dodo-{secrets.token_hex(4)}-"
     about = {"test": plan.slug, "slot": name}
     held: list[leases.Lease] = []

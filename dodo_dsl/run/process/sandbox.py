@@ -9,11 +9,13 @@ killed, the kernel sends SIGTERM to what it started. It has one thread, as that 
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
                         {"do": "close"}; {"do": "probe"}; {"do": "send", "to", "data"}; {"do": "load"};
-                        {"do": "listeners"}; {"do": "use", "names": [service, ...]};
+                        {"do": "relay", "cid"}; {"do": "line", "data"}; {"do": "listeners"};
+                        {"do": "use", "names": [service, ...]};
                         {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
                         {"load": snapshot or null};
+                        {"relay": [host, port] of what sends lines, or null};
                         {"listeners": names of what listens on a bus, or null};
                         {"use": {service: [seconds on processors, bytes of memory]} or null};
                         {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
@@ -37,6 +39,7 @@ from typing import Any
 
 import msgspec
 
+from dodo_dsl.opendlv.relay import Relay
 from dodo_dsl.run.listeners import listening
 from dodo_dsl.run.machine_load import snapshot
 from dodo_dsl.run.machine_load.processes import ThreadTimes
@@ -68,6 +71,7 @@ class Sandbox:
         self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), self.use.note_end, umask)
         self.places: Places | None = None
         self.times = ThreadTimes()
+        self.relay: Relay | None = None
         self.keep = False
         self.ended = False
         self.pumps: dict[int, int] = {}
@@ -166,6 +170,16 @@ class Sandbox:
                 with contextlib.suppress(OSError):
                     sender.sendto(bytes.fromhex(data), (host, port))
 
+    def _do_relay(self, _descriptors: list[int], cid: int) -> None:
+        with contextlib.suppress(OSError):
+            self.relay = Relay(cid)
+        self.send(relay=self.relay and self.relay.address)
+
+    def _do_line(self, _descriptors: list[int], data: str) -> None:
+        with contextlib.suppress(OSError):
+            if self.relay is not None:
+                self.relay.send(bytes.fromhex(data))
+
     def _do_load(self, _descriptors: list[int]) -> None:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
         names, took = {**self.children.names, os.getpid(): ""}, self.children.took_s()
@@ -194,7 +208,10 @@ class Sandbox:
         self.pumps = dict(zip(copies[:half], copies[half:], strict=True))
 
     def _pump(self, output: int) -> None:
-        data = os.read(output, 1 << 16)
+        try:
+            data = os.read(output, 1 << 16)
+        except OSError:  # a terminal that no program has open any more
+            data = b""
         if data:
             os.write(self.pumps[output], data)
         else:

@@ -51,7 +51,6 @@ SHARED = st.fixed_dictionaries(
 
 
 @pytest.mark.slow
-@settings(max_examples=100)
 @given(service=SERVICE, rest=SHARED)
 def test_compiled_files(service: dict[str, Any], rest: dict[str, Any]) -> None:
     paths = HostPaths(Path("/builds/team"), (Path("/builds/team"),))
@@ -61,7 +60,7 @@ def test_compiled_files(service: dict[str, Any], rest: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(service=SERVICE, rest=SHARED)
 def test_written_files(service: dict[str, Any], rest: dict[str, Any], tmp_path: Path) -> None:
     """What the reader takes can be rewritten, too."""

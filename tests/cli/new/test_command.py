@@ -85,35 +85,33 @@ def test_editors_find_the_schema(repository: Path) -> None:
     assert '"title": "DoDo test"' in schema.read_text()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["First"], "'First' is not a valid test name, expected lower-case letters and digits in words joined by"),
-        (["../first"], "'../first' is not a valid test name"),
-        (["a" * 61], "at most 60 characters"),
-        (["variables"], "'variables' is a keyword of GitLab's pipelines"),
-        (["there"], "there is a test 'there' already; names are unique over all registries"),
-        (["half"], "'tests/half/README.md' exists already; nothing was written"),
-        (["new", "--extends", "their"], "there is no test 'their' to extend; did you mean 'there'?"),
-        (["new", "--extends", "there", "--level", "hil"], "--level, --kind and --rec do not apply with --extends"),
-        (["new", "--level", "dil"], "a dil test cannot be closed-loop"),
-        (["new", "--level", "dil"], "; try: dodo new new --level dil --kind open-loop"),
-        (["--deployment", "--level", "hil"], "--level, --kind, --extends and --rec apply to a test"),
-    ],
-    ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
-)
-@pytest.mark.thorough
-def test_what_cannot_be_begun_is_said_and_writes_nothing(repository: Path, words: list[str], said: str) -> None:
+BEGINNINGS: list[tuple[list[str], str]] = [
+    (["First"], "'First' is not a valid test name, expected lower-case letters and digits in words joined by"),
+    (["../first"], "'../first' is not a valid test name"),
+    (["a" * 61], "at most 60 characters"),
+    (["variables"], "'variables' is a keyword of GitLab's pipelines"),
+    (["there"], "there is a test 'there' already; names are unique over all registries"),
+    (["half"], "'tests/half/README.md' exists already; nothing was written"),
+    (["new", "--extends", "their"], "there is no test 'their' to extend; did you mean 'there'?"),
+    (["new", "--extends", "there", "--level", "hil"], "--level, --kind and --rec do not apply with --extends"),
+    (["new", "--level", "dil"], "a dil test cannot be closed-loop"),
+    (["new", "--level", "dil"], "; try: dodo new new --level dil --kind open-loop"),
+    (["--deployment", "--level", "hil"], "--level, --kind, --extends and --rec apply to a test"),
+]
+
+
+def test_what_cannot_be_begun_is_said_and_writes_nothing(repository: Path) -> None:
     assert dodo("new", "there")[0] == 0
     (repository / "tests/half").mkdir()
     (repository / "tests/half/README.md").write_text("mine")
     before = contents(repository)
-    code, out, err = dodo("new", *words)
-    assert (code, out) == (2, "")
-    assert err.startswith("dodo new: ")
-    assert said in err
-    assert err.count("\n") == 1
-    assert contents(repository) == before
+    for words, said in BEGINNINGS:
+        code, out, err = dodo("new", *words)
+        assert (code, out) == (2, ""), words
+        assert err.startswith("dodo new: ")
+        assert said in err
+        assert err.count("\n") == 1
+        assert contents(repository) == before
 
 
 @pytest.mark.parametrize(("level", "kind"), [("sil", "perception"), ("dil", "open-loop"), ("hil", "open-loop")])
@@ -245,9 +243,11 @@ def installed_in(repository: Path, patch: pytest.MonkeyPatch) -> Path:
 
 
 SHIPPED = sorted(path.parent.name for path in package_data.registry().glob("*/*.dodo.yml"))
+FEW = ("dil-kiwi-track", "hil-perception", "sil-closed-left-curve", "sil-perception")
+"""With each kind of file that a test refers to: a recording, a target, a map, classes."""
 
 
-@pytest.mark.parametrize("shipped", SHIPPED)
+@pytest.mark.parametrize("shipped", [s if s in FEW else pytest.param(s, marks=pytest.mark.proof) for s in SHIPPED])
 @pytest.mark.thorough
 def test_a_shipped_test_is_copied_with_what_it_refers_to(repository: Path, shipped: str) -> None:
     (repository / "docker-compose.yml").write_text("services: {anything: {image: example, command: --cid=111}}\n")
@@ -368,6 +368,7 @@ def test_a_language_is_that_of_an_application(empty: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.proof
 def test_the_application_passes_its_test(empty: Path) -> None:
     assert dodo("new", "--application")[0] == 0
     command = [sys.executable, "-m", "dodo_dsl", "run", "sil-first"]
@@ -474,3 +475,24 @@ def test_the_image_of_a_pipeline_reaches_the_compose_file(repository: Path) -> N
     assert dodo("compile")[0] == 0
     application = (repository / "generated/first/application.compose.yml").read_text()
     assert "${DODO_IMAGE_APPLICATION:-registry.example.org/group/application:latest}" in application
+
+
+@pytest.mark.parametrize(
+    ("command", "kind", "made"),
+    [
+        (
+            "--name=img.argb --width=1280 --height=720",
+            "closed-loop",
+            {"name.argb": "img.argb", "width": 1280, "height": 720},
+        ),
+        ("--name.bgr=video0.bgr", "open-loop", {"name.bgr": "video0.bgr", "width": 640, "height": 480}),
+        ("--name=video0.argb --name.i420=/video0.i420", "open-loop", {"width": 640, "height": 480}),
+    ],
+)
+def test_pictures_are_as_the_application_asks_for_them(empty: Path, command: str, kind: str, made: dict) -> None:
+    (empty / "compose.yaml").write_text(f"services: {{app: {{image: example, command: --cid=111 {command}}}}}\n")
+    (empty / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: compose.yaml\n")
+    assert dodo("new", "mine", "--kind", kind)[0] == 0
+    camera = yaml.safe_load((empty / "tests/mine/mine.dodo.yml").read_text())["environment"]["camera"]["with"]
+    assert {key: value for key, value in camera.items() if key not in ("map-path", "freq", "z")} == made
+    assert "warning[application-" not in dodo("compile", "--check")[1]

@@ -67,6 +67,16 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
 
 
 @pytest.mark.thorough
+def test_the_replay_shows_pictures_where_the_application_looks(empty: Path) -> None:
+    compose = empty / "compose.yml"
+    compose.write_text(compose.read_text().replace("--cid=111", "--cid=111 --name=img.argb --name.bgr=img.bgr"))
+    shutil.copy(SHIPPED, empty / "drive.rec")
+    assert dodo("new", "mine", "--level", "dil", "--rec", "drive.rec")[0] == 0
+    assert (spec(empty, "mine")["name.argb"], spec(empty, "mine")["name.bgr"]) == ("img.argb", "img.bgr")
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+
+
+@pytest.mark.thorough
 def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: Path) -> None:
     """Such a test cannot be passed: ``new`` says so, and the check as long as it is so."""
     compose = empty / "compose.yml"
@@ -113,6 +123,41 @@ def test_a_recording_without_pictures_is_played_in_real_time(empty: Path) -> Non
     assert (found["clock"], found["align"], found["sample-times"]) == (None, "begin", "test")
     assert (found["max-mean"], found["max-distance"], found["target-sender"]) == (0.020, 0.10, 4)
     assert dodo("compile", "--check")[0] == 0
+
+
+@pytest.mark.thorough
+def test_pictures_alone_have_to_be_answered(empty: Path) -> None:
+    """By the message that the application sends; the test compiles, and its answers are those to the recording."""
+    pictures = [e for e in read_envelopes(SHIPPED) if e.data_type == 1055][:40]
+    (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, pictures)))
+    code, out, err = dodo("new", "mine", "--level", "dil", "--rec", "drive.rec")
+    assert (code, err) == (0, "")
+    assert f"judged: whether each picture is answered by {STEERING}/0, as there is no recorded signal\n" in out
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+    found = yaml.safe_load((empty / "tests/mine/mine.dodo.yml").read_text())
+    assert (found["clock"], found["evaluation"]["answers"]) == ("lockstep", {"uses": "responds", "with": {
+        "message": STEERING, "field": "groundSteering", "min": "-38 deg", "max": "38 deg", "min-share": "95 %",
+        "max-time": "14 s"}})  # fmt: skip
+
+
+@pytest.mark.thorough
+def test_a_matrix_of_recordings_makes_one_test_over_all(empty: Path) -> None:
+    shutil.copy(SHIPPED, empty / "drive.rec")
+    assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
+    (empty / "tests/recordings/wet").mkdir()
+    shutil.copy(SHIPPED, empty / "tests/recordings/wet/b.2.rec")
+    file = empty / "tests/mine/mine.dodo.yml"
+    text = file.read_text().replace("../recordings/drive.rec", '"${matrix.drive}"')
+    file.write_text(text + "matrix: {drive: [../recordings/drive.rec, ../recordings/wet/b.2.rec]}\n")
+    assert dodo("compile")[0] == 0
+    plans = sorted((empty / "generated").glob("*/test.json"))
+    slugs = ["mine--drive-recordings-drive-rec", "mine--drive-recordings-wet-b-2-rec"]
+    assert [plan.parent.name for plan in plans] == slugs
+    assert [
+        f"recordings/{name}" in plan.read_text() for plan, name in zip(plans, ("drive.rec", "wet/b.2.rec"), strict=True)
+    ] == [True] * 2
+    file.write_text(file.read_text().replace("b.2.rec", "c.rec"))
+    assert "parameter 'rec': there is no file or folder '../recordings/wet/c.rec'" in dodo("compile", "--check")[1]
 
 
 @pytest.mark.parametrize(

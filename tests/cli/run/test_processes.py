@@ -21,6 +21,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         yield Desk(tmp_path, cids)
 
 
+@pytest.mark.proof
 def test_letters_that_the_terminal_lacks_cost_no_verdict(desk: Desk) -> None:
     desk.environment["PYTHONIOENCODING"] = "ascii"
     process = desk.start(desk.bench.plan(judge=READY + PASS.replace("it drove", "it turned 5\\\\u00b0 and")), *HOST)

@@ -1,8 +1,8 @@
 """An application that harms whom it can reach, and drives nobody.
 
-It ends when there is a file /stop/now, at the latest after ten minutes.
+It ends when there is a file /stop/now, or --stop, at the latest after ten minutes.
 
-python3 hostile.py --cid=111 --name=video0.argb --harm=flood|groups|memory|tmp
+python3 hostile.py --cid=111 --name=video0.argb --harm=HARM[,HARM...] of flood, groups, memory and tmp
 """
 
 import contextlib
@@ -85,10 +85,12 @@ def tmp() -> None:
 
 
 print(f"hostile: {FLAGS['harm']}", flush=True)
-harm = {"flood": flood, "groups": groups, "memory": memory, "tmp": tmp}[FLAGS["harm"]]
-thread = Thread(target=harm, daemon=True)
-thread.start()
+harms = {"flood": flood, "groups": groups, "memory": memory, "tmp": tmp}
+threads = [Thread(target=harms[name], daemon=True) for name in FLAGS["harm"].split(",")]
+for thread in threads:
+    thread.start()
 end = time.monotonic() + 600
-while not Path("/stop/now").exists() and thread.is_alive() and time.monotonic() < end:
+stop = Path(FLAGS.get("stop", "/stop/now"))
+while not stop.exists() and all(map(Thread.is_alive, threads)) and time.monotonic() < end:
     time.sleep(0.1)
-sys.exit(0 if thread.is_alive() else 1)
+sys.exit(0 if all(map(Thread.is_alive, threads)) else 1)

@@ -133,3 +133,12 @@ def test_an_unknown_parameter_of_a_car_is_told(tmp_path: Path) -> None:
     (found,) = formats.problems("car", tmp_path / "car.yml", {}, {})
     assert found.position()[0] == 2
     assert "zzq" in found.what
+
+
+def test_bodies_that_a_map_does_not_have_are_told(tmp_path: Path) -> None:
+    (tmp_path / "map.json").write_text(json.dumps({"model": [{"frames": [0]}], "obstacles": []}))
+    given = {"bodies": "true", "frame-id": "0"}
+    (found,) = formats.problems("obstacles", tmp_path, given, {})
+    assert found.what == "no model of the map has 'frames' of other sender stamps than the vehicle's"
+    assert list(formats.problems("obstacles", tmp_path, {**given, "frame-id": "1"}, {})) == []
+    assert list(formats.problems("obstacles", tmp_path, {**given, "bodies": ""}, {})) == []

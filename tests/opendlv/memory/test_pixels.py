@@ -9,10 +9,10 @@ WIDTH, HEIGHT = 64, 48
 SMOOTH = cv2.resize(np.random.default_rng(3).integers(100, 156, (3, 4, 3), np.uint8), (WIDTH, HEIGHT))
 
 
-@pytest.mark.parametrize(("format_", "size"), [("argb", 12288), ("bgr", 9216), ("i420", 4608)])
+@pytest.mark.parametrize(("format_", "size"), [("argb", 12288), ("bgr", 9216), ("rgb", 9216), ("i420", 4608)])
 def test_a_picture_goes_through_memory(format_: str, size: int) -> None:
     assert pixels.size(format_, WIDTH, HEIGHT) == size
-    assert pixels.format_of("video0.argb", size, WIDTH, HEIGHT) == format_
+    assert pixels.format_of(f"video0.{'rgb' if format_ == 'rgb' else 'argb'}", size, WIDTH, HEIGHT) == format_
     memory = bytearray(size + 5)
     pixels.view(memory, format_, WIDTH, HEIGHT)[:] = pixels.from_bgr(SMOOTH, format_)
     back = pixels.to_bgr(pixels.view(memory, format_, WIDTH, HEIGHT), format_)
@@ -25,13 +25,14 @@ def test_the_order_of_the_bytes() -> None:
     red = np.zeros((2, 2, 3), np.uint8)
     red[..., 2] = 255
     assert pixels.from_bgr(red, "argb").tobytes() == b"\x00\x00\xff\xff" * 4
+    assert pixels.from_bgr(red, "rgb").tobytes() == b"\xff\x00\x00" * 4
     assert pixels.from_bgr(red, "i420").tobytes() == bytes([82] * 4 + [90, 240])  # ITU-R BT.601
 
 
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: pixels.size("rgb", 2, 2), "unknown pixel format 'rgb'"),
+        (lambda: pixels.size("yuyv", 2, 2), "unknown pixel format 'yuyv'"),
         (lambda: pixels.size("i420", 3, 2), "even width and height, not 3 x 2"),
         (lambda: pixels.format_of("video0.argb", 100, 64, 48), "100 bytes, not a picture of 64 x 48"),
         (lambda: pixels.view(bytes(11), "bgr", 2, 2), "11 bytes are too few for bgr of 2 x 2 pixels, 12 bytes"),

@@ -47,7 +47,7 @@ SERVICES = st.fixed_dictionaries({"b": SERVICE}, optional={"a": SERVICE})
 
 
 @pytest.mark.slow
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(services=SERVICES, isolation=st.sampled_from(["network", "host"]), hil=st.booleans())
 @example(
     services={"b": {"environment": {"X": "1e3", "Y": "0o17", "Z": "08", "N": "null", "D": "2020-01-01"}}},

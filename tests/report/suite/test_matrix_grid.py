@@ -1,10 +1,19 @@
 """Instances of a matrix lie where their parameters say."""
 
+import io
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from dodo_dsl.report.overview import decisive_value, grids
+from dodo_dsl.cli import run_report
+from dodo_dsl.cli.display import Verbosity
+from dodo_dsl.outcome import Outcome, with_margin
+from dodo_dsl.report.comparison import compare
+from dodo_dsl.report.instances import decisive_value, grids, worst_instances
+from dodo_dsl.report.report_folder import write_summaries
+from dodo_dsl.report.results import GivenReport
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named
 
@@ -77,3 +86,36 @@ def test_what_is_no_matrix_has_no_grid(names: list[str]) -> None:
 )
 def test_the_value_that_decided(checks: list[dict[str, Any]], told: str) -> None:
     assert decisive_value(named("a", checks=tuple(checks))) == told
+
+
+def of_matrix() -> list[Outcome]:
+    """Three recordings, of which the second failed, and others."""
+    made = [
+        named(f"a[rec={rec}]", outcome=outcome, checks=tuple(with_margin(check(value, min=0.5)) for value in values))
+        for rec, outcome, values in (
+            ("../r/x.rec", "passed", (0.6, 0.9)), ("../r/y.rec", "failed", (0.4, 0.9)), ("../r/z.rec", "error", ()),
+        )
+    ]  # fmt: skip
+    return [*made, named("b"), named("b[run=2]"), named("c[x=1]")]
+
+
+def test_the_worst_instance_of_a_matrix_is_named_by_its_margin() -> None:
+    worst = "a: 1 of 3 passed, worst is [rec=../r/y.rec]: x 0.4 m (at least 0.5 m)"
+    assert [one.in_words() for one in worst_instances(of_matrix())] == [worst]
+    passed = [outcome for outcome in of_matrix() if outcome.outcome == "passed"]
+    assert worst_instances(passed) == []
+    best = replace(passed[0], name="a[rec=../r/w.rec]", checks=(with_margin(check(0.9, min=0.5)),))
+    assert [one.choice for one in worst_instances([best, passed[0]])] == ["[rec=../r/x.rec]"]
+
+
+def test_reports_name_the_worst_instance(tmp_path: Path) -> None:
+    """On the page, in the note of a merge request, and at the end of a run, but not of a quiet one."""
+    write_summaries(tmp_path, of_matrix(), compare(of_matrix(), GivenReport(Path("main"), [])))
+    page = (tmp_path / "index.html").read_text()
+    slug = of_matrix()[1].slug
+    assert f'<p>1 of 3 passed; the worst is <a href="#{slug}">' in page and "x 0.4 m</p>" in page
+    worst = "a: 1 of 3 passed, worst is [rec=../r/y.rec]: x 0.4 m (at least 0.5 m)"
+    assert f"**Matrices (1)**\n- `{worst}`\n" in (tmp_path / "changes.md").read_text()
+    for verbosity, number in ((Verbosity.NORMAL, 1), (Verbosity.QUIET, 0)):
+        run_report.write_summary(stream := io.StringIO(), of_matrix(), {}, [], verbosity)
+        assert stream.getvalue().splitlines().count(worst) == number

@@ -30,6 +30,8 @@ DRIVES = {
     "rig refusal": (failures.rig_refused(), 0.0),
 }
 NAMES = list(DRIVES)
+FEW = ("wall hit", "wrong signal", "false detections", "rig refusal")
+"""One of each evaluator, and one without a drive."""
 SCRIPTS = (drives.ROOT / "templates" / "viewer" / "drive.html").read_text().count("<script") - 1
 """But for that of another report's way."""
 
@@ -53,7 +55,9 @@ def page(chromium: Chromium, report: Path, request: pytest.FixtureRequest) -> It
         assert [url for url in opened.requests if not url.startswith((report.as_uri(), "data:,"))] == []
 
 
-@pytest.mark.parametrize("page", NAMES, indirect=True)
+@pytest.mark.parametrize(
+    "page", [n if n in FEW else pytest.param(n, marks=pytest.mark.proof) for n in NAMES], indirect=True
+)
 def test_a_failed_test_opens_where_it_was_decided(page: Page, request: pytest.FixtureRequest) -> None:
     drive, moment = DRIVES[request.node.callspec.params["page"]]
     assert page.value("dodo.cursor.time()") == pytest.approx(moment)

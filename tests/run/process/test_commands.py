@@ -79,6 +79,25 @@ def test_variables_that_the_deployment_passes(tmp_path: Path, monkeypatch: pytes
     assert [made.environment[name] for name in ("LICENSE", "LICENSE_KEY", "UNNAMED", "LEAK")] == ["here"] * 3 + [""]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "argv", "platform"),
+    [
+        ("LEVEL: debug", "LEVEL: debug", ("python", "planner.py"), "offscreen"),
+        ("LEVEL: debug", "QT_QPA_PLATFORM: vnc", ("python", "planner.py"), "vnc"),
+        ("LEVEL: debug", "DISPLAY: ':7'", ("python", "planner.py"), None),
+        ("    x-dodo-process", "    x-dodo: {display: true}\n    x-dodo-process", ("xvfb-run", "-a"), None),
+    ],
+)
+def test_where_a_program_draws(
+    old: str, new: str, argv: tuple[str, ...], platform: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
+    monkeypatch.setitem(globals(), "COMPOSE", COMPOSE.replace(old, new))
+    made = command(tmp_path, monkeypatch)
+    assert (made.argv[:2], made.environment.get("QT_QPA_PLATFORM")) == (argv, platform)
+    assert "planner.py" in made.argv
+
+
 @pytest.mark.parametrize("where", ["environment", "process"])
 def test_a_nul_character_is_named_without_its_value(tmp_path: Path, where: str) -> None:
     changed = {"environment": {"environment": {"LOG": "se\0cret"}}, "process": {"process": ("python", "se\0cret")}}

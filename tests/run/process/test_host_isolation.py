@@ -147,7 +147,7 @@ def test_a_strange_record_removes_nothing_but_itself(slot: object, folder: Path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lives", [True, False])
+@pytest.mark.parametrize("lives", [True, pytest.param(False, marks=pytest.mark.proof)])
 def test_a_fork_server_answers_as_a_sandbox_of_its_own_does(lives: bool) -> None:
     """Also one that has ended, which says nothing about this machine."""
     server = ForkServer(())
@@ -169,7 +169,7 @@ BLAMES = re.compile("install bubblewrap|allow user namespaces|make namespaces")
     [
         ("", "there is no program 'bwrap'", "install bubblewrap"),
         ("echo bwrap: something odd >&2; exit 1", "ended with: bwrap: something odd", ""),
-        ("exit 7", "ended with: exit code 7", ""),
+        pytest.param("exit 7", "ended with: exit code 7", "", marks=pytest.mark.proof),
     ],
 )
 def test_only_what_is_missing_is_blamed(
@@ -197,3 +197,12 @@ def test_where_the_kernel_refuses_namespaces_they_are_to_be_allowed() -> None:
         pytest.skip(done.stderr)
     assert done.stdout.startswith("the kernel refuses namespaces: unshare: "), done
     assert "to make namespaces" in done.stdout
+
+
+def test_a_built_in_cid_of_real_cars_is_refused_on_the_host() -> None:
+    async def take() -> None:
+        async with host_slot(plan(cid=111), (130,), print, alone=True):
+            pass
+
+    with pytest.raises(BackendError, match="the application has the CID 111 built in, which real cars use"):
+        asyncio.run(take())

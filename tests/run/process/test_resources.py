@@ -45,7 +45,7 @@ def judged(outcome: Outcome) -> tuple[str, str]:
     return outcome.outcome, outcome.reason
 
 
-@pytest.mark.parametrize("isolation", ["network", "host"])
+@pytest.mark.parametrize("isolation", ["network", pytest.param("host", marks=pytest.mark.proof)])
 def test_each_manner_has_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, isolation: str) -> None:
     """Bounds are wide, as the machine may be busy: what is measured is compared exactly in tests of each part."""
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))

@@ -71,7 +71,9 @@ def on_the_rig(place: Place) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("killed", ["sandbox", pytest.param("runner", marks=pytest.mark.proof), "both"])
+@pytest.mark.parametrize(
+    "killed", [*(pytest.param(one, marks=pytest.mark.proof) for one in ("sandbox", "runner")), "both"]
+)
 def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place, killed: str) -> None:
     run = drive(place)
     inner = sandbox(run)

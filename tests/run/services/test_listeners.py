@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.opendlv.session import Session
-from dodo_dsl.run.listeners import listening, members
+from dodo_dsl.run.listeners import buses, listening, members
 from tests.run.load.test_thread_times import Proc
 
 ROW = "  72: {local} 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 {inode} 2 0 0"
@@ -63,6 +63,13 @@ def test_the_kernel_s_own_sockets(cid: int) -> None:
     with Session(cid):
         assert (listening(me), members(cid)) == ({"me"}, 1)
     assert (listening(me), members(cid)) == (set(), 0)
+
+
+def test_the_buses_that_programs_have_joined(cid: int) -> None:
+    assert cid not in buses([os.getpid()])
+    with Session(cid):
+        assert cid in buses([os.getpid(), 0])
+    assert buses([0]) == set()
 
 
 def test_a_network_that_cannot_be_seen_has_no_known_members() -> None:

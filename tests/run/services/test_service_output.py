@@ -1,6 +1,7 @@
 """A service's output: complete in its log, its last lines in memory, its lines to a callback."""
 
 import asyncio
+import contextlib
 import os
 import tempfile
 from collections.abc import Sequence
@@ -17,20 +18,25 @@ from dodo_dsl.run.service_output import ServiceOutput
 class Read:
     """What an Output made of the chunks that a service wrote."""
 
-    def __init__(self, folder: Path, chunks: Sequence[bytes], is_hung: bool = False) -> None:
+    def __init__(
+        self, folder: Path, chunks: Sequence[bytes], is_hung: bool = False, terminal: bool = False, cooked: bool = False
+    ) -> None:
         self.lines: list[bytes] = []
+        self.kinds = terminal, cooked
         self.log_path = folder / "logs" / "app.log"
         asyncio.run(self._read(chunks, is_hung))
         self.log = self.log_path.read_bytes()
 
     async def _read(self, chunks: Sequence[bytes], is_hung: bool) -> None:
-        output = ServiceOutput(self.log_path, self._take)
+        output = ServiceOutput(self.log_path, self._take, *self.kinds)
+        os.set_blocking(output.writer, False)
         writer = os.dup(output.writer)
         output.release_writer()
         for chunk in chunks:
             rest = memoryview(chunk)
             while rest:
-                rest = rest[os.write(writer, rest[:4096]) :]
+                with contextlib.suppress(BlockingIOError):  # a terminal holds 4 KiB
+                    rest = rest[os.write(writer, rest[:4096]) :]
                 await asyncio.sleep(0)
         if is_hung:
             output.close()
@@ -49,11 +55,15 @@ def expected_lines(data: bytes) -> list[bytes]:
     return [line for line in data.split(b"\n") if line.strip()]
 
 
-@given(st.lists(st.binary(max_size=40) | st.sampled_from([b"\n", b"a\n", b'{"dodo": "ready"}\n']), max_size=20))
+CHUNKS = st.lists(st.binary(max_size=40) | st.sampled_from([b"\n", b"a\n", b'{"dodo": "ready"}\n']), max_size=20)
+
+
+@given(CHUNKS, st.booleans())
 @pytest.mark.thorough
-def test_lines_do_not_depend_on_how_they_were_written(chunks: list[bytes]) -> None:
+def test_lines_do_not_depend_on_how_they_were_written(chunks: list[bytes], terminal: bool) -> None:
+    """Nor on a terminal, which changes and repeats nothing: no ends of lines, no control characters."""
     with tempfile.TemporaryDirectory() as folder:
-        read = Read(Path(folder), chunks)
+        read = Read(Path(folder), chunks, terminal=terminal)
     data = b"".join(chunks)
     assert (read.log, read.lines) == (data, expected_lines(data))
     log_lines = [line for line in read.lines if not line.startswith(b"{")]
@@ -68,6 +78,11 @@ def test_what_an_evaluator_recorded_is_in_a_file_beside_the_log(tmp_path: Path) 
     assert (tmp_path / "logs" / "app.judged").read_bytes() == 2 * line
     assert Read(tmp_path / "other", [b" " + line]).log == b" " + line
     assert not (tmp_path / "other" / "logs" / "app.judged").exists()
+
+
+def test_the_returns_of_a_terminal_in_a_container_are_taken_off(tmp_path: Path) -> None:
+    read = Read(tmp_path, [b"a\r\nb\r\r", b"\nc\r\n"], cooked=True)
+    assert (read.lines, read.log) == ([b"a", b"b\r", b"c"], b"a\nb\r\nc\n")
 
 
 def test_a_record_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

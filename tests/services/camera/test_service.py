@@ -111,10 +111,12 @@ def test_a_signal_ends_it_while_it_waits_for_the_first_picture(
 
 
 def test_each_update_shares_a_picture_and_reports_on_the_camera(names: list[str], video: Path) -> None:
-    flags = [*names[1:], *SIZE, "--source=file", f"--file={video}", "--freq=20", "--status-id=6"]
+    three = [flag.replace("argb", kind) for flag in names[1:2] for kind in ("bgr", "rgb")]
+    flags = [*names[1:], *three, *SIZE, "--source=file", f"--file={video}", "--freq=20", "--status-id=6"]
     with built("camera", *flags) as camera:
         argb, i420 = attached(names)
-        with argb, i420:
+        bgr, rgb = attached(["", *three])
+        with argb, i420, bgr, rgb:
             outputs, greys = [], []
             for now in range(1_000_000, 1_350_000, 50_000):
                 outputs += camera.update(now)
@@ -122,7 +124,11 @@ def test_each_update_shares_a_picture_and_reports_on_the_camera(names: list[str]
                     assert i420.sample_time() == now
                 with argb.lock():
                     assert argb.sample_time() == now
-                    greys.append(round(float(np.frombuffer(argb.buffer, np.uint8).reshape(48, 64, 4)[..., 0].mean())))
+                    pixels = np.frombuffer(argb.buffer, np.uint8).reshape(48, 64, 4)[..., :3].copy()
+                    greys.append(round(float(pixels[..., 0].mean())))
+                for memory, shown in ((bgr, pixels), (rgb, pixels[..., ::-1])):
+                    with memory.lock():
+                        assert memory.sample_time() == now and bytes(memory.buffer[: shown.size]) == shown.tobytes()
     assert greys == pytest.approx([40, 80, 120, 160, 200, 40, 80], abs=2)
     assert camera.shared == 7 and camera.period == 50_000
     assert [(o.sender_stamp, o.message.code, o.message.description) for o in outputs] == [

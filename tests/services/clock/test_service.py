@@ -5,10 +5,13 @@ from fractions import Fraction
 
 import pytest
 
+from dodo_dsl.opendlv.address import LINES, Address
+from dodo_dsl.opendlv.authentication import with_proof
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock_link import ClockChannel, encode
+from services.base.members import Producers, SenderTable
 from services.clock import model
 from services.clock.answers import Answers
 from services.clock.exchange import Exchange, Patience, Roles, Timing
@@ -90,3 +93,43 @@ def test_what_an_application_that_starts_late_must_not_hear_is_not_sent_again(
 def enveloped(name: str) -> Envelope:
     messages = MessageSet.standard()
     return Envelope(messages.id(name), messages.encode(messages.type(name)()), 0, 0, 0, 0)
+
+
+STEERING = "opendlv.proxy.GroundSteeringRequest"
+
+
+def said(session: Session, address: Address, key: bytes, service: str = LINES) -> Envelope:
+    """The address of who sends what the application prints."""
+    id_ = session.messages.id("dodo.Sender")
+    message = session.messages.type("dodo.Sender")(service=service, host=address[0], port=address[1])
+    return Envelope(id_, with_proof(key, id_, session.messages.encode(message)), 1, 0, 1, 0)
+
+
+def test_an_answer_that_is_printed_comes_from_the_runner_alone(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
+    key, runner, other = b"a key of this test", ("10.0.0.1", 40_000), ("10.0.0.1", 40_001)
+    with Session(cid) as session:
+        ids = session.messages.id(STEERING), session.messages.id("opendlv.sim.Frame")
+        table = {(ids[0], 0): Producers(f"{STEERING}/0", (LINES,)), (ids[1], 0): Producers("F", ("pose",))}
+        taken: list[int] = []
+        channel = ClockChannel(cid, session.messages, key)
+        exchange = Exchange(
+            session, channel, lambda e: taken.append(e.sample_time), SenderTable(session.messages, key, table)
+        )
+        for envelope, source in (
+            (said(session, other, b""), other),
+            (said(session, runner, key), other),
+            (said(session, runner, key, "pose"), runner),
+            (said(session, runner, key), runner),
+            (said(session, other, key), other),
+            (Envelope(ids[0], b"", 1, 0, 5, 0), runner),
+        ):
+            exchange.hear(envelope, source)
+        assert (taken, capsys.readouterr().out) == ([5], "")
+        exchange.hear(Envelope(ids[0], b"", 1, 0, 6, 0), other)
+        exchange.hear(Envelope(ids[1], b"", 1, 0, 7, 0), runner)
+        channel.close()
+    assert taken == [5]
+    assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
+        f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",
+        "the application sent F, which only 'pose' may send",
+    ]

@@ -3,8 +3,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shapely
 
-from services.collision.track import ObstaclesError, load_obstacles, pick
+from services.collision.track import ObstaclesError, load_obstacles, pick, pick_walls
 
 
 def write(folder: Path, document: Any) -> Path:
@@ -40,8 +41,12 @@ def test_a_map_may_have_none(tmp_path: Path) -> None:
     [
         ([], ": $: expected an object, found []"),
         ({"obstacles": {}}, ": $.obstacles: expected a list, found {}"),
-        ({"obstacles": ["left"]}, ": $.obstacles[0]: expected an object with a name"),
-        ({"obstacles": [{"lines": []}]}, ": $.obstacles[0]: expected an object with a name"),
+        ({"obstacles": ["left"]}, ": $.obstacles[0]: expected an object with lines"),
+        (
+            {"obstacles": [{"name": " ", "lines": [0, 0, 1, 1]}]},
+            ": $.obstacles[0].name: expected a text that is not empty",
+        ),
+        ({"obstacles": [{"lines": []}]}, ": $.obstacles[0].lines: expected a list of lines [x1, y1, x2, y2]"),
         (
             {"obstacles": [{"name": "a", "lines": []}]},
             ": $.obstacles[0].lines: expected a list of lines [x1, y1, x2, y2]",
@@ -89,3 +94,43 @@ def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:
     assert str(caught.value) == f"--goal: the map {tmp_path} has no obstacle 'xyz'; it has finish, left, right"
     with pytest.raises(ObstaclesError, match="has no obstacle 'xyz'; it has none"):
         pick({}, ["xyz"], "goal", tmp_path)
+
+
+def test_obstacles_without_a_name_have_a_number(tmp_path: Path) -> None:
+    lines = [[0, 0, 1, 1], [0, 0, 2, 2], [0, 0, 3, 3]]
+    write(tmp_path, {"obstacles": [{"lines": lines[0]}, {"name": "left", "lines": lines[1]}, {"lines": lines[2]}]})
+    obstacles = load_obstacles(tmp_path)
+    assert list(obstacles) == ["obstacle-1", "left", "obstacle-3"]
+    assert list(pick_walls(obstacles, ["obstacle-3"], (), tmp_path, 0.15)) == ["obstacle-3"]
+    assert list(pick_walls(obstacles, ["*"], ["left"], tmp_path, 0.15)) == ["obstacle-1", "obstacle-3"]
+
+
+BLOCKS = [
+    {"name": "floor", "dimension": [10, 10, 0.2], "color": [0, 0, 0], "instances": [[0, 0, -0.1, 0]]},
+    {"name": "ceiling", "dimension": [10, 10, 0.2], "color": [0, 0, 0], "instances": [[0, 0, 1.9, 0]]},
+    {"name": "wall", "dimension": [0.6, 0.02, 0.3], "color": [0, 0, 0], "instances": [[1, 0, 0, 1.5707963267948966]]},
+    {"name": "gantry", "dimension": [0.6, 0.1, 0.1], "color": [0, 0, 0], "instances": [[2, 0, 0.25, 0]]},
+]
+
+
+def test_blocks_at_the_height_of_the_vehicle_are_walls(tmp_path: Path) -> None:
+    write(tmp_path, {"obstacles": [{"name": "left", "lines": [0, 0, 1, 1]}], "block": BLOCKS})
+    obstacles = load_obstacles(tmp_path)
+    walls = pick_walls(obstacles, ["left", "blocks"], (), tmp_path, 0.15)
+    assert list(walls) == ["left", "wall"]
+    assert walls["wall"].bounds == pytest.approx((0.99, -0.3, 1.01, 0.3))
+    assert walls["wall"].distance(shapely.Point(0.5, 0.1)) == pytest.approx(0.49)
+    assert list(pick_walls(obstacles, ["blocks"], (), tmp_path, 0.25)) == ["wall", "gantry"]
+    assert list(pick_walls(obstacles, ["wall"], (), tmp_path, 0.15)) == ["wall"]
+
+
+def test_no_block_at_the_height_of_the_vehicle_is_said(tmp_path: Path) -> None:
+    write(tmp_path, {"block": BLOCKS[:2]})
+    within = "block between 0.01 and 0.15 m above the ground in the map"
+    for name in ("blocks", "floor"):
+        with pytest.raises(ObstaclesError, match=f"^--walls: '{name}' is no {within}"):
+            pick_walls({}, [name], (), tmp_path, 0.15)
+    with pytest.raises(ObstaclesError, match=r"^--walls: '\*' is no obstacle in the map"):
+        pick_walls({}, ["*"], (), tmp_path, 0.15)
+    with pytest.raises(ObstaclesError, match="has no obstacle 'hedge'"):
+        pick_walls({}, ["hedge"], (), tmp_path, 0.15)

@@ -35,13 +35,23 @@ def lane(tmp_path: Path) -> Iterator[Path]:
 
 
 def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool = False, **changes: Any) -> Collision:
-    flags = {"length": 0.36, "width": 0.16, "goal": "finish", "walls": ["left", "right"], "max-time": 40.0}
+    flags = {
+        "length": 0.36,
+        "width": 0.16,
+        "height": 0.15,
+        "goal": "finish",
+        "walls": ["left", "right"],
+        "max-time": 40.0,
+    }
     none: dict[str, Any] = {
         "gates": [],
         "min-margin": 0.0,
         "requests": list(REQUESTS),
         "max-silence": 60.0,
         "max-speed": None,
+        "bodies": None,
+        "min-body-margin": None,
+        "height": None,
     }
     return Collision(
         Context(
@@ -147,11 +157,28 @@ def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
         ({"requests": []}, "--requests is empty: a drive is the application's only if it sends something"),
         ({"requests": ["opendlv.proxy.PedalPositionRequest/x"]}, "Request/x' has no whole number as its sender stamp"),
         ({"goal": "finnish"}, "has no obstacle 'finnish'; did you mean 'finish'?"),
+        ({"min-body-margin": 0.1}, "--min-body-margin needs --bodies"),
+        ({"bodies": True}, "--bodies: no model of the map has 'frames' of other sender stamps than the vehicle's"),
     ],
 )
 def test_flags_that_make_no_track_are_refused(lane: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=f"{re.escape(message.format(lane=lane))}$"):
         service(lane, **changes)
+
+
+def test_frames_of_bodies_are_judged(lane: Path) -> None:
+    (lane / "car.obj").write_text("v 0.1 0.2 0\nv -0.1 0.2 0\nv 0 -0.3 0\nf 1 2 3\n")
+    car = {"name": "car", "file": "car.obj", "color": [1, 0, 0], "frames": [2, 5]}
+    (lane / "map.json").write_text(json.dumps({"model": [car], **LANE}))
+    judge = service(lane, bodies=True)
+    assert {stamp for name, stamp in judge.inputs if name == FRAME} == {2, 5}
+    assert {stamp for name, stamp in service(lane).inputs if name == FRAME} == {2}
+    judge.begin(START)
+    for at, x in ((START, 0.0), (START + 1_000_000, 2.0)):
+        judge.inputs[FRAME, 5](frame(1.0, 0.1), at)
+        judge.inputs[FRAME, 2](frame(x, 0.0), at)
+    assert judge.verdict is not None
+    assert judge.verdict.reason == "hit body car after 1.00 s at x = 2.00 m, y = 0.00 m"
 
 
 def finished(process: subprocess.Popen[str]) -> tuple[int, str, str]:
@@ -230,3 +257,24 @@ def test_no_frame_is_an_error_and_no_verdict(lane: Path) -> None:
 def test_a_wrong_name_is_refused(lane: Path) -> None:
     sentence = f"--goal: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"
     assert refusal("collision", f"--map-path={lane}", "--goal=finnish") == sentence
+
+
+def test_a_block_of_the_map_is_hit(lane: Path) -> None:
+    box = {"name": "crate", "dimension": [0.1, 0.1, 0.3], "color": [1, 0, 0], "instances": [[1.0, 0.1, 0.0, 0.0]]}
+    (lane / "map.json").write_text(json.dumps({**LANE, "block": [box]}))
+    judge = service(lane, walls=["*", "blocks"])
+    judge.begin(START)
+    for step in range(10):
+        judge.inputs[FRAME, 2](frame(step / 10, 0), START + step * 100_000)
+    assert judge.verdict is not None
+    assert judge.verdict.reason == "hit wall crate after 0.80 s at x = 0.80 m, y = 0.00 m"
+    assert judge.verdict.evidence["obstacle"] == "crate"
+
+
+def test_a_wheel_that_is_never_asked_is_named(lane: Path) -> None:
+    model = service(lane, requests=[f"{REQUESTS[1]}/0", f"{REQUESTS[1]}/1"], **{"max-time": 1.0})
+    model.update(START)
+    model.inputs[REQUESTS[1], 0](None, START)
+    hand(model, FRAME, START, 2, qw=1.0)
+    model.update(START + 2_000_000)
+    assert model.verdict is not None and "sent no PedalPositionRequest/1" in model.verdict.reason

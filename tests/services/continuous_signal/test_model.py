@@ -3,6 +3,7 @@ import json
 import math
 import random
 from array import array
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -445,3 +446,49 @@ def test_of_very_many_samples_the_farthest_are_recorded() -> None:
     away[[7, 40_000]] = 1.0
     chosen = model.farthest_of(np.arange(len(away)), away)
     assert len(chosen) <= model.MOST_SAMPLES and {7, 40_000} <= {*chosen} and chosen == sorted(chosen)
+
+
+def shares(verdict: Verdict) -> dict[str, float | None]:
+    return {name: value for name, value in values(verdict).items() if name.endswith("share")}
+
+
+def test_a_band_may_be_a_share_of_the_target_with_a_floor() -> None:
+    """Inside are 1.25 times the target, and 0.05 where that is more: at 0 s and at 1 s, but not at 8 s."""
+    limits = SignalLimits(band=0.25, relative=True, floor=0.05, share=0.5, frame_share=0.75, hold=SECOND)
+    it = judge(limits)
+    hear(it, (0, 0.05), (1, 0.05), (4, 0.5), (8, 1.01))
+    assert shares(decided(it)) == {"share": 0.75, "frame-share": 0.75}
+    assert decided(it).outcome == "passed"
+    it = judge(replace(limits, frame_share=0.8))
+    hear(it, (0, 0.06), (1, 0.05), (4, 0.5), (8, 1.01))
+    assert decided(it).reason.startswith(
+        "the share of frames within 25 % or 0.05 of the target is 0.5 (at least 0.8); worst at"
+    )
+
+
+def test_shares_by_frames_count_samples_and_not_time() -> None:
+    it = judge(SignalLimits(band=0.1, share=0.0, frame_share=0.0, hold=5 * SECOND))
+    hear(it, (0, 0), (0.1, 9), (0.2, 9), (0.3, 9), (5, 0.5))
+    assert shares(decided(it)) == {"share": 0.51, "frame-share": 0.4}
+
+
+def test_a_frame_without_a_sample_is_outside_of_the_band_and_has_no_sign() -> None:
+    frames = np.arange(0, 10 * SECOND, SECOND)
+    limits = SignalLimits(band=0.25, relative=True, floor=0.15, frame_share=0.8, sign_share=0.9)
+    it = SignalEvaluator(SIGNAL, RAMP, limits, 60.0, True, frames)
+    it.begin(BEGIN)
+    hear(it, *((step, step / 10 * (-1 if step == 1 else 1)) for step in range(8)))
+    assert shares(decided(it)) == {"share": 0.875, "frame-share": 0.7, "sign-share": 0.75}
+    assert "is 0.7 (at least 0.8), and 2 had no sample; the share of frames with the sign of the" in decided(it).reason
+
+
+def test_a_target_without_a_sign_is_an_error_of_the_test() -> None:
+    it = judge(SignalLimits(floor=2.0, sign_share=0.5))
+    hear(it, (1, 0.1))
+    with pytest.raises(UnjudgeableError, match=r"^the target is nowhere farther than 2 from 0: it has no sign$"):
+        decided(it)
+
+
+@pytest.mark.parametrize("limits", [SignalLimits(band=9, frame_share=0.0), SignalLimits(sign_share=0.0)])
+def test_no_sample_is_in_no_frame(limits: SignalLimits) -> None:
+    assert decided(judge(limits)).outcome == "failed"

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags
@@ -61,6 +62,22 @@ def test_a_recording_is_met_at_its_sample_times(tmp_path: Path) -> None:
     assert {check.name: check.value for check in judge.verdict.checks}["samples"] == 1
 
 
+def test_frames_are_the_pictures_of_a_recorded_target(tmp_path: Path) -> None:
+    """Four pictures of camera 2 from the first sample on, and one answer to the first of them."""
+    samples = recording(tmp_path, *((second * 1_000_000, 3, 0.4) for second in (101, 106))).read_bytes()
+    pictures = (Envelope(1055, b"", 1, 0, second * 1_000_000, 2) for second in range(101, 106))
+    path = tmp_path / "pictures.rec"
+    path.write_bytes(samples + b"".join(map(encode_frame, pictures)))
+    words = (f"--target={path}", "--sender=3", "--align=sample-time", "--band=25%", "--min-frame-share=0.3", *SPARSE)
+    judge = service(*words, "--video-sender=2", "--min-samples=1")
+    judge.begin(START)
+    judge.inputs[STEERING, 3](steering(0.5), 102_000_000)
+    judge.end_of_input(START + 5_000_000)
+    assert judge.verdict is not None and judge.verdict.outcome == "failed"
+    said = "the share of frames within 25 % of the target is 0.25 (at least 0.3), and 3 had no sample"
+    assert said in judge.verdict.reason
+
+
 def test_a_live_target_has_its_own_message(table: Path) -> None:
     judge = service("--target-sender=9", "--min-samples=1", *SPARSE)
     assert set(judge.inputs) == {(STEERING, 0), (STEERING, 9)}
@@ -77,6 +94,13 @@ def test_a_live_target_has_its_own_message(table: Path) -> None:
     [
         ((), "there is no target: give --target, or --target-sender of one that comes live"),
         (("--target=TABLE", "--min-share=0.9"), "--min-share needs --band, the distance that counts as inside"),
+        (("--target=TABLE", "--min-frame-share=0.9"), "--min-frame-share needs --band, the distance that counts"),
+        (
+            ("--target=TABLE", "--band=0.1", "--band-floor=0.1"),
+            "--band-floor needs a --band that is a share of the target",
+        ),
+        (("--target=TABLE", "--band-floor=5%"), "--band-floor=5% is a share, expected a finite number"),
+        (("--target=TABLE", "--band=-5%"), "--band=-5% is out of range, expected at least 0"),
         (("--target=TABLE", "--from=3", "--until=3"), "--until=3 is not after --from=3"),
         (("--target=TABLE", "--target-field=angle"), "found time, groundSteering"),
         (("--target-sender=9", "--target-field=angle"), "has no field 'angle'; it has groundSteering"),

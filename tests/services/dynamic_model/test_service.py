@@ -6,7 +6,9 @@ import pytest
 
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
-from services.base import Context, Flags, Output
+from dodo_dsl.spec.manifest import load_manifest as load
+from services.base import Context, Output
+from services.base.flags import FlagsError, load_manifest, parse
 from services.dynamic_model.service import DynamicModel
 from tests.services.process import receive, running, send
 
@@ -14,20 +16,13 @@ SECOND = 1_000_000
 STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
 
 
-FLAGS = {
-    "freq": 100.0,
-    "steps": 1,
-    "vehicle": None,
-    "frame-id": 3,
-    "latency": 0.0,
-    "grip": 1.0,
-    "power": 1.0,
-    "steering-offset": 0.0,
-}
+MANIFEST_FILE = Path(__file__).parents[3] / "services" / "dynamic_model" / "service.yml"
+MANIFEST = load_manifest(MANIFEST_FILE.parent)
 
 
 def service(**flags: object) -> DynamicModel:
-    return DynamicModel(Context("dynamic-model", Flags({**FLAGS, **flags}), MessageSet.standard()))
+    words = [f"--{name}={value}" for name, value in {"cid": 128, "frame-id": 3, **flags}.items()]
+    return DynamicModel(Context("dynamic-model", parse(MANIFEST, words), MessageSet.standard()))
 
 
 def test_requests_move_the_body_that_its_output_tells() -> None:
@@ -101,3 +96,100 @@ def test_on_the_bus(cid: int, tmp_path: Path) -> None:
         assert state.vx < 0
         assert envelope.sample_time > first.sample_time
         assert (envelope.sample_time - first.sample_time) % 10_000 == 0
+
+
+STEER, SPEED, ACCELERATE, PEDALS, AXLES = (
+    f"opendlv.proxy.{name}Request"
+    for name in ("GroundSteering", "GroundSpeed", "GroundAcceleration", "PedalPosition", "AxleAngularVelocity")
+)
+
+
+@pytest.mark.parametrize(
+    ("flags", "taken"),
+    [
+        ({}, {(STEER, None), (PEDALS, None)}),
+        ({"drive": "kiwi"}, {(STEER, None), (PEDALS, None)}),
+        ({"drive": "differential"}, {(PEDALS, 0), (PEDALS, 1)}),
+        ({"drive": "differential", "wheel-input": "axle"}, {(AXLES, 0), (AXLES, 1)}),
+        ({"drive": "bicycle"}, {(STEER, None), (SPEED, None)}),
+        ({"drive": "bicycle", "speed-input": "acceleration"}, {(STEER, None), (ACCELERATE, None)}),
+    ],
+)
+def test_each_drive_takes_the_requests_that_its_manifest_names(
+    flags: dict[str, object], taken: set[tuple[str, int | None]]
+) -> None:
+    assert set(service(**flags).inputs) == {*taken, ("opendlv.sim.Command", None)}
+    manifest, _ = load(MANIFEST_FILE)
+    assert manifest is not None
+    named = manifest.messages_with({"wheel-input": "pedal", "speed-input": "speed", **flags}).inputs
+    ports = [text.partition("/") for text in named if not text.endswith("?")]
+    assert {(name, int(stamp) if stamp else None) for name, _, stamp in ports} == taken
+
+
+def senders(outputs: list[Output]) -> list[tuple[str, int]]:
+    """The messages by their short names, with their sender stamps."""
+    return [(output.message.DESCRIPTOR.full_name.rpartition(".")[2], output.sender_stamp) for output in outputs]
+
+
+def test_a_differential_drive_with_its_odometry() -> None:
+    model, messages = service(drive="differential", odometry="true", **{"yaw-rate-id": 7}), MessageSet.standard()
+    for stamp, position in ((0, 0.4), (1, 0.6)):
+        model.inputs[PEDALS, stamp](messages.type(PEDALS)(position=position), 0)
+    for now in range(0, 2_000_001, 10_000):
+        outputs = model.update(now)
+    wheels = [("AxleAngularVelocityReading", 0), ("AxleAngularVelocityReading", 1)]
+    assert senders(outputs) == [("KinematicState", 3), *wheels, ("AngularVelocityReading", 7)]
+    state, left, right, yaw_rate = (output.message for output in outputs)
+    speeds = [28 * (position - 0.05) / 0.95 for position in (0.4, 0.6)]
+    assert [left.axleAngularVelocity, right.axleAngularVelocity] == pytest.approx(speeds)
+    assert state.vx == pytest.approx(0.0325 * sum(speeds) / 2)
+    assert state.yawRate == yaw_rate.angularVelocityZ == pytest.approx(0.0325 * (speeds[1] - speeds[0]) / 0.14)
+
+
+@pytest.mark.parametrize("drive", ["kiwi", "bicycle"])
+def test_the_odometry_of_a_car_that_steers(drive: str) -> None:
+    outputs = service(drive=drive, odometry="true", **{"steering-offset": 2}).update(0)
+    steered = [("GroundSpeedReading", 0), ("GroundSteeringReading", 0), ("AngularVelocityReading", 2)]
+    assert senders(outputs[1:]) == steered
+    assert outputs[2].message.groundSteering == pytest.approx(math.radians(2))
+
+
+def test_a_bicycle_by_speed_and_one_by_acceleration() -> None:
+    messages = MessageSet.standard()
+    for flags, name, field, speed in (
+        ({}, SPEED, "groundSpeed", 5.0),
+        ({"speed-input": "acceleration", "tyres": "dynamic"}, ACCELERATE, "groundAcceleration", 2.0 * 6),
+    ):
+        model = service(drive="bicycle", **flags)
+        model.inputs[name, None](messages.type(name)(**{field: 5.0 if name == SPEED else 2.0}), 0)
+        for now in range(0, 6_000_001, 10_000):
+            (output,) = model.update(now)
+        assert output.message.vx == pytest.approx(speed, rel=1e-3)
+
+
+def test_flags_of_another_drive_are_refused() -> None:
+    with pytest.raises(FlagsError, match=r"^--track is for --drive=differential$"):
+        service(drive="bicycle", track=0.2)
+    with pytest.raises(FlagsError, match=r"^--yaw-rate-id is for --odometry=true$"):
+        service(**{"yaw-rate-id": 4})
+
+
+def test_the_condition_of_other_drives() -> None:
+    def speed(
+        seconds: int, drive: str, requests: dict[tuple[str, int | None], dict[str, float]], **flags: object
+    ) -> float:
+        model, messages = service(drive=drive, **flags), MessageSet.standard()
+        model.update(0)
+        for (name, stamp), fields in requests.items():
+            model.inputs[name, stamp](messages.type(name)(**fields), 0)
+        for now in range(10_000, seconds * SECOND + 1, 10_000):
+            outputs = model.update(now)
+        return float(outputs[0].message.vx)
+
+    both = {(PEDALS, 0): {"position": 1.0}, (PEDALS, 1): {"position": 1.0}}
+    assert speed(3, "differential", both) == pytest.approx(0.91, rel=1e-6)
+    assert speed(3, "differential", both, power=0.5) == pytest.approx(0.455, rel=1e-6)
+    assert speed(1, "differential", both, grip=0.05, friction=1) == pytest.approx(0.05 * 9.81, rel=1e-3)
+    fast: dict[tuple[str, int | None], dict[str, float]] = {(SPEED, None): {"groundSpeed": 30.0}}
+    gained = [speed(2, "bicycle", fast, **flags) for flags in ({}, {"power": 0.5}, {"grip": 0.1}, {"latency": 1})]
+    assert gained == pytest.approx([7.0, 3.5, 0.1 * 9.81 * 2, 3.5], rel=1e-6)

@@ -43,7 +43,7 @@ def test_speeds_change_no_faster_than_the_accelerations() -> None:
     assert shaper.velocity == Velocity()
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None)
 @given(velocities, st.sampled_from([0.01, 0.05, 0.2]))
 def test_no_request_drives_the_rig_out_of_its_workspace(body: Velocity, dt: float) -> None:
     """The rig here follows its commands one step late, as real ones do at best."""

@@ -132,7 +132,13 @@ def psnr(one: bytes, other: bytes) -> float:
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("flags", [("--lossless",), ()], ids=["lossless", "default-quality"])
+@pytest.mark.parametrize(
+    "flags",
+    [
+        pytest.param(("--lossless",), id="lossless"),
+        pytest.param((), id="default-quality", marks=pytest.mark.proof),  # see test_pictures of rec_recorder
+    ],
+)
 def test_a_drive_recorded_and_replayed(cid: int, tmp_path: Path, flags: tuple[str, ...]) -> None:
     path = tmp_path / "drive.rec"
     drive = recorded(cid, tmp_path, path, *flags)

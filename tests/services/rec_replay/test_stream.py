@@ -1,10 +1,14 @@
+import os
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.pixels import FORMATS, size
 from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.shared_memory import SharedMemory
 from dodo_dsl.opendlv.video import VideoError
 from services.rec_replay.selection import Selection, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame, pixels
@@ -70,12 +74,29 @@ def test_a_recording_without_a_decodable_picture(tmp_path: Path) -> None:
     assert str(caught.value) == f"none of the 1 pictures in {path} can be decoded"
 
 
+def test_memories_are_in_their_formats(path: Path) -> None:
+    with ExitStack() as held, Recording(path) as recording:
+        one = pixels(first_frame(recording, np.arange(10)))
+        wide, high = one.argb.shape[1], one.argb.shape[0]
+        sizes = {kind: size(kind, wide, high) for kind in FORMATS}
+        kept = {kind: SharedMemory.create(f"stream-{os.getpid()}.{kind}", sizes[kind]) for kind in FORMATS}
+        PictureMemories([(held.enter_context(memory), kind) for kind, memory in kept.items()]).show(one, 5)
+        found = {kind: bytes(memory.buffer[: sizes[kind]]) for kind, memory in kept.items()}
+        for memory in kept.values():
+            with memory.lock():
+                assert memory.sample_time() == 5
+    assert one.argb.std() > 10 and one.i420 is not None
+    assert (found["argb"], found["i420"]) == (one.argb.tobytes(), one.i420.tobytes())
+    assert found["bgr"] == one.argb[..., :3].tobytes()
+    assert found["rgb"] == one.argb[..., 2::-1].tobytes()
+
+
 def test_a_picture_of_another_size_is_left_out(path: Path) -> None:
     class Memory:
         size = 4
 
     with Recording(path) as recording:
         one = pixels(first_frame(recording, np.arange(10)))
-    memories = PictureMemories(Memory(), None)  # type: ignore[arg-type]
+    memories = PictureMemories([(Memory(), "argb")])  # type: ignore[list-item]
     memories.show(one, 5)
     assert (memories.shown, memories.misfits) == (0, 1)

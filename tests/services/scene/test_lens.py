@@ -17,7 +17,7 @@ from services.virtual_camera.optics import Optics
 CAMERA = Pinhole(160, 120, 1.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(deadline=None)
 @given(st.floats(-0.2, 0.4), st.floats(-0.1, 0.2), st.floats(-0.02, 0.02), st.floats(-0.02, 0.02))
 @pytest.mark.thorough
 def test_the_polynomial_is_opencvs_and_is_inverted(k1, k2, p1, p2):

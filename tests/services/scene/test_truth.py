@@ -33,7 +33,7 @@ def straight():
     return Renderer(load_scene(STRAIGHT), 640, 480, FOVY)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(-0.2, 0.2), st.floats(-0.3, 3), st.floats(0.05, 0.3), st.floats(-0.2, 0.2), st.floats(1.0, 2.2))
 @pytest.mark.thorough
 def test_a_box_holds_the_projection_of_all_corners(straight, x, y, z, pitch, yaw):
@@ -52,7 +52,7 @@ def test_a_box_holds_the_projection_of_all_corners(straight, x, y, z, pitch, yaw
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(-0.2, 0.2), st.floats(-0.3, 3), st.floats(0.05, 0.3), st.floats(1.0, 2.2))
 def test_a_model_that_is_seen_has_a_box_around_its_pixels(straight, x, y, z, yaw):
     pose = CameraPose.at(x, y, z, pitch=0.1, yaw=yaw)

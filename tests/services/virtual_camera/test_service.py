@@ -63,7 +63,7 @@ PICTURED = {
     "distortion.p2": ([], "0.02"),
     "seed": (["--noise=0.02"], "3"),
 }
-OTHERS = {"map-path", "width", "height", "freq", "frame-id", "name.argb", "name.i420", "name.bgr"}
+OTHERS = {"map-path", "width", "height", "freq", "frame-id", "name.argb", "name.i420", "name.bgr", "name.rgb"}
 TRUTH = {"truth-sender", "truth-classes", "truth-min-visible", "truth-min-height"}
 
 
@@ -73,6 +73,7 @@ class Shot(NamedTuple):
     argb: Any
     i420: Any
     bgr: Any
+    rgb: Any
     sample_time: int
     outputs: list[Output]
 
@@ -82,7 +83,7 @@ class Camera:
 
     def __init__(self, *flags: str, size: tuple[int, int] = (160, 120), map_path: Path = STRAIGHT) -> None:
         written = {word.partition("=")[0]: word for word in (*PLACE, *flags)}
-        names = {kind: f"dodo-test-{os.getpid()}-{next(NUMBERS)}.{kind}" for kind in ("argb", "i420", "bgr")}
+        names = {kind: f"dodo-test-{os.getpid()}-{next(NUMBERS)}.{kind}" for kind in ("argb", "i420", "bgr", "rgb")}
         own = [f"--cid=111 --map-path={map_path} --width={size[0]} --height={size[1]}".split()]
         own.append([f"--name.{kind}={name}" for kind, name in names.items()])
         self.resources = ExitStack()
@@ -99,7 +100,7 @@ class Camera:
         outputs = list(self.service.update(now))
         (wide, high), shot = self._size, []
         for memory, shape in zip(
-            self._memories, [(high, wide, 4), (high * 3 // 2, wide), (high, wide, 3)], strict=True
+            self._memories, [(high, wide, 4), (high * 3 // 2, wide), (high, wide, 3), (high, wide, 3)], strict=True
         ):
             with memory.lock():
                 raw = bytes(memory.buffer[: math.prod(shape)])
@@ -144,6 +145,7 @@ def test_all_memories_hold_the_same_picture_and_time(camera):
     shot = camera(size=(64, 50)).shoot((0.0, 0.2, 0.0), now=START + 7)
     assert shot.argb.std() > 10
     assert np.array_equal(shot.bgr, shot.argb[..., :3])
+    assert np.array_equal(shot.rgb, shot.argb[..., 2::-1])
     assert np.array_equal(shot.i420, cv2.cvtColor(shot.argb, cv2.COLOR_BGRA2YUV_I420))
     assert shot.sample_time == START + 7
 

@@ -15,7 +15,7 @@ from dodo_dsl.diagnostics import format_text, has_errors
 from tests.check import examples
 
 GOOD = yaml.safe_load(examples.SPEC)
-quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture

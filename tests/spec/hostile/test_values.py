@@ -39,7 +39,7 @@ TEXTS = [
     "::error::no %0A",
     "\U0001f697, \u00e9, \u05d0",
 ]
-quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ UNKNOWN = "zzq"
 NAMES = {
     "dodo": {"$.application.env", "$.goals", "$.matrix", "$.vary", "$.environment", "$.action", "$.evaluation",
              "$.environment.a.with", "$.action.a.with", "$.evaluation.a.with"},
-    "deployment": {"$.rigs"},
+    "deployment": {"$.rigs", "$.application.services", "$.application.services.a.tune"},
     "machine": {"$.rigs"},
-    "service": {"$.parameters", "$.checks"},
+    "service": {"$.parameters", "$.checks", "$.parameters.a.when", "$.messages.cases[0].when"},
 }  # fmt: skip
 """Mappings whose keys are names; a rule checks those under ``with``."""
 Step = str | int

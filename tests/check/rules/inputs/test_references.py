@@ -22,6 +22,16 @@ def test_each_entry_of_a_list(tmp_path: Path) -> None:
     assert [message.split("'")[1] for _, message in found(check_references, example, tmp_path)] == ["a", "b"]
 
 
+def test_walls_may_be_blocks_all_of_them_and_obstacles_without_a_name(tmp_path: Path) -> None:
+    own = json.dumps({"obstacles": [{"lines": [0, 0, 1, 1]}], "block": [{"name": "hedge"}]})
+    walls = "['*', blocks, hedge, obstacle-1, obstacle-2]"
+    example = (
+        f"evaluation: {{track: {{uses: collision, with: {{walls: {walls}}}}}}}\n# tests/maps/plain/map.json\n{own}\n"
+    )
+    message = "'obstacle-2' is not among the obstacles and blocks of plain/map.json"
+    assert found(check_references, example, tmp_path) == [("unknown-name", message)]
+
+
 @pytest.mark.parametrize("content", ["{", "[]", '{"obstacles": 3}'])
 def test_a_file_that_has_no_entries_is_told_with_the_file(content: str, tmp_path: Path) -> None:
     assert found(check_references, f"{GOAL}# tests/maps/plain/map.json\n{content}\n", tmp_path) == []

@@ -100,7 +100,7 @@ def drive(folder: Path) -> str:
 
 @as_root
 @pytest.mark.slow
-@pytest.mark.parametrize("hides", [(), ("--tmpfs", "/sys/fs/cgroup")])
+@pytest.mark.parametrize("hides", [pytest.param((), marks=pytest.mark.proof), ("--tmpfs", "/sys/fs/cgroup")])
 def test_other_work_of_the_same_id_does_not_count(tmp_path: Path, hides: tuple[str, ...]) -> None:
     """Also where the kernel counts by user, as there are no control groups."""
     program = f"from tests.run.process.confined.test_users import *\nprint(drive(Path({str(tmp_path)!r})))"

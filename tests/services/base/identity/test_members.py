@@ -1,5 +1,6 @@
 """Services of a test know each other's addresses; the application cannot become one of them."""
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
@@ -135,3 +136,26 @@ def test_what_does_not_count_is_recorded_as_never_received(enter: Join, capsys: 
         assert envelope is not None
         loop.handle(envelope)
     assert (service.taken, service.seen) == ([1], [(1, True), (2, False)])
+
+
+STEERING = "opendlv.proxy.GroundSteeringRequest"
+
+
+def test_what_the_application_prints_comes_from_the_runner_alone(
+    enter: Join, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It says its address as services do; under that it sends nothing else of theirs."""
+    monkeypatch.setenv(VARIABLE, f"{STEERING}/0=dodo-lines opendlv.sim.Frame/0=pose")
+    enter("pose")
+    session, members = enter("track")
+    admitted(session, members)
+    runner, application = enter("dodo-lines")[0], enter("dodo-lines", b"")[0]
+    for sender in (runner, application):
+        send(sender, STEERING)
+    assert admitted(session, members) == [True, False]
+    send(runner, FRAME)
+    assert admitted(session, members) == [False]
+    assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
+        f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",
+        "the application sent opendlv.sim.Frame/0, which only 'pose' may send",
+    ]

@@ -35,7 +35,7 @@ def hit(face: Face, eye: np.ndarray, ray: np.ndarray) -> float | None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 10**6))
 def test_what_a_ray_meets_first_is_drawn_last(scene, rays):
     tree, random = Tree(boxes(scene)), np.random.default_rng(rays)
@@ -48,7 +48,7 @@ def test_what_a_ray_meets_first_is_drawn_last(scene, rays):
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 10**6))
 def test_a_place_is_drawn_after_what_lies_behind_it_and_before_what_hides_it(scene, places):
     tree, random = Tree(boxes(scene)), np.random.default_rng(places)

@@ -221,7 +221,7 @@ def crowded(tmp_path_factory):
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.tuples(coordinate, coordinate, coordinate), st.tuples(angle, angle, angle))
 def test_any_pose_gives_a_whole_picture(crowded, place, angles):
     image = crowded.render(CameraPose.at(*place, *angles))

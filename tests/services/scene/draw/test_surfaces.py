@@ -6,11 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets.json_file import MapError
-from services.scene.camera import CameraPose, Pinhole
-from services.scene.surfaces import Face, TextureMap, draw_backdrop, draw_face
+from services.scene.camera import CameraPose, Pinhole, View
+from services.scene.surfaces import Face, TextureMap, draw_backdrop, patches
 from services.scene.textures import Texture, default_ground, load_picture
 
 SKY, GROUND = (255.0, 0.0, 0.0, 255.0), (0.0, 255.0, 0.0, 255.0)
+
+
+def draw_face(image: np.ndarray, view: View, face: Face) -> None:
+    for patch in patches(view, face):
+        patch.draw(image)
 
 
 def waves(size: int) -> np.ndarray:

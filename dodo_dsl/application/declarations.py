@@ -1,0 +1,123 @@
+"""What ``dodo.yml`` says of an application, as if its compose files said it: ``without``, and the keys of ``x-dodo``.
+
+Problems stand at their place in ``dodo.yml``.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from dodo_dsl import source
+from dodo_dsl.application.host_access import references
+from dodo_dsl.application.model import KEYS, ApplicationSource, plain
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix, shown_path
+from dodo_dsl.source import Entry, Mapping, Node
+from dodo_dsl.spec.deployment import Declarations
+
+PROCESS = "process"
+"""The key in ``dodo.yml`` for ``x-dodo-process``."""
+_DECLARED, _OF_PROCESS = KEYS
+_RULE = "application-file"
+_SERVICES = "services"
+
+
+def holding(declarations: Declarations, files: list[Path]) -> Declarations:
+    """The declarations where these are the files that they are about, else none."""
+    about = [file.resolve() for file in declarations.files]
+    return declarations if about == [file.resolve() for file in files] else Declarations()
+
+
+def left_out(document: Mapping, declarations: Declarations) -> dict[str, str]:
+    """Why services do not start, by name: those of ``without`` that the merged compose files have."""
+    services = _services(document)
+    return {word.text: "dodo.yml leaves it out" for word in declarations.without if word.text in services}
+
+
+def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
+    """The merged compose files without what is left out, and with what ``dodo.yml`` says of the other services."""
+    gone = left_out(document, declarations)
+    if declarations.own:
+        about = next(iter(declarations.own.values()))
+        document = _with(document, _DECLARED, {**_entries(document.get(_DECLARED)), **declarations.own}, about.key)
+    if not gone and not declarations.services:
+        return document
+    kept = {
+        name: Entry(entry.key, _declared(entry.value, declarations.services[name]))
+        if name in declarations.services
+        else entry
+        for name, entry in _services(document).items()
+        if name not in gone
+    }
+    return _with(document, _SERVICES, kept, document.span)
+
+
+def _with(node: Mapping, key: str, entries: dict[str, Entry], span: Span) -> Mapping:
+    """The node with a mapping, which is at ``span`` where the node has none."""
+    old = node.entries.get(key)
+    place = old.key if old else span
+    value = Mapping(old.value.span if old else span, entries, old.value.tag if old else "")
+    return Mapping(node.span, {**node.entries, key: Entry(place, value)}, node.tag)
+
+
+def _entries(node: Node | None) -> dict[str, Entry]:
+    return dict(node.entries) if isinstance(node, Mapping) else {}
+
+
+def _services(document: Mapping) -> dict[str, Entry]:
+    return _entries(document.get(_SERVICES))
+
+
+def _declared(service: Node, about: Entry) -> Node:
+    """A service of a compose file with the keys of ``dodo.yml`` in place of its own ones."""
+    if not isinstance(service, Mapping) or not isinstance(about.value, Mapping):
+        return service
+    keys = {key: entry for key, entry in about.value.entries.items() if key != PROCESS}
+    if keys:
+        service = _with(service, _DECLARED, {**_entries(service.get(_DECLARED)), **keys}, about.key)
+    if PROCESS not in about.value.entries:
+        return service
+    return Mapping(service.span, {**service.entries, _OF_PROCESS: about.value.entries[PROCESS]}, service.tag)
+
+
+def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnostic]:
+    """Unknown services, those that are left out and declared, and what both files say; ``document`` is as written."""
+    services = _services(document)
+    named = [(word.text, word.span) for word in declarations.without]
+    named += [(name, entry.key) for name, entry in declarations.services.items()]
+    taken = [name for name, _ in named]
+    for name, span in named:
+        if name not in services:
+            message = f"the application has no service '{name}'"
+            fix = only_fix(name, services, taken)
+            yield Diagnostic(span, _RULE, message, did_you_mean(name, services), fix=fix)
+    gone = left_out(document, declarations)
+    for name, entry in declarations.services.items():
+        if name in gone:
+            yield Diagnostic(entry.key, _RULE, f"'{name}' is declared, but {gone[name]}", "remove one of them")
+        elif name in services:
+            yield from _said_twice(name, services[name].value, entry.value)
+
+
+def _said_twice(name: str, service: Node, about: Node) -> Iterator[Diagnostic]:
+    """Warnings of keys that the compose file has with another value."""
+    if not isinstance(service, Mapping) or not isinstance(about, Mapping):
+        return
+    mine = _entries(service.get(_DECLARED))
+    if _OF_PROCESS in service.entries:
+        mine[PROCESS] = service.entries[_OF_PROCESS]
+    for key, entry in about.entries.items():
+        if key in mine and source.plain(mine[key].value) != source.plain(entry.value):
+            message = f"'{key}' of '{name}' is also in {_place(mine[key].key)}, and this one counts"
+            yield Diagnostic(entry.key, _RULE, message, "remove one of them", "warning")
+
+
+def depending(application: ApplicationSource, gone: dict[str, str]) -> Iterator[Diagnostic]:
+    """Warnings of services that need one that is left out; missing volumes of one are an error elsewhere."""
+    for name, service in application.services.items() if gone else ():
+        for key, other in references(plain(service.node), dict(application.containers)):
+            if other in gone and key != "volumes_from":
+                message = f"'{name}' starts without '{other}', which its '{key}' names: {gone[other]}"
+                yield Diagnostic(service.node.entries[key].key, _RULE, message, severity="warning")
+
+
+def _place(span: Span) -> str:
+    return f"{shown_path(span.file)}:{span.line}"

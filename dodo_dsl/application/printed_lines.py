@@ -1,0 +1,123 @@
+"""What a service prints and becomes messages: ``x-dodo: {lines: [{match: ..., message: ..., sender: 0}]}``.
+
+Patterns are RE2's, so that the time that a line takes grows only with its length. The library is loaded where
+patterns are.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
+from dodo_dsl.opendlv.odvd import SCALARS, Definition
+from dodo_dsl.source import Mapping as Node
+from dodo_dsl.source import Node as AnyNode
+from dodo_dsl.source import Scalar, Sequence
+
+LINES_RULE = "application-lines"
+SAMPLE_TIME = "sample_time"
+"""The group that is a message's sample time in microseconds, and no field."""
+_SYNTAX = "patterns are those of RE2, https://github.com/google/re2/wiki/Syntax"
+_MAX_MEMORY = 8 << 20
+_PLAIN_GROUP = re.compile(r"(?<!\\)(?:\\\\)*\((?!\?)")
+
+
+@dataclass(frozen=True)
+class PrintedLine:
+    """A pattern, and the message under a sender stamp that a line becomes in which it is found, with their places."""
+
+    match: str
+    match_span: Span
+    message: str
+    message_span: Span
+    sender: int = 0
+
+    @property
+    def port(self) -> str:
+        """The message as other keys of ``x-dodo`` name it."""
+        return f"{self.message}/{self.sender}" if self.sender else self.message
+
+
+class PatternError(ValueError):
+    """A pattern that RE2 cannot use; the text says why."""
+
+
+def compiled(pattern: str) -> Any:
+    """The pattern for lines of bytes; raises PatternError."""
+    import re2
+
+    options = re2.Options()
+    options.log_errors, options.max_mem = False, _MAX_MEMORY
+    try:
+        return re2.compile(pattern.encode(), options)
+    except re2.error as error:
+        text = error.args[0] if error.args else ""
+        raise PatternError(text.decode(errors="replace") if isinstance(text, bytes) else str(text)) from None
+    except UnicodeEncodeError:
+        raise PatternError("it is no text in UTF-8") from None
+
+
+def printed_lines(node: AnyNode | None) -> tuple[PrintedLine, ...]:
+    """The ``lines`` of a service, as far as they fit the schema; ``$$`` is a dollar sign, as everywhere in compose."""
+    items = node.items if isinstance(node, Sequence) else ()
+    found = (_printed_line(item) for item in items)
+    return tuple(line for line in found if line is not None)
+
+
+def _printed_line(node: AnyNode) -> PrintedLine | None:
+    if not isinstance(node, Node):
+        return None
+    match, message, sender = (node.get(key) for key in ("match", "message", "sender"))
+    if not (isinstance(match, Scalar) and isinstance(message, Scalar)):
+        return None
+    stamp = sender.value if isinstance(sender, Scalar) and isinstance(sender.value, int) else 0
+    return PrintedLine(match.text.replace("$$", "$"), match.span, message.text, message.span, stamp)
+
+
+def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterator[Diagnostic]:
+    """What is wrong with a pattern and its groups; ``known`` are the messages, an unknown one is another rule's."""
+    name, slash, stamp = line.message.partition("/")
+    if slash:
+        hint = f"write 'message: {name}' and 'sender: {stamp}'"
+        yield Diagnostic(line.message_span, LINES_RULE, f"'{line.message[:80]}' is a message with a stamp", hint)
+        return
+    if name.startswith(("dodo.", "cluon.")):
+        message = f"{name} is not the application's to send"
+        yield Diagnostic(line.message_span, LINES_RULE, message, "name a message of OpenDLV's, or one of your own")
+        return
+    try:
+        pattern = compiled(line.match)
+    except PatternError as error:
+        yield Diagnostic(line.match_span, LINES_RULE, f"the pattern cannot be read: {error}", _SYNTAX)
+        return
+    groups = [group.decode(errors="replace") for group in pattern.groupindex]
+    if not pattern.groups:
+        hint = "name each part of the line that is a field, for example (?P<groundSteering>[-+.0-9eE]+)"
+        yield Diagnostic(line.match_span, LINES_RULE, "the pattern has no group, so that no field gets a value", hint)
+    elif pattern.groups > len(groups):
+        yield Diagnostic(line.match_span, LINES_RULE, *_surplus(line.match, groups))
+    if name in known:
+        yield from _unknown_fields(line, groups, known[name])
+
+
+def _surplus(pattern: str, groups: list[str]) -> tuple[str, str]:
+    """Why there are more groups than names, and what to do."""
+    twice = next((group for group in groups if pattern.count(f"<{group}>") > 1), None)
+    if twice and not _PLAIN_GROUP.search(pattern):
+        return f"the pattern has two groups '{twice}'", "a field has one value: name each group once"
+    return "the pattern has a group without a field", "name it, as in (?P<field>...), or write (?:...)"
+
+
+def _unknown_fields(line: PrintedLine, groups: list[str], definition: Definition) -> Iterator[Diagnostic]:
+    types = {field.name: field.type for field in definition.fields}
+    for group in groups:
+        if group != SAMPLE_TIME and group not in types:
+            message = f"{definition.name} has no field '{group[:80]}'"
+            fields = ", ".join([*types, SAMPLE_TIME])
+            hint = did_you_mean(group, [*types, SAMPLE_TIME]) or f"groups of the pattern may be {fields}"
+            hint = "write 'sender: 0' beside 'match' for a sender stamp" if group == "sender" else hint
+            yield Diagnostic(line.match_span, LINES_RULE, message, hint)
+        elif group in types and types[group] not in SCALARS:
+            message = f"field '{group}' of {definition.name} is a message itself, which a line cannot give"
+            yield Diagnostic(line.match_span, LINES_RULE, message, "leave that group out")

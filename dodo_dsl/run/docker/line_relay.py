@@ -1,0 +1,75 @@
+"""What containers print, as it comes, and a sender of lines in a test's network: a program beside its recorder."""
+
+import contextlib
+import os
+import socket
+from typing import Any
+
+from dodo_dsl.opendlv.address import Address
+
+_COMMAND = ("python", "-m", "dodo_dsl.opendlv.relay")
+_START_S = 30.0
+_CHUNK = 1 << 16
+_HEADER_BYTES = 8
+"""Before each piece of a program's output without a terminal; the last four are its length."""
+
+
+def attached(container: Any) -> socket.socket:
+    """What a container with a terminal prints, from its start on; raises DockerException and OSError."""
+    return _socket(container.attach_socket(params={"stdout": 1, "stderr": 1, "stream": 1}))
+
+
+def copy_into(stream: socket.socket, writer: int) -> None:
+    """Copies output into a pipe, until the container ends or nobody reads the pipe; then closes both."""
+    with contextlib.suppress(OSError), stream:
+        while data := stream.recv(_CHUNK):
+            while data:
+                data = data[os.write(writer, data) :]
+    with contextlib.suppress(OSError):
+        os.close(writer)
+
+
+class ContainerRelay:
+    """``Relay`` in the network of a container that has DoDo's programs.
+
+    Raises DockerException, and OSError or ValueError where the program does not say its address.
+    """
+
+    def __init__(self, container: Any, cid: int) -> None:
+        api = container.client.api
+        self._exec = api.exec_create(container.id, [*_COMMAND, str(cid)], stdin=True, stdout=True, stderr=True)["Id"]
+        self._stream = _socket(api.exec_start(self._exec, socket=True))
+        self._stream.settimeout(_START_S)
+        try:
+            self.address: Address = self._said()
+        except (OSError, ValueError):
+            self._stream.close()
+            raise
+
+    def _said(self) -> Address:
+        data = b""
+        while not data.endswith(b"\n"):
+            header = self._stream.recv(_HEADER_BYTES, socket.MSG_WAITALL)
+            if not header:
+                break
+            data += self._stream.recv(int.from_bytes(header[4:], "big"), socket.MSG_WAITALL)
+        said = " ".join(data.decode("utf-8", "replace").split())
+        host, _, port = said.partition(" ")
+        if not port.isdecimal():
+            raise ValueError(f"the program that sends it says '{said[:200]}'")
+        return host, int(port)
+
+    def send(self, frame: bytes) -> None:
+        """Sends one frame, or loses it where the program has ended."""
+        with contextlib.suppress(OSError):
+            self._stream.sendall(frame)
+
+    def close(self) -> None:
+        self._stream.close()
+
+
+def _socket(found: Any) -> socket.socket:
+    """The socket of an answer of the engine, which the docker package wraps."""
+    inner = getattr(found, "_sock", found)
+    assert isinstance(inner, socket.socket), "the engine is reached by a local socket"
+    return inner

@@ -1,0 +1,65 @@
+"""The evaluator of an area that has to be passed over, on the bus."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import shapely
+
+from dodo_dsl.opendlv.assets import map_file
+from dodo_dsl.opendlv.attitude import heading_of
+from services.base import Context, Flags
+from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint, Pose, enclosed
+
+_SIDES = ("x-min", "x-max", "y-min", "y-max")
+
+
+class Coverage(CoverageEvaluator):
+    """Takes the vehicle's frames under the sender stamp ``frame-id``."""
+
+    def __init__(self, context: Context) -> None:
+        """Raises ValueError for flags that leave something open."""
+        flags = context.flags
+        diameter = flags["diameter"]
+        footprint = Footprint(diameter, 0.0) if diameter else Footprint(flags["length"], flags["width"])
+        grid = CoverageGrid(_area(flags), flags["cell"], footprint)
+        super().__init__(flags["area"] or "the rectangle", grid, flags["min-share"], flags["max-time"])
+        self._log, self._rejected = context.log, 0
+        self.inputs = {("opendlv.sim.Frame", flags["frame-id"]): self._take_frame}
+
+    def _take_frame(self, frame: Any, sample_time: int) -> None:
+        heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
+        if heading is not None and math.isfinite(frame.x + frame.y):
+            self.look(Pose(frame.x, frame.y, heading), sample_time)
+            return
+        self._rejected += 1
+        if self._rejected == 1:
+            self._log.warning("ignored a Frame without a position or an attitude, and will ignore all such")
+
+
+def build(context: Context) -> Coverage:
+    """The service from its flags; raises ValueError for flags that leave something open."""
+    return Coverage(context)
+
+
+def _area(flags: Flags) -> shapely.Geometry:
+    """The loop of the map, or the rectangle; raises MapError, and ValueError for what is no area."""
+    name, path, sides = flags["area"], flags["map-path"], [flags[side] for side in _SIDES]
+    if (name is None) == (sides == [None] * len(_SIDES)):
+        raise ValueError("give the area either as a loop of the map, --area, or as a rectangle, --x-min and so on")
+    if name is None:
+        if missing := [side for side in _SIDES if flags[side] is None]:
+            raise ValueError(f"--{missing[0]} of the rectangle is missing")
+        for low, high in (_SIDES[:2], _SIDES[2:]):
+            if flags[low] >= flags[high]:
+                raise ValueError(f"--{low}={flags[low]:g} is not less than --{high}={flags[high]:g}")
+        return shapely.box(sides[0], sides[2], sides[1], sides[3])
+    if path is None:
+        raise ValueError(f"--area={name} needs --map-path, the map that has it")
+    obstacles = map_file.read_obstacles(Path(path))
+    if name not in obstacles:
+        raise ValueError(f"the map {path} has no obstacle '{name}'; it has {', '.join(sorted(obstacles)) or 'none'}")
+    found = enclosed(obstacles[name])
+    if found is None:
+        raise ValueError(f"the lines of obstacle '{name}' of the map {path} enclose nothing: end where they begin")
+    return found

@@ -1,0 +1,236 @@
+"""Whether each frame is answered: the frames of a recording or of a camera, the answers, and the verdict on them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dodo_dsl.opendlv import recording_times
+from dodo_dsl.opendlv.message_set import OWN_IDS
+from dodo_dsl.opendlv.recording import Recording
+from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.base.clock import MICROSECONDS
+from services.base.evaluator import EARLY
+
+Times = NDArray[np.int64]
+"""Microseconds."""
+_SAME = 1_500
+"""Microseconds by which the sample time of an answer may differ from that of its frame: what rounding does."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The frames of a test, ascending: when each is ``due``, in us from its begin, and its sample time in ``stamps``.
+
+    Without ``stamps`` these are times of the test.
+    """
+
+    due: Times
+    stamps: Times | None = None
+
+    def of(self, sample_time: int, arrival: int, begin: int) -> int:
+        """The number of the frame that is answered, -1 for none, by the sample time of an answer and its arrival in us.
+
+        One that has not the sample time of a frame answers the last that was due when it arrived.
+        """
+        stamps, sought = (self.due, sample_time - begin) if self.stamps is None else (self.stamps, sample_time)
+        number = int(np.searchsorted(stamps, sought + _SAME, side="right")) - 1
+        if number >= 0 and sought - stamps[number] <= _SAME:
+            return number
+        return int(np.searchsorted(self.due, arrival - begin, side="right")) - 1
+
+
+def at_rate(freq: float, seconds: float) -> Frames:
+    """The frames of a camera of ``freq`` Hz in so many seconds."""
+    return Frames(np.rint(np.arange(int(freq * seconds) + 1) * (MICROSECONDS / freq)).astype(np.int64))
+
+
+@dataclass(frozen=True)
+class PlayedPart:
+    """What is played of a recording, times in s: the pictures of ``sender``, from ``start`` to ``end``.
+
+    Gaps are at most ``max_gap``, and then all goes ``timemod`` times faster. ``is_test_time``: pictures carry the
+    time of the test.
+    """
+
+    sender: int
+    start: float = 0.0
+    end: float | None = None
+    max_gap: float = 1.0
+    timemod: float = 1.0
+    is_test_time: bool = False
+
+
+def of_recording(path: Path, part: PlayedPart) -> Frames:
+    """The frames as the player shows them; raises ValueError where there are none."""
+    with Recording(path) as recording:
+        index = recording.index
+        times = index["time"]
+        begin = int(times[times > 0].min(initial=np.iinfo(np.int64).max))
+        start = begin + round(part.start * MICROSECONDS) if part.start else None
+        end = None if part.end is None else begin + round(part.end * MICROSECONDS)
+        rows = recording.rows(start=start, end=end)
+        rows = rows[~np.isin(index["data_type"][rows], list(OWN_IDS))]
+        played = recording_times.within(recording, rows)
+        order = np.argsort(played, kind="stable")
+        rows, played = rows[order], played[order]
+        shown = (index["data_type"][rows] == recording_times.IMAGE) & (index["sender_stamp"][rows] == part.sender)
+    if not shown.any():
+        raise ValueError(f"{path}: has no pictures of sender {part.sender} in the part that is played")
+    gaps = np.minimum(np.diff(played, prepend=played[:1]), round(part.max_gap * MICROSECONDS))
+    due = np.rint(np.cumsum(gaps) / part.timemod).astype(np.int64)[shown]
+    return Frames(due, None if part.is_test_time else played[shown])
+
+
+@dataclass(frozen=True)
+class ResponseLimits:
+    """Limits of the answers; ``delay`` and ``start_up`` in us. Values of the field are from ``low`` to ``high``."""
+
+    share: float
+    frames: int
+    delay: int
+    start_up: int
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class BrokenValue:
+    """The first value that is not finite: the field, and the time in s."""
+
+    field: str
+    time: float
+
+
+class ResponseEvaluator(Evaluator):
+    """Consumes answers; ``name`` is theirs in sentences, ``field`` the one with bounds, empty for none."""
+
+    def __init__(self, name: str, field: str, frames: Frames, limits: ResponseLimits, max_time: float) -> None:
+        super().__init__(max_time, limits.delay / MICROSECONDS)
+        self._name, self._field, self._frames, self._limits = name, field, frames, limits
+        if field:
+            self.plot = self.judged.series(f"{field} of {name}", low=limits.low, high=limits.high)
+        else:
+            self.plot = self.judged.series(f"delay of {name}", "s", high=limits.delay / MICROSECONDS)
+        self._clear()
+
+    def _clear(self) -> None:
+        self._answered = np.zeros(len(self._frames.due), np.bool_)
+        self._received = self._late = self._broken = 0
+        self._first_broken: BrokenValue | None = None
+        self._lowest = self._highest = self._delay = None
+
+    _lowest: float | None
+    _highest: float | None
+    _delay: float | None
+
+    def forget(self, now: int) -> None:
+        self._clear()
+
+    def take(self, values: Mapping[str, float], sample_time: int) -> None:
+        """An answer with the numbers that are judged, by their fields."""
+        arrival = self.arrival
+        if self.verdict is not None or arrival is None:
+            return
+        self._received += 1
+        number = self._frames.of(sample_time, arrival, self.zero)
+        due = self.zero + int(self._frames.due[number]) if number >= 0 else arrival
+        delay = arrival - due
+        self._judge(values, due)
+        if not self._field:
+            self.plot.add(due, delay / MICROSECONDS)
+        if number < 0 or delay > self._limits.delay or delay < -EARLY:
+            self._late += 1
+        elif not self._answered[number]:
+            self._answered[number] = True
+            self._delay = max(self._delay or 0.0, delay / MICROSECONDS)
+
+    def _judge(self, values: Mapping[str, float], time: int) -> None:
+        for field, value in values.items():
+            if not np.isfinite(value):
+                self._broken += 1
+                self._first_broken = self._first_broken or BrokenValue(field, self.elapsed(time))
+            elif field == self._field:
+                self._lowest = value if self._lowest is None else min(self._lowest, value)
+                self._highest = value if self._highest is None else max(self._highest, value)
+            if field == self._field:
+                self.plot.add(time, value)
+
+    def decide(self, span: JudgedTime) -> Verdict:
+        judged = self._judged()
+        if not len(judged):
+            raise UnjudgeableError(f"no frame came {span.within}, so there was nothing to answer")
+        answered = int(self._answered[judged].sum())
+        checks = tuple(self.checks(answered, len(judged)))
+        evidence = {"time": self._first_broken.time} if self._first_broken else {}
+        if not self._received:
+            return Verdict("failed", f"no {self._name} came {span.within}", checks, silent=True)
+        faults = [self._fault(check, judged) for check in checks if not check.ok]
+        if faults:
+            return Verdict("failed", "; ".join(faults) + self._aside(), checks, evidence=evidence)
+        values = f", {self._field} from {self._lowest:z.4g} to {self._highest:z.4g}" if self._field else ""
+        said = f"answered {answered} of {len(judged)} frames with {self._name}{values}"
+        return Verdict("passed", said + self._aside(), checks)
+
+    def _judged(self) -> Times:
+        """The numbers of the frames that had their time to be answered, or are, from the first answer on."""
+        due, limits = self._frames.due, self._limits
+        over = due + limits.delay <= (self.now or self.zero) - self.zero
+        numbers = np.flatnonzero(over | self._answered)
+        answered = np.flatnonzero(self._answered)
+        if len(answered) and due[answered[0]] <= limits.start_up:
+            numbers = numbers[numbers >= answered[0]]
+        return numbers
+
+    def checks(self, answered: int, judged: int) -> Iterator[Check]:
+        """Each measure with its limit, of so many frames answered in time among those judged."""
+        limits, broken = self._limits, self._broken
+        share, low, high = answered / judged, self._lowest, self._highest
+        yield Check("share", share, {"min": limits.share}, "", share >= limits.share)
+        yield Check("frames", answered, {"min": limits.frames}, "", answered >= limits.frames)
+        if limits.low is not None:
+            ok = low is not None and low >= limits.low
+            yield Check("lowest", low, {"min": limits.low}, "", ok, parameters=("min",))
+        if limits.high is not None:
+            ok = high is not None and high <= limits.high
+            yield Check("highest", high, {"max": limits.high}, "", ok, parameters=("max",))
+        yield Check("broken", broken, {"max": 0}, "", not broken)
+        yield Check("late", self._late)
+        yield Check("delay", self._delay, {}, "s")
+
+    def _fault(self, check: Check, judged: Times) -> str:
+        if check.name == "share":
+            return f"answered {int(self._answered[judged].sum())} of {len(judged)} frames in time, a share of " + (
+                f"{check.value:.4g} (at least {self._limits.share:g}){self._longest(judged)}"
+            )
+        if check.name == "frames":
+            return f"only {check.value} frames were answered (at least {self._limits.frames})"
+        if check.name == "broken" and self._first_broken:
+            first = self._first_broken
+            what = (
+                "1 value is not a finite number" if check.value == 1 else f"{check.value} values are not finite numbers"
+            )
+            return f"{what}, the first is {first.field} at {first.time:.2f} s"
+        side, bound = next(iter(check.limit.items()))
+        word = "most" if side == "max" else "least"
+        value = "nothing" if check.value is None else f"{check.value:z.6g}"
+        return f"the {check.name} {self._field} is {value} (at {word} {bound:g})"
+
+    def _longest(self, judged: Times) -> str:
+        """Where the longest run of frames without an answer is."""
+        silent = np.append(self._answered[judged], True)
+        ends = np.flatnonzero(silent)
+        lengths = np.diff(ends, prepend=-1) - 1
+        last = int(ends[np.argmax(lengths)]) - 1
+        first = last - int(lengths.max()) + 1
+        begin, end = (self._frames.due[judged[number]] / MICROSECONDS for number in (first, last))
+        run = last - first + 1
+        return f", the longest run is {run} frame{'' if run == 1 else 's'}, from {begin:.2f} s to {end:.2f} s"
+
+    def _aside(self) -> str:
+        if not self._late:
+            return ""
+        what = "1 answer" if self._late == 1 else f"{self._late} answers"
+        return f"; {what} came later than {self._limits.delay / MICROSECONDS:g} s after the frame, or before it"

@@ -1,0 +1,70 @@
+"""The evaluator of answers on the bus."""
+
+from pathlib import Path
+from typing import Any
+
+from google.protobuf.descriptor import FieldDescriptor
+
+from services.base import Context, Flags
+from services.base.clock import MICROSECONDS
+from services.responds.model import Frames, PlayedPart, ResponseEvaluator, ResponseLimits, at_rate, of_recording
+
+_NO_NUMBERS = (FieldDescriptor.CPPTYPE_STRING, FieldDescriptor.CPPTYPE_MESSAGE)
+
+
+class Responds(ResponseEvaluator):
+    """Takes the answers under their sender stamp."""
+
+    def __init__(self, context: Context) -> None:
+        """Raises ValueError for flags that leave something open."""
+        flags = context.flags
+        self._fields = _numbers(context)
+        name = f"{flags['message']}/{flags['sender']}"
+        super().__init__(name, flags["field"] or "", _frames(flags), _limits(flags), flags["max-time"])
+        self.inputs = {(flags["message"], flags["sender"]): self._take}
+
+    def _take(self, message: Any, sample_time: int) -> None:
+        self.take({field: float(getattr(message, field)) for field in self._fields}, sample_time)
+
+
+def build(context: Context) -> Responds:
+    """The service from its flags; raises ValueError for flags that leave something open."""
+    return Responds(context)
+
+
+def _numbers(context: Context) -> list[str]:
+    """The field with bounds, or else all fields that are numbers."""
+    message, field = context.flags["message"], context.flags["field"]
+    fields = context.messages.type(message).DESCRIPTOR.fields
+    numbers = [each.name for each in fields if each.cpp_type not in _NO_NUMBERS and not each.is_repeated]
+    if field and field not in numbers:
+        raise ValueError(f"{message} has no number '{field}', expected one of {', '.join(numbers) or 'none'}")
+    return [field] if field else numbers
+
+
+def _frames(flags: Flags) -> Frames:
+    if not flags["rec"]:
+        if flags["freq"] is None:
+            raise ValueError("no frames are known: give --rec, the recording that is played, or --freq of the camera")
+        return at_rate(flags["freq"], flags["max-time"])
+    part = PlayedPart(
+        sender=flags["video-sender"] or 0,
+        start=flags["start"] or 0.0,
+        end=flags["end"],
+        max_gap=flags["max-gap"],
+        timemod=flags["timemod"] or 1.0,
+        is_test_time=flags["sample-times"] == "test",
+    )
+    return of_recording(Path(flags["rec"]), part)
+
+
+def _limits(flags: Flags) -> ResponseLimits:
+    low, high = flags["min"], flags["max"]
+    if (low is not None or high is not None) and not flags["field"]:
+        raise ValueError("--min and --max need --field, the number that they are bounds of")
+    if low is not None and high is not None and low > high:
+        raise ValueError(f"--min={low:g} is more than --max={high:g}")
+    if flags["max-delay"] >= flags["max-time"]:
+        raise ValueError("no frame would be judged: --max-time must be longer than --max-delay")
+    delay, start_up = (round(flags[name] * MICROSECONDS) for name in ("max-delay", "start-up"))
+    return ResponseLimits(flags["min-share"], flags["min-frames"], delay, start_up, low, high)

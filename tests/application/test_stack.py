@@ -1,0 +1,48 @@
+"""Which services belong to the stack around an application, and what takes their place."""
+
+import pytest
+
+from dodo_dsl.application import stack
+from tests.application.applications import application
+
+_CASES = {
+    "image: registry.opendlv.org/testing/opendlv-vehicle-view-multi:v0.0.60": "report",
+    "image: chalmersrevere/opendlv-vehicle-view-multi@sha256:0123": "report",
+    "image: '${REGISTRY:-docker.io}/opendlv-video-h264-decoder-amd64:${TAG}'": "virtual-camera, rec-replay",
+    "image: chalmersrevere/opendlv-video-x264-encoder-multi:v0.0.1": "record:",
+    "image: opendlv-data-replay-video-h264": "rec-replay plays",
+    "image: chalmersrevere/opendlv-rec-replay-multi:v0.0.3": "rec-replay plays",
+    "image: chrberger/cluon:v0.0.140, command: 'cluon-replay --cid=253 --stdout /r.rec'": "rec-replay plays",
+    "image: a/b, command: [/usr/bin/cluon-OD4toStdout, --cid=1]": "dodo rec",
+    "build: {context: 'https://github.com/chalmers-revere/opendlv-sim-camera.git#v1'}": "virtual-camera draws",
+    "build: https://github.com/chalmers-revere/opendlv-virtual-camera.git": "virtual-camera draws",
+    "image: ghcr.io/chalmers-revere/opendlv-sim-global": "integrator",
+    "image: opendlv-virtual-space:v0.0.6": "integrator",
+    "image: chalmersrevere/opendlv-virtual-motor-kiwi-amd64": "dynamic-model moves",
+    "image: chalmersrevere/opendlv-virtual-motor-kiwid1-amd64": "differential",
+    "image: opendlv-virtual-rangefinder-ultrasonic-srf08-amd64": "range-finder",
+    "image: opendlv-virtual-rangefinder-ir-gp2y0a-amd64": "range-finder",
+    "image: chalmersrevere/opendlv-logic-distance-voltage-multi": "range-finder",
+    "image: chalmersrevere/opendlv-device-camera-v4l-multi": "rig's camera",
+    "image: chalmersrevere/opendlv-device-lidar-hdl32e-multi": "sensors",
+}
+
+
+@pytest.mark.parametrize(("written", "instead"), _CASES.items())
+def test_a_service_of_the_stack_is_named_with_what_takes_its_place(written: str, instead: str) -> None:
+    found = stack.parts(application(f"services: {{part: {{{written}}}}}"))
+    assert instead in found["part"][1].instead
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "image: chalmersrevere/opendlv-logic-cfsd18-perception-multi",
+        "image: team/opendlv-template, command: --cid=111 --name=img",
+        "build: .",
+        "image: team/sim-camera, command: 'sh -c \"cluon-OD4toStdout --cid=111 | ./judge\"'",
+        "image: chalmersrevere/opendlv-logic-distance-voltage, x-dodo: {out: [opendlv.proxy.DistanceReading]}",
+    ],
+)
+def test_others_are_the_application_s_own(written: str) -> None:
+    assert stack.parts(application(f"services: {{part: {{{written}}}}}")) == {}

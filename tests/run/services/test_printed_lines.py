@@ -1,0 +1,287 @@
+"""What an application prints as messages: the values of fields, what makes none, and what is said of silence."""
+
+import asyncio
+import math
+import os
+import random
+import resource
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.application.printed_lines import compiled
+from dodo_dsl.opendlv.address import LINES
+from dodo_dsl.opendlv.authentication import is_proven
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.plan.model import Line
+from dodo_dsl.run.printed_lines import MAX_LINE, LinePattern, NoValue, PrintedLines, value
+from dodo_dsl.run.service_output import ServiceOutput
+from tests.run.helpers import Bench
+
+STEERING = "opendlv.proxy.GroundSteeringRequest"
+GROUP_06 = Line("group_[0-9]+;(?P<sample_time>[0-9]+);(?P<groundSteering>[-+.0-9eE]+)", STEERING)
+KEY = b"a key of this test"
+TYPES = """
+message t.Inner [id = 5101] { int32 a [id = 1]; }
+message t.All [id = 5100] {
+  bool b [id = 1]; char c [id = 2]; uint8 u8 [id = 3]; int8 i8 [id = 4]; int64 i64 [id = 5]; uint64 u64 [id = 6];
+  float f [id = 7]; double d [id = 8]; string s [id = 9]; bytes raw [id = 10];
+}
+"""
+
+
+class Desk:
+    """The lines of one application service 'app', what they sent, and what was said."""
+
+    def __init__(self, folder: Path, *lines: Line, messages: str = "") -> None:
+        plan = Bench(folder).plan()
+        (app,) = plan.application.services
+        application = replace(plan.application, services=(replace(app, lines=lines),))
+        if messages:
+            (folder / "files").mkdir()
+            (folder / "files" / "own.odvd").write_text(messages)
+        plan = replace(plan, application=application, messages=("own.odvd",) if messages else ())
+        self.said: list[str] = []
+        self.sent: list[Envelope] = []
+        self.messages = MessageSet.load(*([folder / "files" / "own.odvd"] if messages else []))
+        self.lines = PrintedLines(plan, folder, self.said.append)
+        self.lines.connect(lambda frame: self.sent.append(decode_frame(frame)), ("10.0.0.1", 40_000), KEY)
+
+    def print(self, *lines: bytes) -> list[tuple[int, int, dict[str, object]]]:
+        """Sample time, sender stamp and fields of what lines made."""
+        del self.sent[:]
+        for line in lines:
+            self.lines.take("app", line)
+        sender = self.messages.id("dodo.Sender")
+        return [(e.sample_time, e.sender_stamp, fields(self.messages, e)) for e in self.sent if e.data_type != sender]
+
+    def silence(self, unfinished: bytes = b"") -> str:
+        (found,) = self.lines.unmatched({"app": unfinished})
+        return found.words
+
+
+def fields(messages: MessageSet, envelope: Envelope) -> dict[str, object]:
+    message = messages.decode(envelope.data_type, envelope.payload)
+    return {field.name: getattr(message, field.name) for field in message.DESCRIPTOR.fields}
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    return Desk(tmp_path, GROUP_06)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"group_06;1584542902573412;0.25",
+        b"group_06;1584542902573412;0.25\r",
+        b"INFO \x00\xff group_06;1584542902573412;25e-2 and more",
+    ],
+)
+def test_a_line_is_a_message(desk: Desk, line: bytes) -> None:
+    assert desk.print(line) == [(1584542902573412, 0, {"groundSteering": 0.25})]
+
+
+@pytest.mark.parametrize(
+    "line", [b"", b"group_06", b"group_06;;0.25", b"group_06;1;", b"x" * 70_000 + b"group_06;1;0.25", b"\xff\x00"]
+)
+def test_what_matches_nothing_is_no_message(desk: Desk, line: bytes) -> None:
+    assert (desk.print(line), desk.said) == ([], [])
+
+
+def test_the_sender_proves_that_it_is_the_runners(desk: Desk) -> None:
+    (said,) = desk.sent
+    assert is_proven(KEY, said.data_type, said.payload)
+    assert not is_proven(b"another key", said.data_type, said.payload)
+    told = desk.messages.decode(said.data_type, said.payload)
+    assert (told.service, told.host, told.port, told.leaves) == (LINES, "10.0.0.1", 40_000, False)
+
+
+def test_without_a_sample_time_it_is_of_now(tmp_path: Path) -> None:
+    desk = Desk(tmp_path, Line("steer (?P<groundSteering>[^ ]+)", STEERING, 3))
+    before = time.time_ns() // 1000
+    ((sampled, stamp, _),) = desk.print(b"steer 1")
+    assert before <= sampled <= time.time_ns() // 1000
+    assert stamp == 3
+
+
+def test_one_line_may_be_several_messages(tmp_path: Path) -> None:
+    pedal = Line("p=(?P<position>[-.0-9]+)", "opendlv.proxy.PedalPositionRequest", 1)
+    desk = Desk(tmp_path, Line("s=(?P<groundSteering>[-.0-9]+)", STEERING), pedal)
+    assert [found for _, _, found in desk.print(b"s=0.5 p=0.125")] == [{"groundSteering": 0.5}, {"position": 0.125}]
+
+
+@pytest.mark.parametrize(
+    ("type_", "text", "expected"),
+    [
+        ("float", b"-.5e1", -5.0),
+        ("float", b"1e39", "out of range for float"),
+        ("double", b"1e39", 1e39),
+        ("double", b"1e999", "out of range for double"),
+        ("double", b"inf", math.inf),
+        ("double", b"0,5", "no number"),
+        ("double", b"1_0", "no number"),
+        ("double", "\N{ARABIC-INDIC DIGIT ONE}".encode(), "no number"),
+        ("double", b"", "no number"),
+        ("uint8", b"255", 255),
+        ("uint8", b"256", "out of range for uint8"),
+        ("int8", b"-129", "out of range for int8"),
+        ("int64", b"nan", "no whole number"),
+        ("uint64", b"18446744073709551616", "out of range for uint64"),
+        ("uint64", b"9" * 21, "no whole number"),
+        ("bool", b"TRUE", True),
+        ("bool", b"0", False),
+        ("bool", b"yes", "neither true nor false"),
+        ("char", b"x", 120),
+        ("char", b"xy", "no single character"),
+        ("string", "für".encode(), "für"),
+        ("string", b"\xff", "no UTF-8"),
+        ("bytes", b"\xff\x00", b"\xff\x00"),
+    ],
+)
+def test_values_of_fields(type_: str, text: bytes, expected: object) -> None:
+    try:
+        found = value(type_, text)
+    except NoValue as error:
+        found = str(error)
+    assert (type(found), found) == (type(expected), expected)
+
+
+def test_fields_of_all_types_and_those_of_another_alternative(tmp_path: Path) -> None:
+    names = ("b", "c", "u8", "i8", "i64", "u64", "f", "d", "s", "raw")
+    pattern = "all " + " ".join(f"(?P<{name}>[^ ]*)" for name in names[:-1]) + "(?: (?P<raw>.*))?$"
+    desk = Desk(tmp_path, Line(pattern, "t.All"), messages=TYPES)
+    ((_, _, found),) = desk.print(b"all true x 1 -1 -2 2 0.5 nan name")
+    assert math.isnan(float(str(found.pop("d"))))
+    assert list(found.values()) == [True, 120, 1, -1, -2, 2, 0.5, "name", b""]
+
+
+def test_what_does_not_convert_is_said_once_and_is_no_message(desk: Desk) -> None:
+    late = b"group_06;99999999999999999;0.1"
+    assert desk.print(b"group_06;1;0.1.2", b"group_06;2;-", late, b"group_06;3;0.5") == [
+        (3, 0, {"groundSteering": 0.5})
+    ]
+    assert desk.said == [
+        f"a line of 'app' is no {STEERING}: groundSteering '0.1.2' is no number: 'group_06;1;0.1.2'",
+        f"a line of 'app' is no {STEERING}: sample_time '99999999999999999' is no time in microseconds: "
+        f"'{late.decode()}'",
+    ]
+
+
+def test_a_message_that_is_too_large_is_said(tmp_path: Path) -> None:
+    desk = Desk(tmp_path, Line("(?P<s>x+)", "t.All"), messages=TYPES)
+    assert len(desk.print(b"x" * 10_000)) == 1
+    assert desk.print(b"x" * MAX_LINE) == []
+    assert desk.said == ["a line of 'app' makes a message of more than 32768 bytes, which is not sent"]
+
+
+def test_silence_in_words(desk: Desk) -> None:
+    assert desk.silence() == "'app' printed no line"
+    desk.print(b"ready", b"group_06,1584542902573412,0.04\x1b", b"bye")
+    nearest = "group_06,1584542902573412,0.04\N{REPLACEMENT CHARACTER}"
+    assert desk.silence() == f"no line of 'app' matched, the nearest is '{nearest}'"
+    assert desk.silence(b"group_06;1;0.5").endswith("'app' printed a line without its end: 'group_06;1;0.5'")
+    assert [each.never for each in desk.lines.unmatched({})] == [True]
+    desk.print(b"group_06;1;0.5")
+    assert desk.silence() == "since its last match 'app' printed no line"
+    desk.print(b"group_06;nan;0.5", b"done")
+    assert desk.silence() == "since its last match no line of 'app' matched, the nearest is 'group_06;nan;0.5'"
+    assert [each.never for each in desk.lines.unmatched({})] == [False]
+
+
+def fuzzed(count: int) -> Iterable[bytes]:
+    """Lines that are nearly of the form, far from it, huge, or garbage; each tenth is as it should be."""
+    choose = random.Random(36)
+    good = b"group_06;%d;0.5"
+    for number in range(count):
+        line = bytearray(good % number)
+        if number % 10:
+            for _ in range(choose.randrange(1, 6)):
+                place = choose.randrange(len(line) + 1)
+                line[place : place + choose.randrange(3)] = choose.randbytes(choose.randrange(4))
+        if number % 5000 == 1:
+            line *= choose.randrange(1, 4000)
+        yield bytes(line).replace(b"\n", b"\t") + choose.choice((b"\n", b"\r\n"))
+
+
+def fuzz(folder: Path, count: int, terminal: bool) -> tuple[int, int]:
+    """How many messages lines made that were written in pieces, and by how many KiB memory grew after the first."""
+    plan_lines = Desk(folder, GROUP_06)
+    made = {"valid": 0}
+    messages = plan_lines.messages
+    steering = messages.id(STEERING)
+
+    def count_frame(frame: bytes) -> None:
+        envelope = decode_frame(frame)
+        if envelope.data_type == steering:
+            made["valid"] += fields(messages, envelope) == {"groundSteering": 0.5}
+
+    plan_lines.lines.connect(count_frame, ("10.0.0.1", 1), KEY)
+
+    async def scene() -> int:
+        output = ServiceOutput(folder / "app.log", lambda line: bool(plan_lines.lines.take("app", line)), terminal)
+        choose, waiting, began = random.Random(7), b"", 0
+        os.set_blocking(output.writer, False)
+
+        async def write(data: bytes) -> None:
+            while data:
+                try:
+                    data = data[os.write(output.writer, data[: choose.randrange(1, 4096)]) :]
+                except BlockingIOError:  # a terminal holds 4 KiB
+                    await asyncio.sleep(0.0002)
+                await asyncio.sleep(0)
+
+        for number, line in enumerate(fuzzed(count)):
+            waiting += line
+            if len(waiting) > 3000:
+                await write(waiting)
+                waiting = b""
+            if number == count // 5:
+                began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        await write(waiting)
+        output.release_writer()
+        await asyncio.wait_for(output.done.wait(), 60)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - began
+
+    grown = asyncio.run(scene())
+    return made["valid"], grown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terminal", [False, True], ids=["pipe", "terminal"])
+def test_fuzzed_lines(tmp_path: Path, terminal: bool) -> None:
+    valid, grown = fuzz(tmp_path, 10_000, terminal)
+    assert valid >= 1_000
+    assert grown < 32 << 10
+
+
+@pytest.mark.proof
+def test_a_million_fuzzed_lines_in_bounded_memory(tmp_path: Path) -> None:
+    valid, grown = fuzz(tmp_path, 1_000_000, terminal=True)
+    assert valid >= 100_000
+    assert grown < 32 << 10
+
+
+@pytest.mark.slow
+def test_a_hostile_pattern_takes_time_in_proportion_to_the_line() -> None:
+    """In processor time; by backtracking it would take longer than the sun burns."""
+    pattern = compiled(r"((a|a)*)*b|(x+x+)+y|(?P<groundSteering>(z*)*q)")
+
+    def took(size: int) -> float:
+        line = b"a" * size + b"x" * size + b"z" * size
+        began = time.process_time()
+        for _ in range(20):
+            assert pattern.search(line) is None
+        return time.process_time() - began
+
+    took(1000)
+    assert took(20_000) < 40 * max(took(1000), 0.002)
+
+
+def test_patterns_have_only_the_messages_that_they_name() -> None:
+    with pytest.raises(KeyError):
+        LinePattern(Line("(?P<x>.)", "a.B"), MessageSet.standard())

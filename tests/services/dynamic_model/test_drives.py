@@ -1,0 +1,233 @@
+"""Two wheels and the bicycle against closed-form solutions and a solver of high order."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from scipy.integrate import solve_ivp
+
+from services.dynamic_model.drives import (
+    ACCELERATION,
+    GRAVITY,
+    LEFT,
+    RIGHT,
+    SPEED,
+    BicycleDrive,
+    DifferentialDrive,
+    SingleTrack,
+    TwoWheels,
+)
+from services.dynamic_model.model import STEERING, BodyMotion, Condition, Drive, Vehicle
+from services.integrator.model import BodyPose, Integrator, Twist
+
+SECOND = 1_000_000
+WHEELS = TwoWheels(
+    wheel_radius=0.03, track=0.15, top_wheel_speed=30.0, motor_lag=0.1, dead_zone=0.1, axle_offset=0.0,
+    wheel_offset=0.0, friction=1.0,
+)  # fmt: skip
+CAR = SingleTrack(
+    mass=1500.0, inertia=2500.0, wheel_base=2.7, cg=1.2, cornering_front=90_000.0, cornering_rear=110_000.0,
+    friction=1.0, max_steering=0.6, steering_rate=0.5, speed_lag=0.5, max_acceleration=4.0, max_braking=8.0,
+    top_speed=50.0, blend_speed=3.0,
+)  # fmt: skip
+
+
+def driven(drive: Drive, seconds: float, requests: dict[str, float], freq: int = 100, **condition: float) -> Vehicle:
+    vehicle = Vehicle(freq, condition=Condition(**condition), drive=drive)
+    vehicle.update(0)
+    for actuator, value in requests.items():
+        vehicle.request(actuator, value)
+    for number in range(1, round(seconds * freq) + 1):
+        vehicle.update(number * SECOND // freq)
+    return vehicle
+
+
+def radius(vehicle: Vehicle, seconds: float = 2.0) -> float:
+    """Of the circle on which the body goes on, through three of its places."""
+    body, motion = Integrator(BodyPose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))), vehicle.motion
+    body.update(0)
+    body.feed(Twist((motion.vx, motion.vy, 0.0), (0.0, 0.0, motion.yaw_rate)), 0)
+    a, b, c = ((0.0, 0.0), *(body.update(round(part * seconds * SECOND)).position[:2] for part in (0.5, 1.0)))
+    sides = [math.dist(*pair) for pair in ((a, b), (b, c), (c, a))]
+    area = ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])) / 2
+    return math.prod(sides) / (4 * area)
+
+
+@pytest.mark.parametrize(("left", "right"), [(10.0, 12.0), (12.0, 10.0), (-10.0, -8.0), (0.0, 6.0)])
+def test_two_wheels_roll_on_the_circle_of_their_speeds(left: float, right: float) -> None:
+    vehicle = driven(DifferentialDrive(WHEELS, by_axle=True), 3.0, {LEFT: left, RIGHT: right})
+    assert radius(vehicle) == pytest.approx(
+        0.075 * (right + left) / (right - left) * math.copysign(1, left + right), rel=1e-6
+    )
+    assert vehicle.motion.vx == pytest.approx(0.03 * (left + right) / 2, rel=1e-6)
+
+
+def test_opposite_wheels_turn_on_the_spot() -> None:
+    motion = driven(DifferentialDrive(WHEELS, by_axle=True), 3.0, {LEFT: -5.0, RIGHT: 5.0}).motion
+    assert (motion.vx, motion.yaw_rate) == (pytest.approx(0.0, abs=1e-12), pytest.approx(2.0))
+
+
+@pytest.mark.parametrize("freq", [50, 100, 1000])
+def test_a_wheel_follows_the_first_order_response_whatever_the_steps(freq: int) -> None:
+    drive = DifferentialDrive(replace(WHEELS, friction=5.0), by_axle=True)
+    vehicle = driven(drive, 0.1, {LEFT: 20.0, RIGHT: 20.0}, freq)
+    assert [reading.value for reading in vehicle.odometry] == pytest.approx([20 * (1 - math.exp(-1))] * 2)
+    assert vehicle.motion.vx == pytest.approx(0.6 * (1 - math.exp(-1)))
+
+
+@pytest.mark.parametrize(
+    ("pedal", "speed"), [(0.05, 0.0), (-0.1, 0.0), (0.55, 15.0), (-0.55, -15.0), (1.0, 30.0), (7.0, 30.0)]
+)
+def test_the_pedal_turns_a_wheel_beyond_its_dead_zone(pedal: float, speed: float) -> None:
+    drive = DifferentialDrive(WHEELS)
+    assert drive.accepted(LEFT, pedal) == pytest.approx(speed)
+    assert DifferentialDrive(WHEELS, power=0.5).accepted(RIGHT, pedal) == pytest.approx(speed / 2)
+
+
+def test_a_wheel_that_turns_faster_pulls_to_the_other_side() -> None:
+    vehicle = driven(DifferentialDrive(replace(WHEELS, wheel_offset=0.1)), 3.0, {LEFT: 0.5, RIGHT: 0.5})
+    assert vehicle.motion.yaw_rate == pytest.approx(0.03 * 0.1 * 30 * 0.4 / 0.9 / 0.15)
+
+
+def test_wheels_spin_where_friction_does_not_hold_them() -> None:
+    vehicle = driven(DifferentialDrive(replace(WHEELS, friction=0.05, motor_lag=0.0)), 0.5, {LEFT: 1.0, RIGHT: 1.0})
+    assert vehicle.motion.vx == pytest.approx(0.05 * GRAVITY * 0.5)
+    assert [reading.value for reading in vehicle.odometry] == [30.0, 30.0]
+    turned = driven(DifferentialDrive(replace(WHEELS, friction=0.05)), 9.0, {LEFT: 0.5, RIGHT: 0.9}).motion
+    assert abs(turned.vx * turned.yaw_rate) <= 0.05 * GRAVITY * 1.001
+
+
+def test_the_point_before_the_axle_moves_sideways() -> None:
+    motion = driven(
+        DifferentialDrive(replace(WHEELS, axle_offset=0.1), by_axle=True), 2.0, {LEFT: 8.0, RIGHT: 12.0}
+    ).motion
+    assert motion.vy == pytest.approx(0.1 * motion.yaw_rate) and motion.vy > 0
+
+
+@pytest.mark.parametrize("drive", [DifferentialDrive(WHEELS), BicycleDrive(CAR, True), BicycleDrive(CAR)])
+def test_a_request_acts_after_the_latency_and_a_reset_forgets_all(drive: DifferentialDrive | BicycleDrive) -> None:
+    actuators = [name for name in drive.rest if name != STEERING]
+    vehicle = Vehicle(100, condition=Condition(latency=0.1), drive=drive)
+    vehicle.update(0)
+    for actuator in actuators:
+        vehicle.request(actuator, 1.0)
+    assert vehicle.update(100_000).vx == 0.0
+    assert vehicle.update(150_000).vx > 0.0
+    vehicle.reset()
+    assert vehicle.update(900_000) == BodyMotion() and all(reading.value == 0.0 for reading in vehicle.odometry)
+
+
+@pytest.mark.parametrize("has_tyres", [False, True])
+def test_the_bicycle_rolls_on_its_circle_at_low_speed(has_tyres: bool) -> None:
+    vehicle = driven(BicycleDrive(CAR, has_tyres), 8.0, {STEERING: 0.3, SPEED: 1.0})
+    rear_axle = 2.7 / math.tan(0.3)
+    assert vehicle.motion.vx == pytest.approx(1.0, rel=1e-6)
+    assert radius(vehicle) == pytest.approx(math.hypot(rear_axle, 1.5), rel=1e-5)
+
+
+@pytest.mark.parametrize("has_tyres", [False, True])
+def test_the_speed_follows_the_first_order_response(has_tyres: bool) -> None:
+    vehicle = driven(BicycleDrive(CAR, has_tyres), 0.5, {SPEED: 1.5})
+    assert vehicle.motion.vx == pytest.approx(1.5 * (1 - math.exp(-1)), rel=1e-5)
+
+
+@pytest.mark.parametrize("has_tyres", [False, True])
+def test_motor_brakes_and_ground_limit_the_acceleration(has_tyres: bool) -> None:
+    def gained(start: float, asked: float, power: float = 1.0, friction: float = 1.0) -> float:
+        drive = BicycleDrive(replace(CAR, friction=friction), has_tyres, by_speed=False, power=power)
+        vehicle = Vehicle(100, drive=drive)
+        vehicle.motion = BodyMotion(start)
+        vehicle.update(0)
+        vehicle.request(ACCELERATION, asked)
+        return vehicle.update(SECOND).vx - start
+
+    assert [gained(10, 2.0), gained(10, 9.0), gained(10, -20.0)] == pytest.approx([2.0, 4.0, -8.0])
+    assert [gained(10, 2.0, power=0.5), gained(10, 9.0, friction=0.1)] == pytest.approx([1.0, 0.1 * GRAVITY])
+    assert gained(3, -8.0) == pytest.approx(-3.0)  # and it stands
+    assert gained(0, -8.0) == 0.0
+
+
+def test_the_wheel_turns_at_its_rate_to_its_limit_and_the_offset_comes_beyond_it() -> None:
+    drive = BicycleDrive(CAR, offset=0.05)
+    angles = [driven(drive, 0.0, {}).odometry[1].value]
+    for seconds in (0.5, 1.0):
+        drive.reset()
+        angles.append(driven(drive, seconds, {STEERING: 2.0}).odometry[1].value)
+    drive.reset()
+    angles.append(driven(drive, 3.0, {STEERING: 2.0}).odometry[1].value)
+    assert angles == pytest.approx([0.05, 0.3, 0.55, 0.65])
+
+
+@pytest.mark.parametrize("speed", [10.0, 20.0, 30.0])
+def test_a_steady_turn_has_the_understeer_gradient(speed: float) -> None:
+    """Yaw rate = v δ / (L + K v²), K = m/L (lr/Cf - lf/Cr), for small angles (Rajamani, Vehicle Dynamics, 3.3)."""
+    motion = driven(BicycleDrive(CAR, True), 14.0, {STEERING: 0.004, SPEED: speed}).motion
+    gradient = 1500 / 2.7 * (1.5 / 90_000 - 1.2 / 110_000)
+    assert motion.yaw_rate == pytest.approx(motion.vx * 0.004 / (2.7 + gradient * motion.vx**2), rel=2e-3)
+
+
+def test_the_ground_holds_the_car_no_better_than_its_friction() -> None:
+    for has_tyres in (False, True):
+        motion = driven(BicycleDrive(replace(CAR, friction=0.3), has_tyres), 9.0, {STEERING: 0.3, SPEED: 15.0}).motion
+        assert abs(motion.vx * motion.yaw_rate) <= 0.3 * GRAVITY * 1.01
+
+
+def equations(car: SingleTrack, asked: float) -> Callable[[float, list[float]], list[float]]:
+    """Of a car above its blend speed that brakes with 2 m/s2, as the README has them."""
+
+    def derivative(time: float, state: list[float]) -> list[float]:
+        vx, vy, r = state
+        delta = min(asked, 0.5 * time)
+        lr, weight = car.wheel_base - car.cg, car.mass * GRAVITY
+        forces = []
+        for slip, stiffness, share in (
+            (delta - math.atan2(vy + car.cg * r, vx), car.cornering_front, lr / car.wheel_base),
+            (-math.atan2(vy - lr * r, vx), car.cornering_rear, car.cg / car.wheel_base),
+        ):
+            most = math.sqrt((car.friction * weight * share) ** 2 - (car.mass * share * 2.0) ** 2)
+            forces.append(most * math.tanh(stiffness * slip / most))
+        front, rear = forces
+        return [
+            -2.0 + vy * r - front * math.sin(delta) / car.mass,
+            (front * math.cos(delta) + rear) / car.mass - vx * r,
+            (car.cg * front * math.cos(delta) - lr * rear) / car.inertia,
+        ]
+
+    return derivative
+
+
+@pytest.mark.parametrize(("steering", "friction"), [(0.05, 1.0), (0.3, 1.0), (0.2, 0.4)])
+def test_tyres_agree_with_a_solver_of_high_order(steering: float, friction: float) -> None:
+    car = replace(CAR, friction=friction)
+    vehicle = Vehicle(100, drive=BicycleDrive(car, True, by_speed=False))
+    vehicle.motion = BodyMotion(20.0)
+    vehicle.update(0)
+    vehicle.request(STEERING, steering)
+    vehicle.request(ACCELERATION, -2.0)
+    for number in range(1, 151):
+        motion = vehicle.update(number * 10_000)
+    exact = solve_ivp(equations(car, steering), (0.0, 1.5), [20.0, 0.0, 0.0], rtol=1e-10, atol=1e-12, max_step=0.005)
+    assert [motion.vx, motion.vy, motion.yaw_rate] == pytest.approx(list(exact.y[:, -1]), rel=1e-4, abs=1e-5)
+
+
+@pytest.mark.parametrize("freq", [10, 100])
+def test_tyres_are_stable_from_a_standstill_through_the_blend_and_back(freq: int) -> None:
+    drive = BicycleDrive(CAR, True)
+    vehicle = Vehicle(freq, drive=drive)
+    vehicle.request(STEERING, 0.2)
+    for number in range(20 * freq):
+        now = number * SECOND // freq
+        vehicle.request(SPEED, -1.0 if number > 12 * freq else 6.0)
+        before, motion = vehicle.motion, vehicle.update(now)
+        assert abs(motion.yaw_rate - before.yaw_rate) < 40.0 / freq
+        rolling = drive._rolling(motion.vx, drive.wheel)
+        assert abs(motion.yaw_rate - rolling.yaw_rate) < 0.2 and abs(motion.vy - rolling.vy) < 0.6
+    assert motion.vx == pytest.approx(-1.0, rel=1e-3) and motion.yaw_rate == pytest.approx(
+        -math.tan(0.2) / 2.7, rel=1e-3
+    )
+
+
+def test_a_centre_of_mass_behind_the_rear_axle_is_refused() -> None:
+    with pytest.raises(ValueError, match="--cg=3 is not before the rear axle"):
+        replace(CAR, cg=3.0)
