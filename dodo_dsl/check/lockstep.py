@@ -43,15 +43,11 @@ def rates_fit(rate: float, step: float) -> bool:
 def answers(wiring: Wiring) -> list[str]:
     """The messages that answer a frame, each once: those that the application declares, else those that drive the
     vehicle, else those that are judged, and what it prints; empty without any."""
-    declared = _names(wiring.answers)
     expected = [end for end in _from_application(wiring) if _is_expected(end, wiring)]
-    driving = _names(end for end in expected if end.layer == "action")
-    judged = (e for e in expected if e.layer == "evaluation" and not e.port.name.startswith(DETECTIONS))
-    if declared or not (printed := [end for end in wiring.printed if not end.port.name.startswith(DETECTIONS)]):
-        return declared or driving or _names(judged)
-    chosen = [end for end in expected if end.layer == "action"] or list(judged)
-    missing = [end for end in printed if not any(each.port.consumes(end.port) for each in chosen)]
-    return _names([*chosen, *missing])
+    once = [end for end in (*expected, *wiring.printed) if not end.port.name.startswith(DETECTIONS)]
+    chosen = [end for end in expected if end.layer == "action"] or [end for end in once if end.layer == "evaluation"]
+    printed = [end for end in wiring.printed if end in once and not any(c.port.consumes(end.port) for c in chosen)]
+    return _names(wiring.answers) or _names([*chosen, *printed])
 
 
 def other_inputs(wiring: Wiring) -> list[str]:
