@@ -26,7 +26,19 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("judged")]
 REGISTRY = ROOT / "tests_registry"
 STRAIGHT, CURVE, SIGNAL, DRIVER = "sil-closed-straight", "sil-closed-left-curve", "sil-open-straight", "dil-kiwi-track"
 CONES, BOARD = "sil-perception--light-1--clutter-0", "dil-static-rig"
-ALL = (STRAIGHT, CURVE, "sil-closed-kiwi-track", SIGNAL, "sil-open-left-curve", CONES, BOARD, DRIVER)
+CARS = ("sil-closed-two-cars", "sil-perception-cars")
+ALL = (
+    STRAIGHT,
+    CURVE,
+    "sil-closed-kiwi-track",
+    SIGNAL,
+    "sil-open-left-curve",
+    CONES,
+    BOARD,
+    DRIVER,
+    *CARS,
+    "sil-empty-pictures",
+)
 CLOSE = {"rel": 1e-9, "abs": 1e-9}
 STEERING = "opendlv.proxy.GroundSteeringRequest"
 BOX, PROPERTY = "opendlv.logic.perception.DetectionBoundingBox", "opendlv.logic.perception.DetectionProperty"
