@@ -172,10 +172,10 @@ def test_what_does_not_convert_is_said_once_and_is_no_message(desk: Desk) -> Non
     ]
 
 
-def test_a_message_that_is_too_large_is_said(tmp_path: Path) -> None:
+def test_a_message_that_is_too_large_is_said_once(tmp_path: Path) -> None:
     desk = Desk(tmp_path, Line("(?P<s>x+)", "t.All"), messages=TYPES)
     assert len(desk.print(b"x" * 10_000)) == 1
-    assert desk.print(b"x" * MAX_LINE) == []
+    assert desk.print(b"x" * MAX_LINE, b"x" * MAX_LINE) == []
     assert desk.said == ["a line of 'app' makes a message of more than 32768 bytes, which is not sent"]
 
 
