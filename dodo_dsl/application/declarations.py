@@ -90,6 +90,9 @@ def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnost
             fix = only_fix(name, services, taken)
             yield Diagnostic(span, _RULE, message, did_you_mean(name, services), fix=fix)
     gone = left_out(document, declarations)
+    if gone and gone.keys() == services.keys():
+        message = "'without' leaves out every service of the application, so that a test has nothing to start"
+        yield Diagnostic(declarations.without[0].span, _RULE, message, "keep the services that the test is about")
     for name, entry in declarations.services.items():
         if name in gone:
             yield Diagnostic(entry.key, _RULE, f"'{name}' is declared, but {gone[name]}", "remove one of them")

@@ -17,6 +17,8 @@ SAMPLE_TIME = "sample_time"
 """The group that is a message's sample time in microseconds, and no field."""
 _SYNTAX = "patterns are those of RE2, https://github.com/google/re2/wiki/Syntax"
 _MAX_MEMORY = 8 << 20
+_MAX_SIZE = 1000
+"""Instructions of a pattern, by which the time of a line grows, too; a usual one has less than a hundred."""
 _PLAIN_GROUP = re.compile(r"(?<!\\)(?:\\\\)*\((?!\?)")
 
 
@@ -31,12 +33,15 @@ def compiled(pattern: str) -> Any:
     options = re2.Options()
     options.log_errors, options.max_mem = False, _MAX_MEMORY
     try:
-        return re2.compile(pattern.encode(), options)
+        found = re2.compile(pattern.encode(), options)
     except re2.error as error:
         text = error.args[0] if error.args else ""
         raise PatternError(text.decode(errors="replace") if isinstance(text, bytes) else str(text)) from None
     except UnicodeEncodeError:
         raise PatternError("it is no text in UTF-8") from None
+    if found.programsize > _MAX_SIZE:
+        raise PatternError(f"it is as large as {found.programsize} instructions of RE2, expected at most {_MAX_SIZE}")
+    return found
 
 
 def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterator[Diagnostic]:

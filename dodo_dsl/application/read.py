@@ -75,7 +75,7 @@ def read_application(
     found.extend(unread(paths, root))
     found.extend(_shared(document, application))
     found.extend(declared.depending(application, gone))
-    found.extend(application_problems(application, _first(services, declarations)))
+    found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
     refused = {problem.span for problem in found}
@@ -96,12 +96,6 @@ def as_written(path: Path) -> ApplicationSource | None:
     if document is None or not isinstance(services, source.Mapping) or has_errors(validate(document, "application")):
         return None
     return _application(path.resolve(), document, services, files, Access(), SandboxLimits())
-
-
-def _first(services: source.Mapping, declarations: Declarations) -> Span:
-    """The place of the first service, or of the first that is left out where all are."""
-    entries = list(services.entries.values())
-    return entries[0].key if entries else next((word.span for word in declarations.without), services.span)
 
 
 def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:

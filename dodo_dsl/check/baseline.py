@@ -117,12 +117,15 @@ def results(path: Path, _changed_ns: int) -> dict[str, list[Check]] | str:
         return tests if wrong is None else f"not a results.json of DoDo: a check of '{wrong[:60]}' is malformed"
     except OSError as error:
         return f"cannot be read: {error.strerror}"
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         return "not a results.json of DoDo"
 
 
 def _is_check(check: Any) -> bool:
-    return isinstance(check["name"], str) and isinstance(check["limit"], dict) and _is_number(check["value"])
+    name = check["name"]
+    return (
+        isinstance(name, str) and name.isprintable() and isinstance(check["limit"], dict) and _is_number(check["value"])
+    )
 
 
 def _is_number(value: Any) -> bool:

@@ -4,6 +4,8 @@ Sources only say so much: messages that are sent under names of requests, those 
 built in. What they do not say is left to the user.
 """
 
+import contextlib
+import itertools
 import json
 import os
 import re
@@ -18,15 +20,17 @@ from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.pictures import pictures_of
 from dodo_dsl.application.read import as_written
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.spec.manifest import load_manifests
 
 _FORMATS = {"argb": "video0.argb", "i420": "video0.i420", "bgr": "", "rgb": ""}
 """Formats of pictures, with the names that services give them by default."""
 _SUFFIXES = (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h", ".py")
-_MOST_FILES, _MOST_BYTES = 200, 200_000
-"""Sources that are read; the generated headers with all messages are larger."""
+_MOST_FOLDERS, _MOST_FILES, _MOST_BYTES = 20_000, 200, 200_000
+"""Folders that are searched, and sources that are read; the generated headers with all messages are larger."""
 _SKIPPED = ("build", "node_modules", "third_party", "venv")
-_COMMENTS = re.compile(r"/\*.*?\*/|(?://|#(?!include))[^\n]*", re.DOTALL)
+_COMMENTS = re.compile(r"/\*.*?(?:\*/|\Z)|(?://|#(?!include))[^\n]*", re.DOTALL)
+"""Also one without an end, which the search would begin again in each place."""
 _MESSAGE = re.compile(r"opendlv(?:::|_|\.)proxy(?:::|_|\.)(?P<name>[A-Z][A-Za-z]+)")
 _HEARD = re.compile(r"dataTrigger\s*\(\s*opendlv::proxy::(?P<name>[A-Z][A-Za-z]+)::ID")
 _SENDS = re.compile(r"\.\s*send\s*\(")
@@ -121,18 +125,19 @@ def _said(service: ComposeService, application: ApplicationSource) -> str:
 
 
 def _sources(folder: Path) -> Iterator[str]:
-    """The texts of sources without comments."""
+    """The texts of sources without comments; those that cannot be read say nothing."""
     count = 0
-    for place, folders, names in os.walk(folder):
+    for place, folders, names in itertools.islice(os.walk(folder), _MOST_FOLDERS):
         folders[:] = sorted(name for name in folders if not name.startswith(".") and name not in _SKIPPED)
-        for name in sorted(names):
-            path = Path(place) / name
-            if path.suffix not in _SUFFIXES or path.is_symlink() or path.stat().st_size > _MOST_BYTES:
+        for path in (Path(place) / name for name in sorted(names)):
+            if path.suffix not in _SUFFIXES or path.is_symlink():
                 continue
             count += 1
             if count > _MOST_FILES:
                 return
-            yield _COMMENTS.sub(" ", path.read_text(encoding="utf-8", errors="replace"))
+            with contextlib.suppress(OSError):
+                text = regular_file.content(path, _MOST_BYTES).decode("utf-8", "replace")
+                yield _COMMENTS.sub(" ", text)
 
 
 def _item(name: str) -> str:

@@ -208,11 +208,17 @@ class PrintedLines:
         for printed in self.services[service].take(line.rstrip(b"\r"), self._note):
             frame = frame_of(printed.message, self._messages, printed.sample_time, printed.sender)
             if len(frame) > MAX_FRAME:
-                self._note(f"a line of '{service}' makes a message of more than {MAX_FRAME} bytes, which is not sent")
+                self._note_once(service)
                 continue
             if time.monotonic() - self._told_s > _AGAIN_S:
                 self._tell()
             self._send(frame)
+
+    def _note_once(self, service: str) -> None:
+        said, key = self.services[service].said, f"more than {MAX_FRAME} bytes"
+        if key not in said:
+            said.add(key)
+            self._note(f"a line of '{service}' makes a message of {key}, which is not sent")
 
     def _tell(self) -> None:
         self._told_s = time.monotonic()

@@ -71,3 +71,11 @@ def test_editors_know_the_keys_of_a_service() -> None:
     found = keys_at("deployment", ("application", "services", "driver", "out"))
     assert found is not None
     assert (found["type"], found["description"]) == ("array", "Messages that the service produces.")
+
+
+def test_a_service_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "docker-compose.yml").write_text(COMPOSE)
+    (tmp_path / "dodo.yml").write_text("application: {files: docker-compose.yml, without: [viewer, driver]}\ndodo: 1\n")
+    (problem,) = load([]).problems.common
+    assert problem.message.startswith("'without' leaves out every service of the application")

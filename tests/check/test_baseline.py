@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.check import baseline
 from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.outcome import against_baseline
 from dodo_dsl.spec.matrix import Choice
@@ -76,3 +77,15 @@ def test_the_side_of_the_limit_says_what_is_worse(
     ((found, _),) = against_baseline([now], [RecordedValue("x", before, tolerance)])
     assert (found["limit"], found["ok"]) == (pytest.approx(limit), ok)
     assert found["margin"] is None or (found["margin"] >= 0) is ok
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"value": 10**400}, {"name": "\x1b[31m"}, {"name": "\ud800"}, {"value": float("nan")}],
+    ids=["huge", "control", "surrogate", "nan"],
+)
+def test_what_no_report_holds_is_no_baseline(tmp_path: Path, wrong: dict[str, Any]) -> None:
+    tests = [{"slug": "a", "checks": [{**check("mean", 0.1, max=1), **wrong}]}]
+    (tmp_path / "r.json").write_text(json.dumps({"dodo": "results", "version": 1, "tests": tests}))
+    found = baseline.results(tmp_path / "r.json", 0)
+    assert isinstance(found, str) and found.startswith("not a results.json of DoDo")

@@ -110,7 +110,12 @@ def _instances(node: Node) -> tuple[Instance, ...]:
 
 def _frames(node: Node) -> tuple[int, ...]:
     found: list[int] = []
-    for item in node.items("frames"):
+    items = list(node.items("frames"))
+    if len(items) > MAX_FRAMES:
+        raise MapError(
+            node.file, f"{len(items)} frames of a model, expected at most {MAX_FRAMES}", f"{node.place}.frames"
+        )
+    for item in items:
         if isinstance(item.value, bool) or not isinstance(item.value, int) or not 0 <= item.value <= MAX_STAMP:
             item.fail(f"a sender stamp, a whole number from 0 to {MAX_STAMP}")
         if item.value in found:
@@ -195,7 +200,7 @@ def read_frames(path: Path) -> tuple[int, ...]:
                 found.update(_frames(model))
     except MapError:
         return ()
-    return tuple(sorted(found))
+    return tuple(sorted(found)) if len(found) <= MAX_FRAMES else ()
 
 
 def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:

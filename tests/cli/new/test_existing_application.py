@@ -1,5 +1,6 @@
 """dodo new beside a team's compose file: what it leaves out, declares, and takes for the pictures of tests."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -90,3 +91,11 @@ def test_a_compose_file_that_says_all_is_named_alone(tmp_path: Path) -> None:
     file.write_text("services: {steer: {build: ., command: --cid=1, x-dodo: {out: [opendlv.proxy.AngleRequest]}}}")
     (tmp_path / "steer.py").write_text("session.send(opendlv_proxy_AngleRequest())")
     assert declarable(file) is None
+
+
+def test_sources_that_cannot_be_read_say_nothing(repository: Path) -> None:
+    os.mkfifo(repository / "src/a.cpp")
+    (repository / "src/b.cpp").symlink_to(repository / "gone")
+    (repository / "src/c.cpp").write_text("/* " * 60_000)  # a comment that may begin at each of them, without an end
+    assert run("new", "--deployment")[0] == 0
+    assert "GroundSteeringRequest" in (repository / "dodo.yml").read_text()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.printed_lines import compiled
+from dodo_dsl.application.printed_lines import PatternError, compiled
 from dodo_dsl.opendlv.address import LINES
 from dodo_dsl.opendlv.authentication import is_proven
 from dodo_dsl.opendlv.envelope import Envelope, decode_frame
@@ -172,10 +172,10 @@ def test_what_does_not_convert_is_said_once_and_is_no_message(desk: Desk) -> Non
     ]
 
 
-def test_a_message_that_is_too_large_is_said(tmp_path: Path) -> None:
+def test_a_message_that_is_too_large_is_said_once(tmp_path: Path) -> None:
     desk = Desk(tmp_path, Line("(?P<s>x+)", "t.All"), messages=TYPES)
     assert len(desk.print(b"x" * 10_000)) == 1
-    assert desk.print(b"x" * MAX_LINE) == []
+    assert desk.print(b"x" * MAX_LINE, b"x" * MAX_LINE) == []
     assert desk.said == ["a line of 'app' makes a message of more than 32768 bytes, which is not sent"]
 
 
@@ -285,3 +285,9 @@ def test_a_hostile_pattern_takes_time_in_proportion_to_the_line() -> None:
 def test_patterns_have_only_the_messages_that_they_name() -> None:
     with pytest.raises(KeyError):
         LinePattern(Line("(?P<x>.)", "a.B"), MessageSet.standard())
+
+
+def test_a_large_pattern_is_refused_as_the_time_of_a_line_grows_with_it_too() -> None:
+    with pytest.raises(PatternError, match="instructions of RE2, expected at most 1000"):
+        compiled("(?P<position>" + "(?:[ab]?){1000}" * 100 + "c)")
+    assert compiled(GROUP_06.match).programsize < 100

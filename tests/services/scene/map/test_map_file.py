@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.opendlv.assets.json_file import MAX_BYTES, MapError, Node
-from dodo_dsl.opendlv.assets.map_file import MAX_BLOCKS, read_map
+from dodo_dsl.opendlv.assets.map_file import MAX_BLOCKS, read_frames, read_map
 
 GOOD_MODEL = {"name": "cube", "file": "cube.obj", "color": [1, 0, 0.5], "instances": [[1, 2, 3, 0.5]]}
 GOOD_BLOCK = {"name": "floor", "dimension": [10, 10, 0.2], "color": [0, 0, 0], "instances": [[0, 0, 0, 0]]}
@@ -84,8 +84,16 @@ BAD_MODELS = [
     ({"frames": [2**32]}, "$.model[0].frames[0]: expected a sender stamp"),
     ({"frames": [-1]}, "$.model[0].frames[0]: expected a sender stamp"),
     ({"frames": [3, 3]}, "$.model[0].frames[1]: the sender stamp 3 appears twice"),
-    ({"frames": list(range(101))}, "$.model: 101 frames of models, expected at most 100"),
+    ({"frames": list(range(101))}, "$.model[0].frames: 101 frames of a model, expected at most 100"),
 ]
+
+
+def test_frames_of_all_models_are_few(write_map):
+    models = [changed(GOOD_MODEL, name=name, frames=list(range(60 * n, 60 * n + 60))) for n, name in enumerate("ab")]
+    folder = write_map({"model": models})
+    with pytest.raises(MapError, match="120 frames of models, expected at most 100"):
+        read_map(folder)
+    assert read_frames(folder) == ()
 
 
 @pytest.mark.parametrize(("change", "message"), BAD_MODELS)
