@@ -28,8 +28,8 @@ from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS, is_goal, is_valid
 
 FORMAT = 1
-_RARE = frozenset({"lines"})
-"""Keys of the application's services that are written where there is a value."""
+_RARE = frozenset({"lines", "baseline"})
+"""Keys that are written where there is a value."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -39,7 +39,7 @@ class PlanError(ValueError):
 
 def to_json(plan: Plan) -> str:
     application = {**_shallow(plan.application), "services": [*map(_without_nothing, plan.application.services)]}
-    document = {"dodo": "plan", "version": FORMAT, **_shallow(plan), "application": application}
+    document = {"dodo": "plan", "version": FORMAT, **_without_nothing(plan), "application": application}
     return json_text(document, orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
 
 
@@ -47,8 +47,8 @@ def _shallow(value: Any) -> dict[str, Any]:
     return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
 
 
-def _without_nothing(service: ApplicationService) -> dict[str, Any]:
-    return {name: value for name, value in _shallow(service).items() if value or name not in _RARE}
+def _without_nothing(value: Any) -> dict[str, Any]:
+    return {name: each for name, each in _shallow(value).items() if each or name not in _RARE}
 
 
 def json_text(value: Any, option: int = 0) -> str:
