@@ -61,7 +61,7 @@ class ResolvedService:
             return self.texts.get(placeholder)
         argument = self.arguments.get(frames["map"])
         path = argument.value.path if argument and argument.value else None
-        if path is None or (frames["condition"] and self.texts.get(frames["condition"]) != "true"):
+        if path is None:
             return None
         stamps = map(str, map_file.read_frames(path))
         return ",".join(f"{FRAME}/{stamp}" for stamp in stamps if stamp != self.texts.get("frame-id")) or None

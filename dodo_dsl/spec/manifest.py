@@ -21,8 +21,8 @@ RULE = "wrong-manifest"
 RESERVED = ("cid", "help")
 
 _PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
-FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames(?: if (?P<condition>[a-z0-9.-]+))?")
-"""A placeholder for the frames at which a map has models, as in ``{map-path.frames if bodies}``."""
+FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames")
+"""A placeholder for the frames at which a map has models, as in ``{map-path.frames}``."""
 _NUMBERS = ("number", "integer", "amount")
 _TEXTS = ("string", "memory", "message", "output")
 _DEFAULTS: dict[str, tuple[type, ...]] = {
