@@ -12,6 +12,7 @@ from dodo_dsl.application.read import as_written
 from dodo_dsl.cli import existing_application, new_files, new_test
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.new_files import (
+    ANSWERS,
     COMPOSE_FILES,
     LANGUAGES,
     REGISTRY,
@@ -157,13 +158,16 @@ def _registry(deployment: Deployment, diagnostics: Sequence[Diagnostic]) -> Path
 _FIRST = "sil-first"
 _BUILDS = {"cpp": ("cmake -B build", "cmake --build build --parallel --target steering")}
 """How programs are built that have to be."""
+_TESTS = {"wheels": f"application/wheels/{_FIRST}.dodo.yml"}
+"""Templates of first tests other than the usual one, by how the application answers."""
 _PUSH = "commit and push; GitLab runs the tests, on a runner with the tag sil"
 
 
-def new_application(language: str, stdout: TextIO, stderr: TextIO) -> int:
+def new_application(language: str, answers: str, stdout: TextIO, stderr: TextIO) -> int:
     root = Path.cwd()
-    own = application_files(root, language)
-    first = new_test.test_files(_FIRST, new_test.start(new_test.LEVEL, new_test.KIND).template, root / REGISTRY, root)
+    own = application_files(root, language, answers)
+    usual = new_test.start(new_test.LEVEL, new_test.KIND).template
+    first = new_test.test_files(_FIRST, _TESTS.get(answers, usual), root / REGISTRY, root)
     taken = [*(file.path for file in (*own, *first)), *(root / name for name in (*COMPOSE_FILES, FILE_NAME))]
     if there := [path for path in taken if path.exists()]:
         advice = "dodo new --deployment keeps what there is"
@@ -222,6 +226,7 @@ EXAMPLES = """examples:
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --application --language cpp                the same in C++, on libcluon
+  dodo new --application --answers printed             one that prints its answers; wheels: two wheels, range sensors
   dodo new --deployment                                dodo.yml, application and pipeline in this folder
 """
 
@@ -241,6 +246,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--language", choices=LANGUAGES, help="language of the application that --application writes (default: python)"
     )
     parser.add_argument(
+        "--answers",
+        choices=ANSWERS,
+        help="how that application answers: steering and pedal on the bus, the same printed, or a pedal for each of "
+        "two wheels, by range sensors (default: bus)",
+    )
+    parser.add_argument(
         "--level", choices=LEVELS, help="level of the new test: software, data or hardware in the loop (default: sil)"
     )
     parser.add_argument("--kind", choices=KINDS, help="kind of the new test (default: closed-loop)")
@@ -251,15 +262,16 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    if options.language and not options.application:
-        raise UsageError("--language applies to --application")
+    for flag in ("language", "answers"):
+        if getattr(options, flag) and not options.application:
+            raise UsageError(f"--{flag} applies to --application")
     if options.deployment or options.application:
         if options.level or options.kind or options.extends or options.rec:
             words = "--level, --kind, --extends and --rec"
             raise UsageError(f"{words} apply to a test, not to --deployment and --application")
         if options.deployment:
             return new_deployment(stdout, stderr)
-        return new_application(options.language or LANGUAGES[0], stdout, stderr)
+        return new_application(options.language or LANGUAGES[0], options.answers or ANSWERS[0], stdout, stderr)
     return _test(options, stdout)
 
 

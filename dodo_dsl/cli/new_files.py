@@ -46,10 +46,12 @@ REGISTRY = "tests"
 _SCHEMAS = ".dodo"
 _PROCESSES = {"python": "python, steering.py", "cpp": "build/steering"}
 LANGUAGES = tuple(_PROCESSES)
-"""Of the application that ``dodo new --application`` writes."""
+ANSWERS = ("bus", "printed", "wheels")
+"""Of the application that ``dodo new --application`` writes, as are its languages."""
 PIPELINES = ("application", "deployment", "run")
 """The templates for GitLab, each of them a component in its folder."""
 _SPEC_SCHEMA = "dodo.schema.json"
+_MESSAGES = "messages.odvd"
 
 
 def compose_file(root: Path) -> str:
@@ -87,15 +89,18 @@ def dodo_yml(root: Path, application: str) -> New:
     return New(root / FILE_NAME, filled("deployment/dodo.yml", **values))
 
 
-def application_files(root: Path, language: str) -> list[New]:
-    """A small application that drives, and how it starts."""
-    folder = f"application/{language}"
-    values = {"base": f"dodo/vision:{__version__}"}
-    templates = (package_data.templates() / "new" / folder).iterdir()
-    sources = sorted(path.name for path in templates if path.is_file())  # an installed one has __pycache__ beside them
-    compose = filled("application/docker-compose.yml", process=_PROCESSES[language])
-    files = [New(root / name, filled(f"{folder}/{name}", **values)) for name in sources]
-    return [*files, New(root / COMPOSE_FILES[0], compose)]
+def application_files(root: Path, language: str, answers: str) -> list[New]:
+    """A small application that drives, and how it starts; what ``answers`` changes stands in a folder of that name."""
+    values = {"base": f"dodo/vision:{__version__}", "process": _PROCESSES[language], "answers": answers}
+    folder = package_data.templates() / "new/application"
+    usual = [path for path in (folder / language).iterdir() if path.is_file()]  # an installed one has __pycache__
+    sources = {path.name: f"{language}/{path.name}" for path in sorted(usual)}
+    own = [*sources, FILE_NAME]
+    sources |= {name: f"{answers}/{name}" for name in own if (folder / answers / name).is_file()}
+    sources[COMPOSE_FILES[0]] = COMPOSE_FILES[0]
+    if answers == "printed":
+        sources.pop(_MESSAGES, None)
+    return [New(root / name, filled(f"application/{place}", **values)) for name, place in sources.items()]
 
 
 def included(images: bool) -> tuple[str, ...]:

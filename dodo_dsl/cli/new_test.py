@@ -174,7 +174,7 @@ def copied_files(
     """The test of ``instances`` as ``name`` in ``registry``, with the files that it needs and the registry lacks."""
     return [
         *spec_files(name, registry / name, root, _text(name, instances[0])),
-        *_files(instances, manifests, registry),
+        *_files(name, instances, manifests, registry),
     ]
 
 
@@ -197,13 +197,17 @@ def _text(name: str, base: Spec) -> bytes:
     return str(text).encode()
 
 
-def _files(instances: Sequence[Spec], manifests: Mapping[str, Manifest], registry: Path) -> Iterator[New]:
-    """The files that the test names, each once; existing maps and recordings are kept."""
+def _files(name: str, instances: Sequence[Spec], manifests: Mapping[str, Manifest], registry: Path) -> Iterator[New]:
+    """The files that the test names, each once; existing maps and recordings are kept, and its own are the copy's."""
+    root = instances[0].location.root.resolve()
+    own = instances[0].path.resolve().parent.relative_to(root)
     for path in dict.fromkeys(path for spec in instances for path in _paths(spec, manifests)):
-        root = instances[0].location.root.resolve()
-        if (registry / path.relative_to(root)).exists():
+        if (registry / path.relative_to(root)).exists() and not path.relative_to(root).is_relative_to(own):
             continue
-        yield from (New(registry / copy.target, copy.source.read_bytes()) for copy in copies(path, root))
+        for copy in copies(path, root):
+            target = Path(copy.target)
+            place = Path(name) / target.relative_to(own) if target.is_relative_to(own) else target
+            yield New(registry / place, copy.source.read_bytes())
 
 
 def _paths(spec: Spec, manifests: Mapping[str, Manifest]) -> Iterator[Path]:

@@ -1,4 +1,4 @@
-"""The tutorial is what happens."""
+"""The tutorial and the page for existing projects are what happens."""
 
 import sys
 from pathlib import Path
@@ -7,12 +7,13 @@ import pytest
 
 from tests.contributing.tutorial import Command, Edit, New, follow, steps
 
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.mark.slow
-def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
-    follow(TUTORIAL / "python.md", tmp_path, Path(sys.executable).parent)
+@pytest.mark.parametrize("page", ["tutorial/python.md", "how-to/existing-project.md"])
+def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
+    follow(DOCS / page, tmp_path, Path(sys.executable).parent)
 
 
 def test_a_page_is_read_as_its_reader_does() -> None:

@@ -14,6 +14,7 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.cli.errors import NO_APPLICATION
 from dodo_dsl.cli.main import main
+from dodo_dsl.cli.new_files import LANGUAGES
 from dodo_dsl.cli.new_test import kinds
 from dodo_dsl.compiler import load
 from dodo_dsl.opendlv import odvd
@@ -363,19 +364,76 @@ def test_libcluon_is_the_header_beside_the_program_or_is_fetched(
     assert (empty / "build/cluon-msc.cpp").exists() is is_there
 
 
-def test_a_language_is_that_of_an_application(empty: Path) -> None:
+def test_language_and_answers_are_those_of_an_application(empty: Path) -> None:
     assert dodo("new", "first", "--language", "cpp") == (2, "", "dodo new: --language applies to --application\n")
+    assert dodo("new", "--deployment", "--answers", "printed")[2] == "dodo new: --answers applies to --application\n"
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("answers", ["printed", "wheels"])
+def test_an_application_may_print_or_drive_by_two_wheels(empty: Path, language: str, answers: str) -> None:
+    code, _, err = dodo("new", "--application", "--language", language, "--answers", answers)
+    assert (code, err) == (0, "")
+    (service,) = yaml.safe_load((empty / "docker-compose.yml").read_text())["services"].values()
+    declared = yaml.safe_load((empty / "dodo.yml").read_text())["application"]
+    if answers == "printed":
+        assert not {"x-dodo", "x-dodo-process"} & service.keys()
+        said = [line["message"] for line in declared["services"]["steering"]["lines"]]
+        assert said == ["opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"]
+    else:
+        assert service["x-dodo"]["out"] == [f"opendlv.proxy.PedalPositionRequest/{wheel}" for wheel in (0, 1)]
+    own = (empty / "messages.odvd").exists()
+    assert own is (answers == "wheels" and language == "cpp")
+    if own:
+        standard = {definition.name: definition for definition in odvd.load(STANDARD)}
+        layouts = odvd.load(empty / "messages.odvd")
+        assert {each.name for each in layouts} == {
+            "opendlv.proxy.DistanceReading",
+            "opendlv.proxy.PedalPositionRequest",
+        }
+        assert all(each.same_layout(standard[each.name]) for each in layouts)
+    assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
+
+
+def run_first(folder: Path) -> None:
+    command = [sys.executable, "-m", "dodo_dsl", "run", "sil-first"]
+    environment = {**os.environ, "PYTHONPATH": str(package_data.root()), "DODO_LEASES": str(folder / "leases")}
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "PASSED  sil-first  reached finish after " in result.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("answers", ["wheels", *(pytest.param(a, marks=pytest.mark.proof) for a in ("bus", "printed"))])
+def test_the_application_passes_its_test(empty: Path, answers: str) -> None:
+    assert dodo("new", "--application", "--answers", answers)[0] == 0
+    run_first(empty)
 
 
 @pytest.mark.slow
 @pytest.mark.proof
-def test_the_application_passes_its_test(empty: Path) -> None:
-    assert dodo("new", "--application")[0] == 0
-    command = [sys.executable, "-m", "dodo_dsl", "run", "sil-first"]
-    environment = {**os.environ, "PYTHONPATH": str(package_data.root()), "DODO_LEASES": str(empty / "leases")}
-    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
-    assert result.returncode == 0, result.stdout + result.stderr
-    assert "PASSED  sil-first  reached finish after " in result.stdout
+def test_the_application_in_c_plus_plus_passes_its_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With libcluon as a header, ``LIBCLUON_HEADER=.../cluon-complete.hpp``; its cluon-msc is built once."""
+    header = os.environ.get("LIBCLUON_HEADER")
+    if not header or not shutil.which("cmake") or not shutil.which("g++"):
+        pytest.skip("LIBCLUON_HEADER names no cluon-complete.hpp, or cmake or g++ is not installed")
+    for name in ("CMAKE_GENERATOR", "CXX"):
+        monkeypatch.delenv(name, raising=False)
+    for answers in ("bus", "printed", "wheels"):
+        folder = tmp_path / answers
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        assert dodo("new", "--application", "--language", "cpp", "--answers", answers)[0] == 0
+        shutil.copy(header, folder / "cluon-complete.hpp")
+        msc = tmp_path / "bus/build/cluon-msc"
+        if answers == "wheels":  # what is built already
+            cmake = folder / "CMakeLists.txt"
+            cmake.write_text(cmake.read_text().replace("COMMAND cluon-msc", f"COMMAND {msc}"))
+            cmake.write_text(cmake.read_text().replace("DEPENDS cluon-msc", "DEPENDS"))
+        subprocess.run(["cmake", "-B", "build"], check=True, capture_output=True, timeout=300)
+        build = ["cmake", "--build", "build", "--target", "steering"]
+        subprocess.run(build, check=True, capture_output=True, timeout=600)
+        run_first(folder)
 
 
 @pytest.mark.parametrize("there", ["compose.yaml", "steering.py", "Dockerfile", "dodo.yml"])
