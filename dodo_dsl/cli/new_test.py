@@ -174,7 +174,7 @@ def copied_files(
     """The test of ``instances`` as ``name`` in ``registry``, with the files that it needs and the registry lacks."""
     return [
         *spec_files(name, registry / name, root, _text(name, instances[0])),
-        *_files(instances, manifests, registry),
+        *_files(name, instances, manifests, registry),
     ]
 
 
@@ -197,13 +197,18 @@ def _text(name: str, base: Spec) -> bytes:
     return str(text).encode()
 
 
-def _files(instances: Sequence[Spec], manifests: Mapping[str, Manifest], registry: Path) -> Iterator[New]:
-    """The files that the test names, each once; existing maps and recordings are kept."""
+def _files(name: str, instances: Sequence[Spec], manifests: Mapping[str, Manifest], registry: Path) -> Iterator[New]:
+    """The files that the test names, each once; existing maps and recordings are kept.
+
+    Those beside the spec come beside the copy, called ``name``.
+    """
+    root, own = instances[0].location.root.resolve(), instances[0].path.resolve().parent
     for path in dict.fromkeys(path for spec in instances for path in _paths(spec, manifests)):
-        root = instances[0].location.root.resolve()
-        if (registry / path.relative_to(root)).exists():
+        above, below = (own, registry / name) if own != root and path.is_relative_to(own) else (root, registry)
+        if (below / path.relative_to(above)).exists():
             continue
-        yield from (New(registry / copy.target, copy.source.read_bytes()) for copy in copies(path, root))
+        for copy in copies(path, root):
+            yield New(below / (root / copy.target).relative_to(above), copy.source.read_bytes())
 
 
 def _paths(spec: Spec, manifests: Mapping[str, Manifest]) -> Iterator[Path]:
