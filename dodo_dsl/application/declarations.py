@@ -90,6 +90,10 @@ def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnost
             fix = only_fix(name, services, taken)
             yield Diagnostic(span, _RULE, message, did_you_mean(name, services), fix=fix)
     gone = left_out(document, declarations)
+    if gone and len(gone) == len(services):
+        span = next(span for name, span in named if name in gone)
+        hint = "name a compose file that has the service of your program under 'files'"
+        yield Diagnostic(span, _RULE, "every service of the application is left out", hint)
     for name, entry in declarations.services.items():
         if name in gone:
             yield Diagnostic(entry.key, _RULE, f"'{name}' is declared, but {gone[name]}", "remove one of them")
