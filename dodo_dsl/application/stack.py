@@ -55,7 +55,9 @@ STACK = (
     ),
     Part(r"opendlv-(virtual|sim)-motor-.+", "dynamic-model moves the vehicle", is_world=True),
     Part(
-        r"opendlv-(virtual|sim)-(rangefinder|ultrasonic|ir|lidar).*", "range-finder measures distances", is_world=True
+        r"opendlv-(virtual|sim)-(rangefinder|ultrasonic|ir|lidar|adc).*",
+        "range-finder measures distances",
+        is_world=True,
     ),
     Part(
         r"opendlv-(virtual|sim)-(imu|gps|inertial|accelerometer|gyroscope|magnetometer).*",

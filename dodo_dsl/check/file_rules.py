@@ -24,7 +24,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.registry import SUFFIX
 
 RULE = "wrong-file"
-_TEXT = (".json", ".csv", ".obj", ".yml", ".yaml")
+_TEXT = (".json", ".csv", ".obj", ".txt", ".yml", ".yaml")
 """Endings of files whose lines can be shown."""
 
 
@@ -145,7 +145,8 @@ def entries(file: Path, key: str) -> tuple[str, ...] | str:
             return "not a regular file"
         if file.stat().st_size > _MAX_BYTES:
             return f"larger than {_MAX_BYTES >> 20} MiB"
-        document = json.loads(file.read_text(encoding="utf-8"))
+        is_walls = file.suffix == map_file.WALLS
+        document = map_file.load(file).value if is_walls else json.loads(file.read_text(encoding="utf-8"))
         found = document.get(key, []) if isinstance(document, dict) else None
         if not isinstance(found, list):
             return f"expected an object with a list '{key}'"

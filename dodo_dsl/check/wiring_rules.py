@@ -78,7 +78,9 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
-        hint = _otherwise(context, end) or "list it under x-dodo.out of the application's service that sends it"
+        hint = _otherwise(context, end) or (
+            "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
+        )
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
         hint = _who_could(context, wiring, end)

@@ -188,12 +188,17 @@ def new_deployment(stdout: TextIO, stderr: TextIO) -> int:
     files = deployment_files(Path.cwd())
     there = [file for file in files if file.path.exists()]
     new = [file for file in files if file not in there]
+    written = [file.path.name for file in new if file.path.name in COMPOSE_FILES]
+    others = ", ".join(new_files.other_compose_files(Path.cwd())) if written else ""
     write_new(new, stdout)
     included = _say_kept(there, False, stdout, stderr)
     if not new:
         stdout.write("\nnothing to write\n")
         return Exit.OK
-    named = [f"name your services in {file.path.name}" for file in new if file.path.name in COMPOSE_FILES]
+    instead = (
+        f", or name those that you have in {FILE_NAME}, of {others}: application: {{files: [...]}}" if others else ""
+    )
+    named = [f"name your services in {name}{instead}" for name in written]
     say_next([*named, *included, f"dodo new {_FIRST}", "dodo compile --check", _PUSH], stdout)
     return Exit.OK
 

@@ -4,6 +4,7 @@ Of a file that is kept it says what it lacks, and what in it meets DoDo's pipeli
 """
 
 import functools
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,8 @@ def filled(template: str, **values: object) -> bytes:
 
 
 COMPOSE_FILES = ("docker-compose.yml", "docker-compose.yaml", "compose.yml", "compose.yaml")
+_SERVICES = re.compile(rb"^services:", re.MULTILINE)
+_MOST_LOOKED, _MOST_NAMED, _MOST_BYTES = 200, 8, 20_000
 REGISTRY = "tests"
 _SCHEMAS = ".dodo"
 _PROCESSES = {"python": "python, steering.py", "cpp": "build/steering"}
@@ -57,6 +60,14 @@ _MESSAGES = "messages.odvd"
 def compose_file(root: Path) -> str:
     """The name of the compose file in a folder, empty when there is none."""
     return next((name for name in COMPOSE_FILES if (root / name).is_file()), "")
+
+
+def other_compose_files(root: Path) -> list[str]:
+    """Compose files of other names, and in the folders of the repository, as far as they are told apart at a glance."""
+    found = sorted((*root.glob("*.y*ml"), *root.glob("[!.]*/*.y*ml")), key=lambda path: (len(path.parts), path))
+    looked = (path for path in found[:_MOST_LOOKED] if path.is_file() and not path.is_symlink())
+    names = [str(path.relative_to(root)) for path in looked if _SERVICES.search(path.read_bytes()[:_MOST_BYTES])]
+    return names[:_MOST_NAMED]
 
 
 def schema_of_specs(root: Path) -> Path:

@@ -97,7 +97,7 @@ _ENVIRONMENT = "pyvenv.cfg"
 _HEAD = 4096
 _OF_MAPS = {".json", ".obj", ".mtl", ".png", ".jpg", ".jpeg", ".md"}
 _OF_RECORDINGS = {_RECORDING, ".mp4", ".md"}
-_DATA = _OF_MAPS | _OF_RECORDINGS | {".csv", ".yml", ".yaml"}
+_DATA = _OF_MAPS | _OF_RECORDINGS | {".csv", ".txt", ".yml", ".yaml"}
 _PLACEHOLDERS = re.compile(r"(\$\{[^}]*\}|\*)+")
 _WORD = re.compile(r"""[^\s'"\[\]{},:#]+""")
 

@@ -208,7 +208,12 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
         raise ValueProblem(scalar.span, "missing-file", message)
     if not target.is_relative_to(root.resolve()):
         message = f"{_name(parameter)}: '{scalar.text}' leaves the registry"
-        raise ValueProblem(scalar.span, "path-escape", message, "the files of a test must be in its registry")
+        raise ValueProblem(
+            scalar.span,
+            "path-escape",
+            message,
+            "the files of a test must be in its registry: copy them there",
+        )
     if not target.exists():
         beside = [p.name for p in target.parent.iterdir()] if target.parent.is_dir() else []
         message = f"{_name(parameter)}: there is no file or folder '{scalar.text}'"

@@ -22,6 +22,7 @@ _CASES = {
     "image: chalmersrevere/opendlv-virtual-motor-kiwid1-amd64": "differential",
     "image: opendlv-virtual-rangefinder-ultrasonic-srf08-amd64": "range-finder",
     "image: opendlv-virtual-rangefinder-ir-gp2y0a-amd64": "range-finder",
+    "image: registry.opendlv.org/community/opendlv-virtual-adc-bbblue:1.0": "range-finder",
     "image: chalmersrevere/opendlv-logic-distance-voltage-multi": "range-finder",
     "image: chalmersrevere/opendlv-device-camera-v4l-multi": "rig's camera",
     "image: chalmersrevere/opendlv-device-lidar-hdl32e-multi": "sensors",

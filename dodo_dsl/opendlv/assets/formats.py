@@ -13,7 +13,7 @@ from pathlib import Path
 
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import map_file, mesh_text
-from dodo_dsl.opendlv.assets.json_file import MapError, Node, read_bytes
+from dodo_dsl.opendlv.assets.json_file import MapError, read_bytes
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.numbers import number
 from dodo_dsl.opendlv.picture_size import problem_of
@@ -91,7 +91,7 @@ def _obstacles(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError
     if settings.get("bodies") == "true" and not {*map(str, map_file.read_frames(path))} - {settings["frame-id"]}:
         yield InputError(file, map_file.NO_BODIES, hint='give the model of another vehicle "frames": [1]')
     try:
-        found = list(map_file.unread_keys(Node.load(file)))
+        found = list(map_file.unread_keys(map_file.load(file)))
     except MapError as error:
         found = [error]
     yield from found

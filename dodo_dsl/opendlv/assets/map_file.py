@@ -175,10 +175,36 @@ def find_map(path: Path) -> Path:
     return path / "map.json" if path.is_dir() else path
 
 
+WALLS = ".txt"
+"""The suffix of a map of older simulations, which has walls alone."""
+_WALL = "a wall x1,y1,x2,y2; in m"
+
+
+def load(file: Path) -> Node:
+    """The document of a map; walls ``x1,y1,x2,y2;`` of a text file are its obstacles. Raises MapError."""
+    if file.suffix != WALLS:
+        return Node.load(file)
+    lines = enumerate(read_bytes(file).decode(errors="replace").splitlines(), 1)
+    walls = [_wall(file, wall, number) for number, line in lines for wall in line.split(";") if wall.strip()]
+    if not walls:
+        raise MapError(file, f"the file is empty, expected {_WALL}", line=1)
+    return Node(file, "$", {"obstacles": [{"lines": [wall]} for wall in walls]})
+
+
+def _wall(file: Path, text: str, line: int) -> list[float]:
+    try:
+        wall = [float(word) for word in text.split(",")]
+    except ValueError:
+        wall = []
+    if len(wall) != NUMBERS or not all(abs(value) <= MAX_NUMBER for value in wall):
+        raise MapError(file, f"expected {_WALL}, found '{text.strip()[:60]}'", line=line, hint="as -2,0,2,0;")
+    return wall
+
+
 def read_map(path: Path) -> MapFile:
     """Reads and checks the map in a folder (or a ``map.json``); MapError names the file and the JSON path."""
     file = find_map(path)
-    return _collected(file, Node.load(file), _raised)
+    return _collected(file, load(file), _raised)
 
 
 def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, ModelEntry]]:
@@ -207,7 +233,7 @@ def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
     """What can be drawn of a map, None for what is no map, and all that is wrong with it."""
     file, found = find_map(path), list[MapError]()
     try:
-        root = Node.load(file)
+        root = load(file)
         read = _collected(file, root, found.append)
     except MapError as error:
         return None, [error]
@@ -339,8 +365,7 @@ def read_obstacles(path: Path) -> dict[str, list[Line]]:
 
     Obstacles of one name are one; one without a name is named by its number. Raises MapError.
     """
-    file = path if path.suffix == ".json" else path / "map.json"
-    root = Node.load(file)
+    root = load(path if path.suffix in (".json", WALLS) else path / "map.json")
     require_few_lines(root)
     found: dict[str, list[Line]] = {}
     for number, entry in enumerate(root.items("obstacles"), 1):
@@ -361,7 +386,7 @@ Outline = tuple[tuple[float, float], ...]
 
 def read_footprints(path: Path, height: float = HIGHEST) -> dict[str, list[Outline]]:
     """As ``footprints``, of the map in a folder or of a ``map.json``; raises MapError."""
-    return footprints(_entries(Node.load(find_map(path)), "block", _block, _raised), height)
+    return footprints(_entries(load(find_map(path)), "block", _block, _raised), height)
 
 
 def footprints(blocks: Iterable[BlockEntry], height: float = HIGHEST) -> dict[str, list[Outline]]:

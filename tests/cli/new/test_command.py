@@ -244,8 +244,8 @@ def installed_in(repository: Path, patch: pytest.MonkeyPatch) -> Path:
 
 
 SHIPPED = sorted(path.parent.name for path in package_data.registry().glob("*/*.dodo.yml"))
-FEW = ("dil-kiwi-track", "hil-perception", "sil-closed-left-curve", "sil-perception")
-"""With each kind of file that a test refers to: a recording, a target, a map, classes."""
+FEW = ("dil-kiwi-track", "hil-perception", "sil-closed-left-curve", "sil-closed-two-cars", "sil-perception")
+"""With each kind of file that a test refers to: a recording, a target, a map, one of its own, classes."""
 
 
 @pytest.mark.parametrize("shipped", [s if s in FEW else pytest.param(s, marks=pytest.mark.proof) for s in SHIPPED])
@@ -452,6 +452,17 @@ def test_a_deployment_is_written_once(repository: Path) -> None:
     assert out.endswith("\nnothing to write\n")
     assert out.count("kept: ") == len(before)
     assert contents(repository) == before
+
+
+def test_a_deployment_names_compose_files_that_it_does_not_take(empty: Path) -> None:
+    (empty / "simulation-task1.yml").write_text("version: '2'\nservices: {app: {image: example}}\n")
+    (empty / "driver").mkdir()
+    (empty / "driver/rover.yaml").write_text("services: {app: {image: example}}\n")
+    (empty / "other.yml").write_text("my-services: 1\n")
+    code, out, _ = dodo("new", "--deployment")
+    said = "name your services in docker-compose.yml, or name those that you have in dodo.yml, of "
+    assert code == 0
+    assert f"{said}simulation-task1.yml, driver/rover.yaml: application: {{files: [...]}}\n" in out
 
 
 def test_a_deployment_takes_the_compose_file_that_is_there(empty: Path) -> None:

@@ -32,6 +32,32 @@ def test_lines_by_name_from_the_folder_or_the_file(tmp_path: Path) -> None:
     assert load_obstacles(tmp_path / "map.json").keys() == obstacles.keys()
 
 
+def test_walls_of_a_text_file(tmp_path: Path) -> None:
+    file = tmp_path / "simulation-map.txt"
+    file.write_text("-2.0,-2.0,-2.0,2.0;\r\n\n-2,0,0,0; 1,1,2,2;\n")
+    obstacles = load_obstacles(file)
+    assert {name: lines.wkt for name, lines in obstacles.items()} == {
+        "obstacle-1": "MULTILINESTRING ((-2 -2, -2 2))",
+        "obstacle-2": "MULTILINESTRING ((-2 0, 0 0))",
+        "obstacle-3": "MULTILINESTRING ((1 1, 2 2))",
+    }
+
+
+@pytest.mark.parametrize("wrong", ["1,2,3;", "1,2,3,4,5;", "a,0,0,0;", "1,2,3,nan;", "1,2,3,1e9;", "\xff;"])
+def test_what_is_no_wall(wrong: str, tmp_path: Path) -> None:
+    file = tmp_path / "room.txt"
+    file.write_text(f"0,0,1,1;\n{wrong}\n", encoding="latin-1")
+    with pytest.raises(ObstaclesError, match=r"room\.txt:2: expected a wall x1,y1,x2,y2; in m, found "):
+        load_obstacles(file)
+
+
+def test_a_text_file_without_walls_is_no_map(tmp_path: Path) -> None:
+    file = tmp_path / "room.txt"
+    file.write_text("\n ;\n")
+    with pytest.raises(ObstaclesError, match="the file is empty, expected a wall"):
+        load_obstacles(file)
+
+
 def test_a_map_may_have_none(tmp_path: Path) -> None:
     assert load_obstacles(write(tmp_path, {"model": []})) == {}
 
