@@ -59,7 +59,10 @@ def test_something_has_to_be_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / "docker-compose.yml").write_text("services: {viewer: {image: view}}\n")
     (tmp_path / "dodo.yml").write_text("dodo: 1\napplication: {files: [docker-compose.yml], without: [viewer]}\n")
     [found] = load([], []).diagnostics
-    assert (found.rule, found.message) == ("application-file", "every service of the application is left out")
+    assert (found.rule, found.message) == (
+        "application-file",
+        "'without' leaves out every service of the application, so that a test has nothing to start",
+    )
     assert (Path(found.span.file).name, found.span.line, found.hint) == (
         "dodo.yml",
         2,
