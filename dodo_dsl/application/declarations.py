@@ -92,7 +92,12 @@ def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnost
     gone = left_out(document, declarations)
     if gone and gone.keys() == services.keys():
         message = "'without' leaves out every service of the application, so that a test has nothing to start"
-        yield Diagnostic(declarations.without[0].span, _RULE, message, "keep the services that the test is about")
+        yield Diagnostic(
+            declarations.without[0].span,
+            _RULE,
+            message,
+            "name a compose file that has the service of your program under 'files'",
+        )
     for name, entry in declarations.services.items():
         if name in gone:
             yield Diagnostic(entry.key, _RULE, f"'{name}' is declared, but {gone[name]}", "remove one of them")
