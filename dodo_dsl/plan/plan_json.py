@@ -10,6 +10,7 @@ from typing import Any
 
 import orjson
 
+from dodo_dsl.application.printed_lines import PatternError, compiled
 from dodo_dsl.plan.model import (
     COMPLETED,
     HEALTHY,
@@ -123,7 +124,9 @@ def _problem(plan: Plan) -> str:
         "port": not any("\0" in s.port for s in plan.services),
         "device": all(is_device(d) for s in plan.services for d in s.devices),
         "resources": plan.resources is None or is_valid(plan.resources),
-        "line": all(0 <= line.sender < 1 << 32 for s in application.services for line in s.lines),
+        "line": all(
+            0 <= line.sender < 1 << 32 and _is_pattern(line.match) for s in application.services for line in s.lines
+        ),
         "condition": all(_is_after(s, application) for s in application.services),
         "order of starts: services wait for one another": not _is_cyclic(application),
     }
@@ -149,6 +152,14 @@ def _is_lockstep(lockstep: Lockstep) -> bool:
     limit = lockstep.max_response_s
     is_limit = (limit is None or 0 < limit <= 3600) and 0 <= lockstep.response_over <= 1
     return is_limit and 1 <= lockstep.readers <= 1000 and 0 < lockstep.wall_timeout_s <= 10 * 86_400 + 60
+
+
+def _is_pattern(text: str) -> bool:
+    try:
+        compiled(text)
+    except PatternError:
+        return False
+    return True
 
 
 def _is_inside(path: str) -> bool:

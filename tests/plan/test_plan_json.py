@@ -108,6 +108,13 @@ def test_wrong_values_of_services(key: str, value: Any, problem: str) -> None:
     assert f"(wrong {problem})" in refused(found)
 
 
+@pytest.mark.parametrize("line", [{"match": "(", "sender": 0}, {"match": "(?P<percent>.)", "sender": -1}])
+def test_wrong_lines_of_the_application(line: dict[str, Any]) -> None:
+    found = document()
+    found["application"]["services"][0]["lines"] = [{**line, "message": "opendlv.proxy.PedalPositionRequest"}]
+    assert "(wrong line)" in refused(found)
+
+
 def with_value(place: str, value: Any) -> dict[str, Any]:
     found = document()
     *steps, key = place.split(".")
