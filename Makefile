@@ -51,7 +51,7 @@ types: dev
 	$(BESIDE) .venv/bin/mypy
 
 quick-tests: dev
-	$(PYTEST) -n $(WORKERS) -m "not slow and not thorough" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
+	$(PYTEST) -n $(WORKERS) -m "not slow and not thorough and not proof" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
 
 realtime-tests:
 	$(AHEAD) $(PYTEST) -n $(RIGS) --dist loadgroup -m "realtime and not proof" --junitxml=$(JUNIT)/realtime.xml
@@ -60,7 +60,7 @@ engine-tests:
 	$(PYTEST) -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
 
 fast-tests:
-	$(BEHIND) $(PYTEST) -n 2 -m "not slow" --junitxml=$(JUNIT)/fast.xml
+	$(BEHIND) $(PYTEST) -n 2 -m "not slow and not proof" --junitxml=$(JUNIT)/fast.xml
 
 slow-tests:
 	$(PYTEST) -n $(shell nproc) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml

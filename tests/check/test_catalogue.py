@@ -23,6 +23,7 @@ def test_the_bad_example_gives_its_rule(rule: str, tmp_path: Path) -> None:
     assert rule in {problem.rule for problem in examples.problems(tmp_path)}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("rule", slow_where_large(RULES))
 def test_the_good_example_is_silent(rule: str, tmp_path: Path) -> None:
     examples.write(catalogue.pages()[rule].good, tmp_path)

@@ -33,6 +33,7 @@ def without(rule: str, patch: pytest.MonkeyPatch) -> None:
         patch.setattr(module, "ordered", kept)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("rule", slow_where_large(RULES))
 def test_a_case_fails_without_the_rule(rule: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only the cases that show the rule are run again, as the others do not depend on it."""

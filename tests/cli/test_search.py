@@ -112,6 +112,7 @@ def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
     assert (driven > 17, search.driven) == (True, [])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sweep", [[], pytest.param(["--sweep"], marks=pytest.mark.proof)])
 def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) -> None:
     code, out = search("example", "--runs", "24", "--until-failure", *sweep)
@@ -126,6 +127,7 @@ def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) 
     assert {**result(), "shrunk": []} == {**result("whole"), "shrunk": []}, "it goes on from there"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "words",
     [pytest.param([], id="all"), pytest.param(["--until-failure"], id="first", marks=pytest.mark.proof)],
@@ -146,6 +148,7 @@ def test_a_failure_that_does_not_repeat_is_none(search: Search, words: list[str]
     assert (result(), search.driven) == (before, [])
 
 
+@pytest.mark.thorough
 def test_what_is_saved_replaces_no_other_test(search: Search) -> None:
     search("example", "--runs", "8", "--save")
     (shrunk,) = result()["shrunk"]
@@ -162,6 +165,7 @@ def test_a_drive_in_error_is_repeated_once(search: Search) -> None:
     assert len(search.driven) == 17 + len(twice)
 
 
+@pytest.mark.thorough
 def test_an_interrupted_search_goes_on_to_the_same_result(search: Search) -> None:
     """It is interrupted while it sweeps, and again while it drives what the optimiser proposed."""
     words = ("example", "--runs", "16", "-j", "1")
@@ -201,12 +205,14 @@ def test_a_search_is_interrupted_between_drives_too(
     assert (code, "the same command goes on" in out, len(set(search.driven))) == (130, True, FIRST + 1)
 
 
+@pytest.mark.thorough
 def test_the_result_is_the_same_however_many_drive_at_once(search: Search) -> None:
     for jobs in ("1", "3"):
         search("example", "--runs", "16", "-j", jobs, report=jobs)
     assert result("1") == result("3")
 
 
+@pytest.mark.thorough
 def test_further_drives_fail_more_often_than_the_sweep(search: Search) -> None:
     search("example", "--runs", "32", "--seed", "2")
     found = result()
@@ -276,6 +282,7 @@ def test_whole_numbers_where_a_parameter_needs_them(search: Search) -> None:
     assert result()["worst"]["values"]["clutter"].isdecimal()
 
 
+@pytest.mark.thorough
 def test_an_ended_search_is_finished_without_looking_for_more(search: Search) -> None:
     search("example", "--runs", "9", "--sweep")
     code, _ = search("example", "--runs", "100", "--finish")

@@ -127,6 +127,7 @@ def test_the_example_says_a_lot(name: str) -> None:
     assert len(said(name, None)) >= 2 * FRAMES
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "fault"), CASES)
 def test_a_fault_changes_what_a_program_says(name: str, fault: str) -> None:
     make = MAKES[name][fault]
@@ -139,6 +140,7 @@ def test_a_fault_changes_what_a_program_says(name: str, fault: str) -> None:
     assert said(name, make) != said(name, None)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "fault"), [case for case in CASES if case[1] not in BY_THE_CLOCK])
 def test_a_fault_is_the_same_every_time(name: str, fault: str) -> None:
     make = MAKES[name][fault]

@@ -99,6 +99,7 @@ def test_run_with_nothing_stands_and_needs_no_further_run(bench: Bench) -> None:
     assert bench.status() == Status.IDLE
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("line", "code"),
     [

@@ -16,6 +16,7 @@ def keep_sending(bench: Bench, velocity: str, seconds: float) -> None:
         bench.run(0.05)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize("line", ["$STOP", "$GOTO:0,0,0", "$CALIBRATE", "$RUN:-0.2,-0.2,-0.2", "$RUN:0,0,0"])
 def test_a_driver_that_does_not_obey_loses_its_current(bench: Bench, motor: str, line: str) -> None:

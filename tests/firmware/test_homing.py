@@ -94,6 +94,7 @@ def test_a_pair_that_is_far_from_square_is_not_torn_on(fresh: Bench) -> None:
     assert abs(fresh.pose()["skew"]) < 0.03
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("motor", ["x", "y1", "y2", "alpha"])
 @pytest.mark.parametrize("stuck", ["open", "closed"])
 def test_a_stuck_switch_is_a_fault_and_not_a_crash_with_force(bench: Bench, motor: str, stuck: str) -> None:
@@ -209,6 +210,7 @@ def test_a_reset_does_not_take_up_a_part(bench: Bench, motor: str) -> None:
     assert bench.status() == Status.NOT_CALIBRATED
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("line", ["$RUN:0.2,0,0", "$GOTO:0.3,0,0"])
 @pytest.mark.parametrize("notice", ["$STOP", "$CALIBRATE"])
 def test_after_a_reset_nobody_continues_unaware(bench: Bench, line: str, notice: str) -> None:

@@ -48,6 +48,7 @@ def test_run_takes_the_highest_speed_and_nothing_beyond(bench: Bench, axis: str,
     assert bench.send_line(f"$RUN:{with_one(axis, f'{sign}{SPEED[axis]:.6f}')}") == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sign", ["", "-"])
 @pytest.mark.parametrize("axis", AXES)
 def test_run_brakes_before_the_edge(bench: Bench, axis: str, sign: str) -> None:

@@ -8,6 +8,7 @@ from tests.firmware.programs import Bench
 MOTORS = ("x", "y1", "y2", "alpha")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize(
     ("command", "status", "void"),
@@ -90,6 +91,7 @@ def test_a_hard_stop_from_high_speed_voids_the_position(bench: Bench) -> None:
     assert bench.status() == Status.NOT_CALIBRATED
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize("command", ["heat {} hot", "short {}", "push {} 8", "forget {}"])
 def test_stop_does_not_hide_what_voids_the_position(bench: Bench, motor: str, command: str) -> None:

@@ -97,6 +97,7 @@ def test_goto_goes_on_while_somebody_asks(bench: Bench, line: str) -> None:
     assert bench.position()[0] == pytest.approx(0.5, abs=1e-5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("line", ["$GOTO:2,0,0", "$NOISE", "$RUN:1", "STATUS", ""])
 @pytest.mark.parametrize("motion", ["$GOTO:0.7,0.5,2", "$CALIBRATE"])
 def test_a_line_with_a_mistake_is_nobody(bench: Bench, motion: str, line: str) -> None:

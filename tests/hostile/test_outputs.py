@@ -105,6 +105,7 @@ def test_logs_follow_no_symlink(tmp_path: Path) -> None:
     assert (tmp_path / "mine").read_text() == "mine"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("link", ["", "files", "files/maps"])
 def test_compiling_follows_no_symlink(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, link: str) -> None:
     """Compiling follows no symlink that a repository has in the place of output."""

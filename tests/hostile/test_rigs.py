@@ -88,6 +88,7 @@ PLACES: dict[str, Callable[[str, Path], str]] = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("text", NUMBERS)
 @pytest.mark.parametrize("where", PLACES)
 def test_numbers_that_only_python_reads(

@@ -86,6 +86,7 @@ def test_no_pieces_become_a_command(pieces: list[str]) -> None:
     assert all(c.isprintable() or c in "\n\t" for c in stream.getvalue())
 
 
+@pytest.mark.thorough
 @each_or_all
 def test_a_recording_commands_no_terminal(record: Callable[..., Path], attack: str) -> None:
     image = message("opendlv.proxy.ImageReading", BEGIN, 7, data=b"x", format=attack, width=4, height=4)
@@ -94,6 +95,7 @@ def test_a_recording_commands_no_terminal(record: Callable[..., Path], attack: s
         assert not FORBIDDEN.search(stdout + stderr), repr(stderr)
 
 
+@pytest.mark.thorough
 @each_or_all
 @pytest.mark.parametrize("place", ["name", "description", "rig", "service", "file"])
 def test_a_repository_commands_no_terminal(

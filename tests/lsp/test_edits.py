@@ -56,6 +56,7 @@ def test_a_name_changes_in_the_whole_file(
     assert edited(written, answer["changes"][repository.spec.as_uri()]) == expected != written
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("word", "new", "why"),
     [

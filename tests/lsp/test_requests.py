@@ -68,6 +68,7 @@ def offers(editor: Editor, repository: Repository, written: str) -> dict[str, di
     return {item["label"]: item for item in found["items"]}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("before", "after", "there", "absent"),
     [

@@ -152,6 +152,7 @@ def compiled(written: list[Case], folder: Path, hil: bool = False) -> tuple[Appl
     return plan_application(source, setting), problems
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("key", CASES)
 def test_what_becomes_of_each_form(key: str, repository: Path) -> None:
     refused = [case for case in CASES[key] if case.treatment == "refused"]
@@ -180,6 +181,7 @@ def left_below(service: Mapping[str, Any]) -> Iterator[str]:
             yield from (f"{path}.{key}" for key, value in mapping.items() if value and key in removed(rows))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("key", [f"{table}.{key}" for table, rows in ROWS.items() for key in rows])
 def test_no_key_has_another_case(key: str, repository: Path) -> None:
     """Compose knows keys in lower case only, and DoDo takes no other for granted."""

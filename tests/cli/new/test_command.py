@@ -101,6 +101,7 @@ BEGINNINGS: list[tuple[list[str], str]] = [
 ]
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_begun_is_said_and_writes_nothing(repository: Path) -> None:
     assert dodo("new", "there")[0] == 0
     (repository / "tests/half").mkdir()
@@ -546,6 +547,7 @@ def test_the_image_of_a_pipeline_reaches_the_compose_file(repository: Path) -> N
     assert "${DODO_IMAGE_APPLICATION:-registry.example.org/group/application:latest}" in application
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("command", "kind", "made"),
     [

@@ -109,6 +109,7 @@ def test_a_curve_falls(text):
         Curve.parse(text)
 
 
+@pytest.mark.thorough
 def test_noise_has_its_deviation_and_its_seed(room):
     def readings(seed, **errors):
         finder = RangeFinder(room, [Sensor(3), Sensor(5)], Device(**errors), seed)

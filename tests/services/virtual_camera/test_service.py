@@ -125,6 +125,7 @@ def test_each_parameter_is_tested_here():
     assert {*PICTURED, *OTHERS, *TRUTH} == set(MANIFEST["parameters"])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", PICTURED)
 def test_each_parameter_changes_the_picture(camera, name):
     beside, value = PICTURED[name]

@@ -61,6 +61,7 @@ SPECS = {
 }  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", SPECS)
 def test_hostile_specs_are_refused(folder: Path, case: str) -> None:
     (folder / "tests" / "loop").symlink_to("loop")

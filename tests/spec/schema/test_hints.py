@@ -95,6 +95,7 @@ CASES = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "path"), CASES, ids=[f"{name} {shown(path)}" for name, path in CASES])
 def test_what_a_hint_says_is_allowed(name: str, path: tuple[Step, ...]) -> None:
     for wrong in WRONG:

@@ -22,6 +22,7 @@ def maze(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Renderer]:
     yield Renderer(load_scene(make_maze(tmp_path_factory.mktemp("maze"))), 320, 180, math.radians(48.8))
 
 
+@pytest.mark.thorough
 def test_hidden_faces_change_no_pixel(maze: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     found = [maze.render(pose) for pose in POSES]
     monkeypatch.setattr(surfaces, "_FEW", 1 << 30)
