@@ -15,6 +15,7 @@ import jinja2
 from dodo_dsl import __version__, package_data, source
 from dodo_dsl.cli.existing_application import declarable
 from dodo_dsl.diagnostics import shown_path
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.spec.deployment import FILE_NAME
 from dodo_dsl.terminal import printable
 
@@ -63,11 +64,19 @@ def compose_file(root: Path) -> str:
 
 
 def other_compose_files(root: Path) -> list[str]:
-    """Compose files of other names, and in the folders of the repository, as far as they are told apart at a glance."""
+    """Compose files under other names, in a repository and its folders, by their suffix and first keys."""
     found = sorted((*root.glob("*.y*ml"), *root.glob("[!.]*/*.y*ml")), key=lambda path: (len(path.parts), path))
     looked = (path for path in found[:_MOST_LOOKED] if path.is_file() and not path.is_symlink())
-    names = [str(path.relative_to(root)) for path in looked if _SERVICES.search(path.read_bytes()[:_MOST_BYTES])]
+    names = [str(path.relative_to(root)) for path in looked if _SERVICES.search(_beginning(path))]
     return names[:_MOST_NAMED]
+
+
+def _beginning(path: Path) -> bytes:
+    try:
+        with regular_file.opened(path) as file:
+            return file.read(_MOST_BYTES)
+    except OSError:
+        return b""
 
 
 def schema_of_specs(root: Path) -> Path:

@@ -40,7 +40,7 @@ _GROUP = re.compile(r"\(\?P<[^>]*>|[][()?*+|^$\\]|\{[0-9,]*\}")
 
 
 class NoValue(ValueError):
-    """Text that is no value of a field; the text says why."""
+    """A printed text does not fit its field; the message says why."""
 
 
 def value(type_: str, text: bytes) -> Any:

@@ -218,7 +218,7 @@ def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, Model
 
 
 def read_frames(path: Path) -> tuple[int, ...]:
-    """The sender stamps at which a map has models, in order; none of what is no map, which is told elsewhere."""
+    """The sender stamps at which a map has models, in order; none for a file that another check refuses."""
     file, found = find_map(path), set[int]()
     try:
         if b'"frames"' in read_bytes(file):
