@@ -22,7 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
-	@echo "make check    format, lint, types, imports, and the tests that need only Python: two minutes"
+	@echo "make check    format, lint, types, imports, and the tests that need only Python: a minute"
 	@echo "make test     set up, then every check and every test: a quarter of an hour"
 	@echo "make proof    what takes long to prove, in half an hour at most, and what of it holds"
 	@echo "make lint     format, lint, types, imports"
