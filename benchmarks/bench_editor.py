@@ -135,7 +135,7 @@ def late(values: Sequence[float]) -> list[float]:
 
 
 def rows(ours: Times, theirs: Times) -> list[Row]:
-    """A row for each kind of wait; every value of ours has one of the peer's, where it has an answer at all."""
+    """A row for each kind of wait; every value of ours has one of the peer's, if it has an answer at all."""
     made = []
     for name in (KEY, LATE, AFTER_PAUSE, *PLACES):
         pair = [late(times.get(KEY, ())) if name == LATE else times.get(name, []) for times in (ours, theirs)]

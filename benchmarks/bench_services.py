@@ -64,7 +64,7 @@ def in_the_drive(memory: str, folder: Path) -> dict[str, list[str]]:
 
 
 def alone(memory: str, rig: FakeRig) -> dict[str, list[str]]:
-    """Services that play a part of their own."""
+    """Services that play their own part."""
     return {
         "beacon": ["--start=at-once", "--points=0 0,1000 0", "--speed=1"],
         "camera": [

@@ -59,7 +59,7 @@ class Ledger:
 
 
 def read(path: Path) -> Ledger:
-    """Raises OSError, and ValueError for what is no ledger."""
+    """Raises OSError, and ValueError for what is not a ledger."""
     try:
         return _ledger(json.loads(path.read_bytes()))
     except (ValueError, TypeError, KeyError, AttributeError) as error:

@@ -50,7 +50,7 @@ class Row:
 
     @classmethod
     def from_json(cls, found: dict[str, Any]) -> "Row":
-        """Raises TypeError and ValueError for what is no row."""
+        """Raises TypeError and ValueError for what is not a row."""
         goal = found.get("goal")
         numbers = {key: tuple(map(float, found.get(key, ()))) for key in ("ours", "theirs", "ratios")}
         return cls(**{**found, **numbers, "goal": Goal(**goal) if goal else None})
@@ -94,7 +94,7 @@ def plan(*rows: Row, note: str = NOT_REACHED) -> None:
 
 @contextmanager
 def attempt(*planned: Row) -> Iterator[None]:
-    """A part of a benchmark. Where it fails, its rows that have no values say why, and what comes after it goes on."""
+    """A part of a benchmark. If it fails, its rows that have no values say why, and what comes after it goes on."""
     try:
         yield
     except Exception as error:  # noqa: BLE001 - whatever it is, it is the reason

@@ -113,7 +113,7 @@ def by_cross_entropy(bug: Bug, seed: int) -> Iterator[float]:
 
 
 def until_failure(margins: Iterator[float], most: int) -> int:
-    """The number of drives up to the first failure; one more than ``most`` where none of these fails."""
+    """The number of drives up to the first failure; one more than ``most`` if none of these fails."""
     return next((number for number, margin in enumerate(margins, 1) if margin < 0 or number > most), most + 1)
 
 
