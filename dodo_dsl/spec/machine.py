@@ -47,7 +47,7 @@ class PermittedRig:
 
 @dataclass(frozen=True)
 class Machine:
-    """The operator's file; a place is None where it names none."""
+    """The operator's file; a place is None if it names none."""
 
     rigs: tuple[PermittedRig, ...] = ()
     leases: Path | None = None

@@ -238,8 +238,8 @@ class Manifest:
     """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None.
 
     A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
-    by patterns of their names, empty where it does not tell. ``messages`` are those that it has whatever its parameters
-    are, ``cases`` the others.
+    by patterns of their names, empty if it does not declare them. ``messages`` are those that it has whatever its
+    parameters are, ``cases`` the others.
     """
 
     folder: Path

@@ -128,8 +128,8 @@ _BOUNDS = ("minimum", "maximum")
 def without_consequences(errors: Iterable[Any]) -> list[Any]:
     """The errors of jsonschema without what follows from others.
 
-    Those are missing keys that are misspelt, empty ones whose content is not indented, and bounds of what is no number
-    of the expected kind.
+    Those are missing keys that are misspelt, empty ones whose content is not indented, and bounds of what is not a
+    number of the expected kind.
     """
     typed = list(errors)
     wrong = {tuple(error.absolute_path) for error in typed if error.validator == "type"}
