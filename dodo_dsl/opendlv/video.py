@@ -96,7 +96,7 @@ def has_key_frame(packet: bytes) -> bool:
 
 
 def pyav(purpose: str) -> Any:
-    """PyAV; raises VideoError where it cannot be loaded."""
+    """PyAV; raises VideoError if it cannot be loaded."""
     try:
         import av
     except ImportError as error:
