@@ -40,12 +40,12 @@ class UnsafeFolder(OSError):
 
 
 def secured(folder: Path) -> Path:
-    """The folder, which only its owner can write: this user or root; it is made, with mode 0700, where there is none.
+    """The folder, which only its owner can write: this user or root; it is made, with mode 0700, if there is none.
 
     Of a folder of root the group may write, too, as several users share the state then. Raises UnsafeFolder, also for
     a symlink, and OSError.
     """
-    with contextlib.suppress(FileExistsError):  # of a file in its place the next call tells
+    with contextlib.suppress(FileExistsError):  # the next call reports a file in its place
         folder.parent.mkdir(parents=True, exist_ok=True)
     try:
         folder.mkdir(mode=0o700)

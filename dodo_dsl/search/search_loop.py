@@ -30,7 +30,7 @@ The margin says nothing of a failure then, and what lies within the ranges is fo
 
 @dataclass(frozen=True)
 class Candidate:
-    """Values to be driven; ``swept`` is whether they belong to the sweep, which tells how often the test fails."""
+    """Values to be driven; ``swept`` is whether they belong to the sweep, which shows how often the test fails."""
 
     values: Values
     swept: bool

@@ -41,7 +41,7 @@ Shrinking = Generator[list[Values], Sequence[bool], Values]
 
 @dataclass
 class Shrinker:
-    """Numbers its drives from ``number`` on. ``report`` takes the tests, as does ``registry`` where there is one."""
+    """Numbers its drives from ``number`` on. ``report`` takes the tests, as does ``registry`` if there is one."""
 
     study: Study
     drives: Drives
@@ -79,7 +79,7 @@ class Shrinker:
             self.found.append(await self._confirmed(values))
 
     async def _first(self, failed: dict[int, tuple[Values, Drive]]) -> Drive | None:
-        """The drive nearest to the nominal values that fails again; None where none of the MOST_TRIED nearest does."""
+        """The drive nearest to the nominal values that fails again; None if none of the MOST_TRIED nearest does."""
         left = {number: drive for number, (_, drive) in failed.items()}
         for _ in range(min(MOST_TRIED, len(left))):
             drive = nearest(self.study.space, list(left.values()))
@@ -128,7 +128,7 @@ class Shrinker:
         for folder in filter(None, (self.report / TESTS, self.registry)):
             path = folder / name / f"{name}{SUFFIX}"
             if folder == self.registry and path.exists() and path.read_text() != text:
-                self.drives.progress.note(f"'{path}' is kept, as it holds another test")
+                self.drives.progress.note(f"'{path}' is kept, because it holds another test")
             else:
                 atomic.write_text(path, text)
         return name

@@ -1,4 +1,4 @@
-"""Find the cones and other cars in the frames of the car's camera and tell the bus about them.
+"""Find the cones and other cars in the frames of the car's camera and send them on the bus.
 
     python perception.py --cid=111 --name=video0.argb --width=640 --height=480 --verbose
 

@@ -7,7 +7,7 @@ the start and go on past the finish, so that a car sees cones all the way. A lap
 the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that backs up to the finish.
 An oval has ``far`` instead, the line half-way round.
 ``two-cars`` is the straight track with another car, at the frames of sender stamp 1; the car of the test
-has stamp 0. ``static-rig`` is no track but a board with eight cones, seen from x = 0, y = 0 along +x.
+has stamp 0. ``static-rig`` is not a track but a board with eight cones, seen from x = 0, y = 0 along +x.
 """
 
 import json
