@@ -14,7 +14,7 @@ from pathlib import Path
 
 
 class NoStateFolder(Exception):
-    """This user has no home folder that could hold the state; the text says what to set."""
+    """This user has no home folder that could hold the state; the text shows what to set."""
 
 
 def state_path(variable: str, name: str) -> Path:
@@ -36,7 +36,7 @@ def account_path(name: str) -> Path:
 
 
 class UnsafeFolder(OSError):
-    """Others could write into a folder of DoDo's state; the text says what to do."""
+    """Others could write into a folder of DoDo's state; the text shows what to do."""
 
 
 def secured(folder: Path) -> Path:

@@ -24,7 +24,7 @@ class Machine:
 class Bench:
     """A run of one benchmark: its rows, seconds, and the load average before and after it.
 
-    ``trouble`` says what was wrong. One that was ended because its time was over has not failed.
+    ``trouble`` shows what was wrong. One that was ended because its time was over has not failed.
     """
 
     name: str

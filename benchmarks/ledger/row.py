@@ -31,8 +31,8 @@ class Goal:
 class Row:
     """``ours`` and ``theirs`` in ``unit``, and ``ratios``: how many times as good as the peer, in each round.
 
-    ``less`` says that less of the unit is better, as of seconds. A row without ``ours`` was not measured, and one
-    without ``theirs`` has no peer; ``note`` says why.
+    ``less`` means that less of the unit is better, as of seconds. A row without ``ours`` was not measured, and one
+    without ``theirs`` has no peer; ``note`` gives the reason.
     """
 
     what: str

@@ -5,7 +5,7 @@ format is JSON of the shape that the manifest names.
 ``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
 ``short-timeout``: the test's timeout leaves room for the longest time that an evaluator waits.
 ``no-limit``: an evaluator has something to judge by; ``empty-file``: so has the file that it judges by. A test that can
-only pass says nothing about the application.
+only pass shows nothing about the application.
 """
 
 import functools

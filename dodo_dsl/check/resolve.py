@@ -74,7 +74,7 @@ def _of_application(wiring: Wiring) -> Iterator[Port]:
 
 
 def may_send(service: ResolvedService, port: Port, ids: frozenset[tuple[str, int]]) -> bool:
-    """Whether a service of which the manifest only says that it may send anything can send what a port consumes.
+    """Whether a service of which the manifest only shows that it may send anything can send what a port consumes.
 
     ``ids`` are names and numbers of messages. A recording that is too large or damaged may hold any.
     """

@@ -39,7 +39,7 @@ def check_names(context: RuleContext) -> Iterator[Diagnostic]:
     if spec.name in KEYWORDS:
         message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
         yield Diagnostic(spec.span("name"), "name-reserved", message, as_file(spec.location.stem, SUFFIX))
-    elif spec.name != spec.location.stem and is_name(spec.name):  # the schema says what is wrong with any other
+    elif spec.name != spec.location.stem and is_name(spec.name):  # the schema shows what is wrong with any other
         message, stem = f"the name '{spec.name}' differs from the file's name", spec.location.stem
         written = f"write 'name: {stem}', or " if is_free(stem) else ""
         hint = f"{written}rename the file to {spec.name}{SUFFIX}"

@@ -1,4 +1,4 @@
-"""The language server: it listens to the editor, answers it, and says what is wrong a moment after a change."""
+"""The language server: it listens to the editor, answers it, and shows what is wrong a moment after a change."""
 
 import asyncio
 import contextlib

@@ -49,7 +49,7 @@ class Interrupted(Exception):
 
 
 class RigFailure(Exception):
-    """A test on a rig ended in error, which says nothing of the values; one sentence."""
+    """A test on a rig ended in error, which shows nothing about the values; one sentence."""
 
 
 class DriveProgress(Progress, Protocol):

@@ -24,7 +24,7 @@ FIRST, SWEPT, PROPOSED = 8, 4, 4
 PATIENCE = 12
 """Generations whose proposals may all pass; from then on, all but one drive of each are of the sweep.
 
-The margin says nothing of a failure then, and what lies within the ranges is found soonest by an even cover.
+The margin shows nothing about a failure then, and what lies within the ranges is found soonest by an even cover.
 """
 
 
@@ -37,7 +37,7 @@ class Candidate:
 
 
 Judge = Callable[[Sequence[Candidate], Margins], Awaitable[bool]]
-"""Drives candidates and adds their margins; says whether to go on."""
+"""Drives candidates and adds their margins; shows whether to go on."""
 
 
 @dataclass(frozen=True)

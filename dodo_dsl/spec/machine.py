@@ -1,6 +1,6 @@
 """The operator's word on the rigs of a machine: ``/etc/dodo/rigs.yml``, which no test and no job can change.
 
-It says where leases and quarantines are kept, which devices are rigs, how far they may move at most, and the
+It shows where leases and quarantines are kept, which devices are rigs, how far they may move at most, and the
 repositories whose tests may move them. A repository's ``dodo.yml`` can only be stricter.
 """
 

@@ -126,7 +126,7 @@ class Use:
 class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
-    ``pool`` says which rigs will do where the spec names none, and the deployment says which ones these are.
+    ``pool`` shows which rigs will do where the spec names none, and the deployment shows which ones these are.
     ``isolation`` is None if the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
     to take what only a simulation knows. ``frames`` is one of FRAMES, ``frames_hz`` None for the cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.

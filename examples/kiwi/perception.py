@@ -5,7 +5,7 @@
 Reads shared memory, 4 bytes a pixel (blue, green, red, alpha). Sends for each cone and car, with the frame's time
 stamp as sample time and the frame's number as sampleId: DetectionType (1 yellow, 2 blue, 3 car), DetectionProperty
 (`yellow`, `blue`, `car`) and DetectionBoundingBox (fractions of the image). When all of a frame have been sent,
-also when there are none, an ImageReadingShm with the same sampleId says that the frame is complete.
+also when there are none, an ImageReadingShm with the same sampleId shows that the frame is complete.
 """
 
 import argparse

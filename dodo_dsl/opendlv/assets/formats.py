@@ -195,9 +195,9 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
 HELP: Mapping[str, str] = {
     "map": "docs/reference/maps.md has an example",
     "obstacles": "docs/reference/maps.md has an example",
-    "truth": "services/object_detection/README.md says what a truth has",
-    "target": "services/continuous_signal/README.md says what a target has",
-    "way-points": "services/beacon/README.md says what a path has",
+    "truth": "services/object_detection/README.md shows what a truth has",
+    "target": "services/continuous_signal/README.md shows what a target has",
+    "way-points": "services/beacon/README.md shows what a path has",
     "car": "services/dynamic_model/README.md lists the parameters",
 }
 """Where to read on, for problems without their own hint."""

@@ -32,7 +32,7 @@ _HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder wri
 class LookedThrough:
     """The senders of one message, up to the one that is looked for.
 
-    ``ends_at`` is the byte behind the last whole message that was looked at; ``is_whole`` says that no
+    ``ends_at`` is the byte behind the last whole message that was looked at; ``is_whole`` means that no
     other follows, as far as was looked.
     """
 
