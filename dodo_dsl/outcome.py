@@ -129,7 +129,7 @@ class ServiceUse:
         used = f"{self.processor_s:.2f} s of processor time{share}, up to {megabytes(self.peak_memory_bytes)} of memory"
         growth = self.memory_growth_bytes_per_s
         if growth is None:
-            return f"{used}, and the test was too short to measure the growth of memory"
+            return f"{used}, and the test was too short to measure its growth"
         return f"{used}, growing by {megabytes(growth * 60)}/min" if growth else used
 
 

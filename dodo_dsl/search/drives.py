@@ -65,7 +65,7 @@ class DriveProgress(Progress, Protocol):
         """Another worker made one meanwhile."""
 
     def begin_shrinking(self, failures: int, most: int) -> None:
-        """From now on, ``most`` drives at most shrink failures."""
+        """From now on, ``most`` drives at most reduce failures."""
 
     def expect(self, most: int) -> None:
         """``most`` further drives at most are left."""
