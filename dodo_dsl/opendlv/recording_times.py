@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.recording import Recording
 DAY = 86_400_000_000
 IMAGE = 1055
 MOST_BACK = 1_000_000
-"""Microseconds that a message may lie before the one before it of the same sender; pictures must be in order."""
+"""Microseconds that a message may lie before the one before it of the same sender; images must be in order."""
 TOOLS = range(1, 13)
 """Ids of messages of players and recorders, whose times are those of the tool."""
 _SECONDS = ((365.25 * 86_400, "years"), (86_400, "days"), (60, "minutes"), (0, ""))

@@ -29,7 +29,7 @@ class MessageStream:
 
 @dataclass(frozen=True)
 class Frames:
-    """Packets with camera frames, and how many of them give a picture (None if they were not decoded)."""
+    """Packets with camera frames, and how many of them give a frame (None if they were not decoded)."""
 
     packets: int
     decoded: int | None

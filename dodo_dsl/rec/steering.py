@@ -1,4 +1,4 @@
-"""Frames with the requests that answered them, for programs that learn to steer from pictures (pictures, one table).
+"""Frames with the requests that answered them, for programs that learn to steer from frames (images, one table).
 
 A frame is answered by the first GroundSteeringRequest of its sample time or later, at most ``PATIENCE`` later: an
 application of DoDo's tests copies the frame's sample time, a person at the wheel reacts after it. Recordings of a data

@@ -83,7 +83,7 @@ def _picture(file: Path) -> Iterator[InputError]:
         yield error
     else:
         if problem and not pointer:
-            yield InputError(file, problem, hint="save the picture again as PNG or JPEG")
+            yield InputError(file, problem, hint="save the image again as PNG or JPEG")
 
 
 def _obstacles(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
