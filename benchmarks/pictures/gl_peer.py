@@ -30,7 +30,7 @@ void main() { gl_Position = camera * vec4(place, 1.0); colour = tint; tile = spo
 """
 FRAGMENT = """
 #version 330
-uniform sampler2D picture; uniform bool textured;
+uniform sampler2D image; uniform bool textured;
 flat in vec3 colour; in vec2 tile;
 out vec4 pixel;
 void main() { pixel = vec4((textured ? texture(picture, tile).rgb : colour).bgr, 1.0); }
@@ -82,7 +82,7 @@ def block_triangles(entry: BlockEntry, instance: Instance) -> Array:
 
 
 class GlPeer:
-    """Draws a map with OpenGL and reads the picture back, which is upside down in OpenGL and so drawn that way."""
+    """Draws a map with OpenGL and reads the image back, which is upside down in OpenGL and so drawn that way."""
 
     def __init__(self, path: Path, width: int, height: int, fovy: float) -> None:
         """Size in pixels, vertical field of view in rad."""
@@ -123,7 +123,7 @@ class GlPeer:
         return self._plain(rows)[0], texture
 
     def render(self, position: Array, axes: Array) -> Image:
-        """The picture (height, width, 4) in the order B, G, R, A, the next one drawn over it.
+        """The image (height, width, 4) in the order B, G, R, A, the next one drawn over it.
 
         ``position`` (3,) in the world, ``axes`` (3, 3) of the camera as rows: right, down and forward.
         """
@@ -148,7 +148,7 @@ def grey(picture: Image) -> Array:
 
 
 def ssim(one: Image, other: Image) -> float:
-    """Structural similarity of two pictures (Wang et al. 2004): grey, a Gaussian window of 1.5 pixels."""
+    """Structural similarity of two images (Wang et al. 2004): grey, a Gaussian window of 1.5 pixels."""
     a, b = grey(one), grey(other)
 
     def mean(values: Array) -> Array:

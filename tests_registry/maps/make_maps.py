@@ -110,7 +110,7 @@ BOARD = {
     "yellow": [(0.30, 0.172), (0.36, 0.07), (0.52, 0.13), (0.56, -0.05)],
     "blue": [(0.30, -0.08), (0.42, 0.072), (0.44, -0.18), (0.58, 0.04)],
 }
-"""Where the cones of the static rig stand: one at the edge of the picture, one partly behind another."""
+"""Where the cones of the static rig stand: one at the edge of the frame, one partly behind another."""
 
 
 def poses(sections: list[Section], offset: float, start: Place) -> Iterator[Place]:
