@@ -24,7 +24,7 @@ NEAR, FAR = 0.01, 2000.0
 VERTEX = """
 #version 330
 uniform mat4 camera;
-in vec3 place; in vec3 tint; in vec2 spot;
+in vec3 position; in vec3 tint; in vec2 spot;
 flat out vec3 colour; out vec2 tile;
 void main() { gl_Position = camera * vec4(place, 1.0); colour = tint; tile = spot; }
 """
@@ -51,7 +51,7 @@ def lit(corners: Array, colour: Array) -> Array:
 
 
 def model_triangles(entry: ModelEntry) -> Array:
-    """Rows (n, 8) of place, colour and texture of all copies of a model."""
+    """Rows (n, 8) of position, colour and texture of all copies of a model."""
     import trimesh
 
     assert not isinstance(entry.paint, Path)
@@ -66,7 +66,7 @@ def model_triangles(entry: ModelEntry) -> Array:
 
 
 def block_triangles(entry: BlockEntry, instance: Instance) -> Array:
-    """Rows (36, 8) of place, colour and texture of a block."""
+    """Rows (36, 8) of position, colour and texture of a block."""
     size, rows = np.array(entry.dimension), []
     colour = np.zeros(3) if isinstance(entry.paint, Path) else np.array(entry.paint)
     for axis in range(3):

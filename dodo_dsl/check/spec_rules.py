@@ -110,7 +110,7 @@ def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
         span = places.get(rig.name, pool.kind.span if pool.kind else context.spec.span("rig"))
         if rig.kind != found[0].kind:
             message = f"rig '{rig.name}' is {rig.kind}, and '{found[0].name}' is {found[0].kind}"
-            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can take each other's place")
+            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can replace each other")
         for other in found[:number]:
             if device := _same_device(other, rig):
                 message = (

@@ -141,7 +141,7 @@ def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[
 
 
 def _write_copies(folder: Path, wanted: Sequence[FileCopy]) -> None:
-    for path in _former_links(folder, wanted):  # before anything else: a folder may come into its place
+    for path in _former_links(folder, wanted):  # before anything else: a folder may replace it
         path.unlink()
     for copy in wanted:
         if _is_copied(folder, copy):

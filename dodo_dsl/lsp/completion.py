@@ -1,6 +1,6 @@
 """Completion: the keys, services, parameters, values and units that may stand at the cursor.
 
-A text that is being written is most often no YAML: the cursor's place is found in what stands before it.
+A text that is being written is most often no YAML: the cursor's position is found in what stands before it.
 """
 
 import re

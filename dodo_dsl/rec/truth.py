@@ -44,7 +44,7 @@ class Mark(NamedTuple):
 
 
 def mark(label: object, values: Sequence[object], place: str) -> Mark:
-    """A box of a class and its four numbers; raises TruthError, which names the place."""
+    """A box of a class and its four numbers; raises TruthError, which names the position."""
     name = str(label).strip().removeprefix("color:").strip()
     if not name or not name.isprintable():
         raise TruthError(f"{place}: the class is empty or not printable")

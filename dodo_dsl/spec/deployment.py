@@ -111,7 +111,7 @@ DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 @dataclass(frozen=True)
 class Declarations:
-    """What ``dodo.yml`` says of an application beside its compose ``files``, at its place there.
+    """What ``dodo.yml`` states about an application in addition to its compose ``files``, at its position there.
 
     ``without`` names services that no test starts. ``services`` have the keys of ``x-dodo``, and ``process``, by name.
     ``own`` are the keys of ``x-dodo`` of the whole application.

@@ -137,7 +137,7 @@ def row(sections: list[Section], offset: float, start: Place) -> list[Point]:
 
 
 def across(place: Place, reach: float) -> list[Point]:
-    """The two points ``reach`` m to the left and to the right of a place."""
+    """The two points ``reach`` m to the left and to the right of a position."""
     return [row([Section(1.0)], side * reach, place)[0] for side in (1, -1)]
 
 

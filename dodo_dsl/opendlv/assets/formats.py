@@ -204,7 +204,7 @@ HELP: Mapping[str, str] = {
 
 
 def _raised(path: Path, read: Callable[[], object]) -> Iterator[InputError]:
-    """What a reader raises, with the place that its sentence begins with."""
+    """What a reader raises, with the position that its sentence begins with."""
     try:
         read()
     except InputError as error:

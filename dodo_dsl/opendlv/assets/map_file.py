@@ -66,7 +66,7 @@ class BlockEntry:
 
 @dataclass(frozen=True)
 class OverlayEntry:
-    """An image laid over the camera's: its size and places (upper left corners) as fractions of that image."""
+    """An image laid over the camera's: its size and positions (upper left corners) as fractions of that image."""
 
     name: str
     file: Path
@@ -166,7 +166,7 @@ def _overlay(node: Node) -> OverlayEntry | None:
 
 
 def _names(item: Node, names: str) -> str:
-    """OpenDLV reads the first two numbers of an overlay's place; maps often write four as elsewhere."""
+    """OpenDLV reads the first two numbers of an overlay's position; maps often write four as elsewhere."""
     return "x y z angle" if isinstance(item.value, list) and len(item.value) == 4 else names
 
 

@@ -30,7 +30,7 @@ _KEYS: Mapping[str, frozenset[str]] = {
 
 
 class TruthFileError(InputError):
-    """A truth that cannot be used; the message names file and place."""
+    """A truth that cannot be used; the message names file and position."""
 
 
 @dataclass(frozen=True)
