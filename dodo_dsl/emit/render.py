@@ -170,8 +170,10 @@ def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
         if layer != "application"
     ]
     files.append(File(f"{plan.slug}/{names['application']}", _render("application.compose.yml.j2", plan=plan)))
-    files.append(File(f"{plan.slug}/compose.yaml", _render("compose.yaml.j2", plan=plan, files=list(names.values()))))
-    files.append(File(f"{plan.slug}/.env", _render("env.j2", plan=plan, files=list(names.values()))))
+    judges = [service.name for service in plan.services if service.judge]
+    for path, template in (("compose.yaml", "compose.yaml.j2"), (".env", "env.j2")):
+        text = _render(template, plan=plan, files=list(names.values()), judges=judges)
+        files.append(File(f"{plan.slug}/{path}", text))
     files.append(File(f"{plan.slug}/test.json", to_json(plan)))
     return files
 
