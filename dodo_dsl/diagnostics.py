@@ -67,7 +67,7 @@ class Diagnostic:
 
     @property
     def sentence(self) -> str:
-        """The message, with the tests that have the problem, or their number where they are many."""
+        """The message, with the tests that have the problem, or their number if they are many."""
         if not self.tests:
             return self.message
         many = f"{len(self.tests)} tests, such as {self.tests[0]}"

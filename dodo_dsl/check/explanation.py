@@ -56,7 +56,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Asked:
-    """What the application must produce, or may produce where ``required`` is false."""
+    """What the application must produce, or may produce if ``required`` is false."""
 
     kind: str
     port: str

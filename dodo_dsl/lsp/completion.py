@@ -158,7 +158,7 @@ _KEY, _SERVICE, _VALUE, _UNIT = (
     types.CompletionItemKind.Unit,
 )
 Offer = tuple[str, types.CompletionItemKind, str, str]
-"""A word, what it is, what stands beside it, and its documentation as Markdown."""
+"""A word, what it is, what is next to it, and its documentation as Markdown."""
 TRIGGERS = [" ", "{", "[", ",", "$", ".", "/"]
 
 

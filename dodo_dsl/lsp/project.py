@@ -77,7 +77,7 @@ class ChangedSources(Sources):
     def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> Ruled:
         """Instances that are the very objects of the check before keep what it found.
 
-        A test is checked again, too, where another one took or gave up its name.
+        A test is checked again, too, if another one took or gave up its name.
         """
         former, found = self._ruled if self._inputs == inputs else ((), {})
         known = {id(test.spec): test for test in former}

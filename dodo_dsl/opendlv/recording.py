@@ -238,7 +238,7 @@ class Recording:
 
     The index takes 36 bytes of memory a message; ``index`` has the columns offset, size (bytes), data_type,
     sender_stamp, sampled and time (microseconds since the epoch), a row for each message in the order of the file.
-    ``time`` is the sample time, or where that is zero when the message was received, or else sent.
+    ``time`` is the sample time, or if that is zero when the message was received, or else sent.
     """
 
     def __init__(self, path: Path, progress: Callable[[int], None] | None = None) -> None:

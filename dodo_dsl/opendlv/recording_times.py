@@ -39,7 +39,7 @@ def within(recording: Recording, rows: Numbers) -> Numbers:
 def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:
     """What is wrong with the times of rows, in a sentence with the first of them; empty if they may be right.
 
-    ``time`` counts: the sample time, or where that is zero when the message was received, or else sent. With
+    ``time`` counts: the sample time, or if that is zero when the message was received, or else sent. With
     ``in_order`` those of a message and sender must not go back, nor a message repeat.
     """
     rows = rows[~np.isin(recording.index["data_type"][rows], list(TOOLS))]

@@ -137,7 +137,7 @@ class Result(Enum):
 
 
 def operate_semaphore(id_: int, value: int, timeout: float | None, undo: bool = False) -> Result:
-    """Add ``value`` to a semaphore (waiting while it would become negative), or wait for zero where ``value`` is 0.
+    """Add ``value`` to a semaphore (waiting while it would become negative), or wait for zero if ``value`` is 0.
 
     ``undo`` lets the kernel take the change back when this process dies. Raises OSError when the semaphore is gone.
     """

@@ -103,7 +103,7 @@ class SplitError(ValueError):
 
 
 def split_recordings(files: Sequence[Path], share: float, seed: int) -> dict[str, list[Path]]:
-    """The files by part, in their order; all in one part with the name "" where ``share`` is 0.
+    """The files by part, in their order; all in one part with the name "" if ``share`` is 0.
 
     Whole recordings are chosen, as frames of one drive are alike; the same ones for the same number of files and seed.
     Raises SplitError for fewer than two.

@@ -100,7 +100,7 @@ def truth_text(marks: Sequence[Mark], picture: str, width: int, height: int) -> 
 
 
 def drawn_boxes(picture: "Picture", marks: Sequence[Mark]) -> "Picture":
-    """A frame (height, width, 3; B, G, R) with the boxes and their classes; twice as large where it is small."""
+    """A frame (height, width, 3; B, G, R) with the boxes and their classes; twice as large if it is small."""
     import cv2
 
     scale = 2 if picture.shape[1] < _LEAST_SHOWN else 1

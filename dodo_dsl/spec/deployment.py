@@ -168,7 +168,7 @@ class Deployment:
 
 
 def build_command(prefix: str, tag: str, *names: str) -> str:
-    """What builds images of DoDo's with this prefix and tag, also where ``dodo.yml`` shows nothing about them."""
+    """What builds images of DoDo's with this prefix and tag, also if ``dodo.yml`` does not name them."""
     flags = [*(["--prefix", prefix] if prefix != Deployment.image_prefix else [])]
     flags += ["--tag", tag] if tag != Deployment.image_tag else []
     return shlex.join(["dodo", "images", "build", *names, *flags])

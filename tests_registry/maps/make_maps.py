@@ -1,6 +1,6 @@
 """Makes the maps beside this file: python tests_registry/maps/make_maps.py [FOLDER].
 
-Yellow cones stand on the left of a track, blue ones on its right, and two large red ones beside the
+Yellow cones stand on the left of a track, blue ones on its right, and two large red ones next to the
 finish. Obstacles: ``left`` and ``right`` are walls through the cones, ``finish`` is the line across the
 lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it names another start; its rows begin behind
 the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
