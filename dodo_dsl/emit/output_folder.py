@@ -53,7 +53,7 @@ def _shared(compiled: Compiled) -> dict[str, FileCopy]:
 
 
 def _write_shared(folder: Path, wanted: Mapping[str, FileCopy]) -> None:
-    """Copies of files, or links to those of the repository; the name tells the content."""
+    """Copies of files, or links to those of the repository; the name depends on the content."""
     for name, copy in wanted.items():
         if _is_shared_as(folder / name, copy):
             continue
