@@ -12,7 +12,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
-from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions, PipelineJob, packed
+from dodo_dsl.emit.pipeline_jobs import (
+    NO_OPTIONS,
+    NOTHING_COMMON,
+    SPARE_MINUTES,
+    CommonSettings,
+    JobOptions,
+    PipelineJob,
+    factored,
+    packed,
+)
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.runs import by_test, named, pooled
 from dodo_dsl.plan.test_files import FileCopy
@@ -61,7 +70,10 @@ class SearchJobs:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The stages in order, whether a gate precedes hil, the variables, the jobs, and what those without a test have."""
+    """The stages in order, whether a gate precedes hil, the variables, the jobs, and what those without a test have.
+
+    What is ``common`` to the jobs of tests is not in them.
+    """
 
     stages: tuple[str, ...]
     gate: bool
@@ -69,6 +81,7 @@ class Pipeline:
     jobs: tuple[PipelineJob, ...]
     searches: tuple[SearchJobs, ...] = ()
     options: JobOptions = NO_OPTIONS
+    common: CommonSettings = NOTHING_COMMON
 
 
 def pipeline(
@@ -91,7 +104,8 @@ def pipeline(
     if options.most_jobs:
         timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
         jobs = packed(jobs, options.most_jobs, {**timeouts, **options.seconds(by_test(suite.plans))})
-    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options)
+    common, jobs = factored(jobs, options)
+    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options, common)
 
 
 def _variables(suite: Suite, options: JobOptions) -> dict[str, str]:
