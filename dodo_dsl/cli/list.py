@@ -159,7 +159,7 @@ def _rows(specs: Sequence[Spec], unfolded: bool) -> list[tuple[str, ...]]:
     tests: dict[Path, list[Spec]] = defaultdict(list)
     for spec in specs:
         tests[spec.path].append(spec)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for spec, *others in tests.values():
         if others and not unfolded:
             dimensions = ", ".join(name for name, _ in (*spec.choice.values, *spec.choice.shown))

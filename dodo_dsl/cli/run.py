@@ -29,7 +29,6 @@ from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import Drawings, next_report
 from dodo_dsl.report.results import Circumstances
-from dodo_dsl.report.viewer.names import LOGS
 from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.session import is_real
@@ -153,7 +152,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     display.add_verbosity(
         parser,
         "print only what did not pass, and a last line with the counts",
-        "print each test's phases, checks, what the application used, and errors and warnings in logs",
+        "print each test's phases, sentence, checks, what the application used, and errors and warnings in logs",
     )
     selection.add_application(parser)
 
@@ -254,8 +253,9 @@ def run(
         with Drawings(target.folder) as drawings, runner.progress:
             outcomes = asyncio.run(runner.run(jobs, lambda job, outcome: drawings.begin(outcome, drawable(job))))
         not_run = runner.not_run()
-        logs = {job.plan.slug: job.report / LOGS for job in jobs}
-        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, logs)
+        plans = {job.plan.slug: job.plan for job in jobs}
+        about = {s: run_report.Reported(p, target.folder / s, report / s) for s, p in plans.items()}
+        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, about)
         stdout.flush()
         with undisturbed():
             circumstances = Circumstances((record(),), tuple(not_run))

@@ -200,6 +200,13 @@ class Plan:
         }
         return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}}
 
+    def place_named_in(self, text: str) -> Place | None:
+        """Where the spec has the service that a message names; None when it names none."""
+        for service in sorted(self.services, key=lambda s: -len(s.name)):
+            if re.search(rf"(?<![\w-]){re.escape(service.name)}(?![\w-])", text):
+                return self.source_map.get(f"{service.layer}.{service.name}")
+        return None
+
     def layer(self, name: str) -> tuple[PlannedService, ...]:
         return tuple(s for s in self.services if s.layer == name)
 

@@ -26,7 +26,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import FILES, SANDBOX, image_variable
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
-from dodo_dsl.plan.model import LAYERS, Place, Plan
+from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.application_files import (
     application_paths,
     env_file_findings,
@@ -82,17 +82,9 @@ def _source(volume: Mapping[str, Any], volumes: Mapping[str, Any]) -> Path | Non
     return Path(os.path.realpath(source)) if source else None
 
 
-def trace(plan: Plan, text: str) -> Place | None:
-    """The place in the spec of the service that a message about compiled files names; None when it names none."""
-    for service in sorted(plan.services, key=lambda s: -len(s.name)):
-        if re.search(rf"(?<![\w-]){re.escape(service.name)}(?![\w-])", text):
-            return plan.source_map.get(f"{service.layer}.{service.name}")
-    return None
-
-
 def traced(plan: Plan, text: str) -> str:
-    """The message followed by that place."""
-    place = trace(plan, text)
+    """The message, followed by the place in the spec of the service that it names."""
+    place = plan.place_named_in(text)
     return f"{text} ({place.file}:{place.line}:{place.column})" if place else text
 
 
