@@ -54,7 +54,7 @@ _APT_S = 10.0
 
 
 def missing(extra: str) -> str:
-    """The first module that this Python lacks for an extra; empty where it has all."""
+    """The first module that this Python lacks for an extra; empty if it has all."""
     for module in _LOADED[extra]:
         try:
             importlib.import_module(module)
@@ -114,7 +114,7 @@ def join(device: Path) -> str:
     if status.st_mode & 0o060 != 0o060 or status.st_gid == 0:
         return "only root may use it"
     words = ["usermod", "--append", "--groups", _name(grp.getgrgid, status.st_gid), _name(pwd.getpwuid, os.getuid())]
-    return f"{as_root(shlex.join(words))}, and log in anew"
+    return f"{as_root(shlex.join(words))}, and log in again"
 
 
 def _name(look_up: Callable[[int], Any], number: int) -> str:
@@ -145,7 +145,7 @@ def firmware(variable: str) -> str:
 
 
 def _source(extra: str) -> list[str]:
-    """The checkout that DoDo was installed from, with an extra; nothing where there is none, or not any more."""
+    """The checkout that DoDo was installed from, with an extra; nothing if there is none, or not any more."""
     folder, is_editable = _installed_from()
     return [*(["--editable"] if is_editable else []), f"{folder}[{extra}]"] if folder else []
 
@@ -180,7 +180,7 @@ def _for_owner(*commands: str) -> str:
 
 
 def _by_apt(packages: tuple[str, ...], least: int = 0) -> str:
-    """Installs the first package that apt has in this major version or a later one; empty where there is none."""
+    """Installs the first package that apt has in this major version or a later one; empty if there is none."""
     apt = shutil.which("apt-cache")
     for name in packages if apt else ():
         words = [str(apt), "policy", name]

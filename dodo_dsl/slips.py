@@ -222,7 +222,7 @@ def _open_quote(failure: Failure) -> Slip | None:
 
 
 def _not_indented(failure: Failure) -> Slip | None:
-    """A value in a line of its own, which begins where its key does."""
+    """A value in its own line, which begins where its key does."""
     number = failure.suspect
     above = failure.above(number)
     found = _OPEN.fullmatch(failure.line(above)) if above >= 0 else None
@@ -319,7 +319,7 @@ _NO_KEY = r"(?!.*: )(?!.*:\s*$)\s*(?:- )?(?P<at>)"
 _NAME = r"(?P<key>[A-Za-z_][\w.-]*)"
 _SEVERAL_WORDS = r"\s*(?:- )?[A-Za-z_][\w.-]*:\s+(?![\"'\[{|>])\S+ .*"
 _OR_INDENT = ", or indent the line if it goes on with the text above"
-_TEXT = "a second colon in the value of '{key}', which has to be one text"
+_TEXT = "a second colon in the value of '{key}', which must be one string"
 _IN_TEXT = r"\s*(?:- )?(?P<key>[^:]*): "
 _WRITE = "write '{key}: {value}'"
 _EQUALS = "'=' stands after '{key}', expected a colon"

@@ -43,7 +43,7 @@ Fixes = dict[Span, Fix]
 
 
 def apply_fixes(diagnostics: Iterable[Diagnostic], root: Path) -> str:
-    """Mends the files of the repository at ``root`` and returns the diff; each file appears whole. Raises OSError."""
+    """Fixes the files of the repository at ``root`` and returns the diff; each file appears whole. Raises OSError."""
     by_file: dict[Path, Fixes] = defaultdict(dict)
     for diagnostic in diagnostics:
         path = Path(diagnostic.span.file)
@@ -201,15 +201,17 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
     display.add_verbosity(parser, "print only problems, and what is stale", "print the name of each test, too")
     parser.add_argument("--fix", action="store_true",
-                        help="with --check: correct names, units and spaces where there is one way to")  # fmt: skip
+                        help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="text",
                         help="format of the diagnostics (default: text); with gitlab, sarif and junit the text goes to "
                         "standard error")  # fmt: skip
-    parser.add_argument("--forecast", type=positive, metavar="R", help="say how long the pipeline takes with R runners")
+    parser.add_argument(
+        "--forecast", type=positive, metavar="R", help="show how long the pipeline takes with R runners"
+    )
     parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
                         help="results or report with times; repeatable (default: the history here)")  # fmt: skip
     parser.add_argument("--overhead", type=patience, default=_OVERHEAD_S, metavar="S",
-                        help="seconds that a runner needs to begin a job (default: %(default)g)")  # fmt: skip
+                        help="seconds that a runner needs to start a job (default: %(default)g)")  # fmt: skip
     parser.add_argument("--search", action="append", default=[], metavar="TEST",
                         help="add jobs that together search TEST; repeatable")  # fmt: skip
     parser.add_argument("--workers", type=positive, metavar="N",
@@ -250,7 +252,7 @@ def _fixed(checked: Checked, options: argparse.Namespace, out: TextIO) -> Checke
 
 
 def _log(style: str, stdout: TextIO, stderr: TextIO) -> TextIO | None:
-    """Where people read what is wrong: a report is for a file, and the log of its job tells the same as text.
+    """Where people read what is wrong: a report is for a file, and the log of its job shows the same as text.
 
     None for JSON, which a program reads, and where the report itself is on the terminal.
     """

@@ -44,12 +44,14 @@ from dodo_dsl.terminal import printable
 def reserved(folder: Path, stdout: TextIO) -> Iterator[None]:
     """Holds a report's folder, as long as this process lives at most; says so when another run holds it already.
 
-    Both go on: their tests have folders of their own there, and the pages and results are those of the later end.
+    Both go on: their tests have their own folders there, and the pages and results are those of the later end.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         if not _locked(descriptor):
-            stdout.write(f"note: another run writes into '{folder}', too, and the report will be of the last to end; ")
+            stdout.write(
+                f"note: another run also writes into '{folder}': the last run to finish overwrites the report; "
+            )
             stdout.write("--report names another folder\n")
         yield
     finally:

@@ -123,7 +123,7 @@ def _times(outcome: Outcome) -> str:
 
 
 def _wrapped(text: str, width: int | None, outcome: Outcome | None = None) -> Iterator[Piece]:
-    """Indented lines, the first of which begins with the outcome; one line where there is no width."""
+    """Indented lines, the first of which begins with the outcome; one line if there is no width."""
     whole = f"{'':{_INDENT}}{printable(text)}"
     wrapper = textwrap.TextWrapper(
         width or len(whole) + 1,

@@ -51,7 +51,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--runs", type=positive, metavar="N", help=f"drives (default: {_RUNS}, unless --minutes is given)"
     )
     parser.add_argument(
-        "--sweep", action="store_true", help="no drives near the worst ones: all tell how often it fails"
+        "--sweep", action="store_true", help="no drives near the worst ones: all count for how often it fails"
     )
     parser.add_argument(
         "--minutes",
@@ -60,7 +60,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="look for failures no longer than that; to shrink them takes further drives",
     )
     parser.add_argument("--until-failure", action="store_true", help="end soon after the first failure, and shrink it")
-    parser.add_argument("--save", action="store_true", help="put a test of each failure beside TEST, to be kept")
+    parser.add_argument("--save", action="store_true", help="write a test of each failure next to TEST, to be kept")
     parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of the search (default: 0)")
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
@@ -76,7 +76,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--study", metavar="NAME", help=f"with --storage: which search of TEST (default: {MAIN})")
     parser.add_argument(
-        "--finish", action="store_true", help="look for nothing more: shrink the failures found, and write the result"
+        "--finish", action="store_true", help="look for nothing more: reduce the failures found, and write the result"
     )
     selection.add_application(parser)
 
@@ -142,7 +142,7 @@ def _registry(study: Study) -> Path:
     """The folder of the user's own tests; raises UsageError for a test that ships."""
     root = study.test.spec.location.root
     if package_data.is_shipped(root, study.checked.deployment.root):
-        raise UsageError("'--save' is for tests of your own: copy this one with 'dodo new NAME --extends'")
+        raise UsageError("'--save' is for your own tests: copy this one with 'dodo new NAME --extends'")
     return root
 
 

@@ -49,7 +49,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--metres", type=positive, metavar="M",
-        help=f"a rig drives no longer way than that, with 2.4 m for each way to its start (default: {_RIG_METRES:g})",
+        help=f"maximum distance that a rig drives, with 2.4 m for each return to its start (default: {_RIG_METRES:g})",
     )  # fmt: skip
     parser.add_argument("--mean", action="store_true", help="the mean margin counts, not the worst one")
     parser.add_argument(
@@ -108,7 +108,7 @@ def _limits(own: SearchSession, driven: Scenarios) -> DriveLimits:
     if driven.rigs:
         options.minutes = options.minutes or _RIG_MINUTES
         options.metres = options.metres or _RIG_METRES
-        said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of way"
+        said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of driving"
         own.stdout.write(printable(said) + "\n")
     deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
     return DriveLimits(deadline, options.metres or math.inf)

@@ -131,7 +131,7 @@ def test_an_error_is_an_error_in_junit(dodo: Command) -> None:
 def test_losses_of_messages_are_noted_below_the_test(dodo: Command) -> None:
     dodo.stages = stages(Overrun("track", 5), PASSED, Exited("track", 0))
     code, out, _ = dodo.run()
-    note = "service 'track' lost 5 messages, as its receive buffer was full: its verdict does not consider them"
+    note = "service 'track' lost 5 messages, because its receive buffer was full: its verdict does not consider them"
     assert (code, f"        note: {note}\n" in out) == (0, True), out
     assert dodo.result()["notes"] == [note]
 
@@ -186,7 +186,7 @@ def test_tampered_compiled_tests_are_refused(dodo: Command, change: dict[str, ob
 
 USAGE = [
     (("--compiled", "nowhere"), "there is no compiled test at 'nowhere': No such file or directory"),
-    (("no-such-test",), "there is no test 'no-such-test'"),
+    (("no-such-test",), "unknown test 'no-such-test'"),
     (("--application", "none.yml"), "there is no file 'none.yml', expected the application's compose file"),
     (("a/b.dodo.yml",), "there is no test at"),
     (("--seed", "-1"), "'-1' is "),
