@@ -1,4 +1,4 @@
-"""Commands that messages tell users to type. Each works where it is shown: for this user and Python, in any folder."""
+"""Commands that messages propose. Each works where it is shown: for this user and Python, in any folder."""
 
 import grp
 import importlib
@@ -126,7 +126,7 @@ def _name(look_up: Callable[[int], Any], number: int) -> str:
 
 
 def _script(name: str) -> str:
-    """A script of the checkout that installs what is missing, where it can: for root, where there is apt."""
+    """A script of the checkout that installs what is missing, if it can: for root, if there is apt."""
     checkout = package_data.checkout()
     can = checkout and os.geteuid() == 0 and shutil.which("apt-get")
     return shlex.quote(str(checkout / "scripts" / name)) if checkout and can else ""

@@ -1,4 +1,4 @@
-"""dodo images: build, push and pull images, and say what they are made of.
+"""dodo images: build, push and pull images, and list what they are made of.
 
 A deployment's own services have images, too.
 """

@@ -260,9 +260,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--level", choices=LEVELS, help="level of the new test: software, data or hardware in the loop (default: sil)"
     )
     parser.add_argument("--kind", choices=KINDS, help="kind of the new test (default: closed-loop)")
-    parser.add_argument("--extends", metavar="TEST", help="test that the new one changes; a shipped one is copied")
+    parser.add_argument("--extends", metavar="TEST", help="test that the new one extends; a shipped one is copied")
     parser.add_argument(
-        "--rec", metavar="FILE.rec", type=Path, help="recording that a new dil test plays, and takes its target from"
+        "--rec",
+        metavar="FILE.rec",
+        type=Path,
+        help="recording that a new dil test plays, with its target",
     )
 
 
