@@ -75,7 +75,7 @@ class SpecLines:
 def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters) -> Iterator[dict[str, Any]]:
     """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
     for check in outcome.checks:
-        places = list(_places(plan, check["name"], recorded)) if check.get("limit") else []
+        places = list(limit_places(plan, check["name"], recorded)) if check.get("limit") else []
         yield {
             "name": shown(check["name"], 100),
             "value": check["value"],
@@ -91,7 +91,8 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
         }
 
 
-def _places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
+def limit_places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
+    """Where the spec sets the limit of a check, each with the parameter's name, empty for a service's default."""
     if check in _OF_THE_TEST and "response" in plan.source_map:
         yield _OF_THE_TEST[check], plan.source_map["response"]
     if check.startswith(BASELINE) and "baseline" in plan.source_map:

@@ -137,7 +137,7 @@ DESK = ("desk", "--picture", "desk.png")
         (("blind", *BOX), "rig 'blind' has no camera in dodo.yml"),
         (
             ("nobody", *BOX),
-            "there is no rig 'nobody', expected one of emulated, emulated-circle, blind, desk, kiwi-static",
+            "unknown rig 'nobody', expected one of emulated, emulated-circle, blind, desk, kiwi-static",
         ),
         (("emulated",), "the emulated rig's camera sees the map of a test: name one with --test"),
         (("emulated", "--test", "hil-camera-scenes"), "matches 6 tests, expected one"),
