@@ -105,7 +105,7 @@ def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
         yield from _kind(pool.kind, rigs)
     for word in pool.names:
         if word.text in EMULATED_RIGS:
-            message = f"'{word.text}' is in no pool, as every test has one of its own"
+            message = f"'{word.text}' is in no pool, because every test has its own"
             yield Diagnostic(word.span, "rig-pool", message, f"write 'rig: {word.text}'")
         elif word.text not in rigs:
             yield Diagnostic(word.span, "unknown-rig", f"unknown rig '{word.text}'", did_you_mean(word.text, rigs))

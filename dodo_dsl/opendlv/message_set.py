@@ -154,7 +154,7 @@ class MessageSet:
     def decode(self, id_: int, payload: bytes) -> Any:
         """The message in a payload: fields in any order, the first of equal ones counts, absent ones default.
 
-        Raises MessageError for bytes that are no such message, UnknownMessage for an unknown id.
+        Raises MessageError for bytes that are not such a message, UnknownMessage for an unknown id.
         """
         return decode(self.layout(id_), payload)
 
