@@ -317,7 +317,7 @@ def test_a_file_over_5_mb_is_an_error(plan: Plan) -> None:
 
 @pytest.mark.parametrize(
     ("number", "said"),
-    [(501, "501 jobs, gitlab.com allows 500 on its free tier"), (851, "851 jobs, which take more than the 2 MB")],
+    [(501, "501 jobs, gitlab.com allows 500 on its free tier"), (1701, "1701 jobs, which take more than the 2 MB")],
 )
 def test_many_jobs_are_a_warning_at_the_test_with_most_instances(plan: Plan, number: int, said: str) -> None:
     small = replace(plan, spec="small/small.dodo.yml", slug="small")
