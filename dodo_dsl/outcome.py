@@ -79,7 +79,7 @@ class Response:
     longer than the period of the frames, ``over`` those beyond the limit of the test, None without one, ``uncopied``
     those that did not carry the sample time of their frame. ``surplus`` counts answers beyond the one that counts for
     a frame, ``surplus_frames`` the frames with any, and ``differing`` those of them that say something else. In
-    ``unasked`` of the ``pauses``, in which no frame is shown, the application sent on by a clock of its own.
+    ``unasked`` of the ``pauses``, in which no frame is shown, the application went on sending, by its own clock.
     """
 
     answers: int

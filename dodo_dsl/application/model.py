@@ -93,7 +93,7 @@ class ComposeService:
 
     @property
     def timed(self) -> Span | None:
-        """Where it declares timers of its own."""
+        """The place that declares its own timers."""
         return self._true("timed")
 
     def _true(self, key: str) -> Span | None:
@@ -151,7 +151,7 @@ class ApplicationSource:
 
     @property
     def timed(self) -> tuple[Word, ...]:
-        """The services that declare timers of their own, each with the place."""
+        """The services that declare their own timers, each with the place."""
         return tuple((each.name, each.timed) for each in self.services.values() if each.timed)
 
     @functools.cached_property

@@ -144,7 +144,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=seed, metavar="N", help="override the specs' seed")
     parser.add_argument("--repeat", type=positive, default=1, metavar="N",
-                        help="run every test N times; in lockstep, print which values differ")  # fmt: skip
+                        help="run every test N times; in lockstep, say which values differ")  # fmt: skip
     parser.add_argument("--samples", type=positive, metavar="N",
                         help="run each test with 'vary' at N values of its ranges")  # fmt: skip
     parser.add_argument("--fail-fast", action="store_true", help="start no further test after one that did not pass")

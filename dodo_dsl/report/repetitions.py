@@ -73,7 +73,7 @@ def values(outcome: Outcome, report: Path) -> dict[str, str]:
 
 
 def path_of(recording: Path) -> str:
-    """A hash of all messages of the vehicle's path in a recording; "none" where it cannot be read."""
+    """A hash of all messages of the vehicle's path in a recording; "none" if it cannot be read."""
     from dodo_dsl.opendlv.message_set import MessageSet
     from dodo_dsl.opendlv.recording import read_envelopes
 

@@ -1,7 +1,7 @@
 """The application under test as the clock sees it: it gets pictures and answers them.
 
 How long it takes for an answer is measured: lockstep hides that, as the world waits for it. So is whether it goes on
-by a clock of its own while the world waits.
+by its own clock while the world waits.
 """
 
 import statistics

@@ -51,7 +51,7 @@ class FindingUnderLoad:
 def consider(finding: Finding, load: MachineLoad | None, is_timed: bool = False) -> FindingUnderLoad:
     """An error in place of a failure that may be due to a busy machine; anything else as it is.
 
-    ``is_timed`` tells that the application acts by its own clock, so that lockstep is no way out.
+    ``is_timed`` means that the application acts by its own clock, so that lockstep does not help.
 
     Only findings that depend on time can turn. An application that waits for a tenth of the time answers each picture
     of a 10 Hz camera 10 ms later on average, some much later, as waits come in bursts: on two cores with four busy
@@ -167,7 +167,7 @@ def _notes(response: Response, lockstep: Lockstep, timed: Sequence[str]) -> Iter
 def own_clock(response: Response, timed: Sequence[str] = ()) -> str:
     """That an application does not only answer frames, and what follows for its results; empty where it does.
 
-    It is a note, and no error: a program with timers may well give the same verdict each time, as one that answers
+    It is a note, and not an error: a program with timers may well give the same verdict each time, as one that answers
     each frame twice does, and of the drive that was judged everything is true.
     """
     frames, counts = response.answers + 1, []
