@@ -82,7 +82,7 @@ def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
     assert "growing by 300 MB/min; it may use 2,000 MB of memory</dd>" in page
     assert (
         second.in_words()
-        == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to tell whether memory grows"
+        == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to measure its growth"
     )
 
 
