@@ -3,16 +3,19 @@
 import base64
 import hashlib
 import re
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from markupsafe import Markup
 
 from dodo_dsl.report import overview
+from dodo_dsl.report.check_display import MEANINGS, BarPlace, Bars, place
 from dodo_dsl.report.comparison import compare
 from dodo_dsl.report.overview import ReportFiles, ReportPicture, breakable, render
 from dodo_dsl.report.report_folder import write_summaries
-from dodo_dsl.report.results import GivenReport
+from dodo_dsl.report.results import Circumstances, GivenReport, Repository, RunRecord
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named, write
 from tests.report.viewer import drives, failures
@@ -184,3 +187,68 @@ def test_strings_of_others_are_text(chromium: Chromium, tmp_path: Path) -> None:
 
 def test_names_of_matrices_break_between_their_values_alone() -> None:
     assert breakable("t[a=0.45,b=<x>]") == "t<wbr>[a=0.45,<wbr>b=&lt;x&gt;]"
+
+
+@pytest.mark.parametrize(
+    ("checked", "expected"),
+    [
+        (check(2.0, ok=False, max=1), BarPlace(0, 50, 50, 25, False)),
+        (check(0.5, min=1, ok=False), BarPlace(50, 100, 33, 17, False)),
+        (check(3.0, min=1), BarPlace(50, 100, 50, 33, True)),
+        (check(2.0, min=1, max=3), BarPlace(25, 75, 25, 25, True)),
+        (check(9.0, min=1, max=3, ok=False), BarPlace(25, 75, 75, 21, False)),
+        (check(0.0, min=0, ok=False), BarPlace(50, 100, 50, 2, False)),  # a wall that is touched
+        (check(None, min=1, ok=False), None),
+        (check(2.0), None),
+    ],
+)
+def test_a_bar_leads_from_the_limit_to_the_value(checked: dict[str, object], expected: BarPlace | None) -> None:
+    assert place(checked) == expected
+
+
+def test_equal_bars_of_a_page_are_drawn_once() -> None:
+    bars = Bars()
+    assert bars.symbols() == ""
+    drawn = [bars.bar(check(value, max=4)) for value in (1.0, 3.0, 1.0)]
+    assert drawn[0] == drawn[2] != drawn[1]
+    assert bars.symbols().count("<symbol") == 2
+
+
+def test_a_matrix_is_one_row_and_what_did_not_pass_comes_first() -> None:
+    found = [(row.outcomes[0].name, len(row.outcomes), row.count("failed")) for row in overview.rows(TESTS)]
+    assert found == [("sil-b", 1, 1), ("dil-m[light=dark,speed=1]", 4, 2), ("hil-c", 1, 0), ("sil-a", 1, 0)]
+
+
+def test_a_usual_page_of_a_hundred_tests_is_below_half_a_megabyte() -> None:
+    """Each with a drive, seven checks with limits, fifteen without, logs of eight services and the latest runs."""
+    limited = [{**check(0.2, max=1.0, unit="m"), "name": name} for name in list(MEANINGS)[:7]]
+    counted = [{**check(7.0), "name": name} for name in list(MEANINGS)[7:22]]
+    tests = [named(f"sil-{n}", checks=(*limited, *counted), description="Find the cones.") for n in range(100)]
+    way = Markup("<svg>" + "l6 0 " * 120 + "</svg>")
+    page = render(
+        tests,
+        ReportFiles(
+            {test.slug: [] for test in tests},
+            {test.slug: [f"{test.slug}/logs/environment.{layer}.log" for layer in "abcdefgh"] for test in tests},
+            {test.slug: f"{test.slug}/test.rec" for test in tests},
+            {},
+            {test.slug: f"{test.slug}/drive.html" for test in tests},
+            ways={test.slug: way for test in tests},
+        ),
+    )
+    assert 250_000 < len(page.encode()) < 500_000
+
+
+def test_the_branch_is_shown_where_its_commit_is_the_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    git = ("git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
+    for words in (("init", "-q", "-b", "<main>"), ("commit", "-q", "--allow-empty", "-m", "x")):
+        subprocess.run([*git, *words], check=True)
+    commit = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+    for name, value in (("CI_COMMIT_SHA", "b" * 40), ("CI_COMMIT_REF_NAME", "of-the-job")):
+        monkeypatch.setenv(name, value)
+    for of_run, shown_branch in ((commit, "&lt;main&gt;"), ("b" * 40, "of-the-job"), ("c" * 40, None)):
+        run = RunRecord("2026-11-23T04:10:00+00:00", "host", "1", "dodo run", (Repository("tests", of_run, False),))
+        write_summaries(tmp_path / "report", TESTS, circumstances=Circumstances((run,)))
+        found = re.findall("<dt>Branch</dt><dd>(.*?)</dd>", (tmp_path / "report" / "index.html").read_text())
+        assert found == ([shown_branch] if shown_branch else [])
