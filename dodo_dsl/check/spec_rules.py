@@ -81,7 +81,7 @@ def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
     spec = context.spec
     if spec.level == "hil":
         return
-    if spec.max_response_s is not None:
+    if spec.max_response_s is not None and "clock" in spec.spans:  # else the command line chose it
         message = "with clock virtual computing takes no test time, so that no answer is slow"
         hint = "limit answers with clock lockstep, or processor time with 'resources'"
         yield Diagnostic(spec.span("response"), "clock-virtual", message, hint)

@@ -155,7 +155,9 @@ def applied(spec: Spec, settings: Settings) -> Spec:
     """The spec with the settings; a test on hardware keeps its clock."""
     is_kept = settings.keeps_virtual and spec.clock == VIRTUAL
     if settings.clock and spec.level != "hil" and not is_kept:
-        spec = replace(spec, clock=settings.clock)
+        left_out = {"clock"} if settings.clock == VIRTUAL else set()
+        spans = {key: span for key, span in spec.spans.items() if key not in left_out}
+        spec = replace(spec, clock=settings.clock, spans=spans)
     if settings.isolation:
         spans = {key: span for key, span in spec.spans.items() if key != "isolation"}
         spec = replace(spec, isolation=settings.isolation, spans=spans)

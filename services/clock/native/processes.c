@@ -327,6 +327,14 @@ bool processes_are_quiet(void)
     return is_listed() && first_look() && network_is_empty() && second_look() && last_number() == listed_number;
 }
 
+bool processes_have_ended(void)
+{
+    for (int at = 0; at < thread_count; at++)
+        if (!strchr("ZX", state_of(&threads[at])))
+            return false;
+    return true;
+}
+
 struct busy_thread processes_busy(void)
 {
     return busy;
