@@ -131,6 +131,9 @@ class SteppedApplication:
         self._reading: set[str] = set()
         """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
 
+    def begin(self, now: int) -> None:
+        """It may still be starting: the first picture waits for it."""
+
     def expect_at(self, now: int) -> None:
         """Without cameras, the application answers the services' messages in the step of this time (us)."""
         self._link.drain()

@@ -42,6 +42,7 @@ class Application(Protocol):
     waited_first: float
     waited: float
 
+    def begin(self, now: int) -> None: ...
     def expect_at(self, now: int) -> None: ...
     def remember(self, messages: Iterable[EncodedEnvelope]) -> None: ...
     def show(self, shown: Sequence[StepResult], now: int) -> None: ...
@@ -95,6 +96,7 @@ class Stepper:
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
         self._deliver([encode(begin)], "")
+        self.application.begin(self.now)
         while not self.stopped():
             if not self._memories:
                 self.application.expect_at(self.now)

@@ -277,6 +277,15 @@ class VirtualApplication:
         """What the clock reports of the answers at the end."""
         return self.answers.facts()
 
+    def begin(self, now: int) -> None:
+        """Let it come to the begin of the test (us), before services send anything; what it sent is left out.
+
+        Raises as ``show``.
+        """
+        self._agent.open(self._stopped)
+        self._run(now)
+        self.answers.begin()
+
     def expect_at(self, now: int) -> None:
         """Without cameras, nothing is to be expected."""
 
@@ -288,10 +297,6 @@ class VirtualApplication:
 
         For the first ones it has to wait; raises ApplicationSilent, ApplicationFloods and ServiceSilent.
         """
-        if not self.frames:
-            self._agent.open(self._stopped)
-            self._link.drain()
-            self.answers.begin()
         self.frames += 1
         self._shown_at = now
         self._run(now)

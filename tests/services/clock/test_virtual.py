@@ -107,6 +107,8 @@ def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path
 
     with agent(tmp_path, answer) as time:
         driven = application(time, sent, Link(drain))
+        driven.begin(EPOCH)
+        assert not waiting
         driven.show((), EPOCH)
         driven.await_answer(EPOCH + STEP)
         taken = [(e.received - EPOCH, e.sample_time, e.sender_stamp) for e in driven.collect()]
@@ -130,12 +132,13 @@ def test_who_does_not_wait_is_named(tmp_path: Path, frame: int, report: dict[str
     steps = iter(range(9))
 
     def answer(until: int) -> list[object]:
-        return [*([{"busy": busy}] if next(steps) == (frame - 1) * 2 else []), reached(until)]
+        return [*([{"busy": busy}] if next(steps) == (frame - 1) * 2 + 1 else []), reached(until)]
 
     with agent(tmp_path, answer) as time:
         driven = application(time)
 
         def drive() -> None:
+            driven.begin(EPOCH)
             for step in range(frame):
                 driven.show((), EPOCH + step * STEP)
                 driven.await_answer(EPOCH + (step + 1) * STEP)
@@ -153,6 +156,7 @@ def test_it_goes_on_only_when_the_time_is_reached(tmp_path: Path) -> None:
     noise = [b"{}\n[]\n\xff\nnull\n" + b"[" * 5000 + b"\n", {"now": "1"}, {"busy": 3}, reached(EPOCH - 1), b"{"]
     with agent(tmp_path, lambda until: [*noise, b"\n", reached(until), reached(until)]) as time:
         driven = application(time)
+        driven.begin(EPOCH)
         for step in range(3):
             driven.show((), EPOCH + step * STEP)
             driven.await_answer(EPOCH + (step + 1) * STEP)
@@ -177,7 +181,7 @@ def test_reports_are_taken_as_far_as_they_can_be(line: bytes, expected: object) 
 def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(tmp_path: Path) -> None:
     with agent(tmp_path, lambda _: [{"destroyed": True}]) as time:
         with pytest.raises(ApplicationSilent, match="the application destroyed the page"):
-            application(time).show((), EPOCH)
+            application(time).begin(EPOCH)
         (tmp_path / "command").write_text("end\n")
         with pytest.raises(ServiceSilent, match="has ended"):
             while True:
@@ -216,7 +220,7 @@ def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(
     begun = iter([[0, 1], [0, 1], [0]])
     with agent(tmp_path, lambda until: [reached(until, notes=notes, services=next(begun), repeatable=False)]) as time:
         driven = application(time)
-        driven.show((), EPOCH)
+        driven.begin(EPOCH)
         driven.await_answer(EPOCH + STEP)
         with pytest.raises(ServiceSilent, match="service 'eye' never loaded DoDo's clock"):
             driven.show((), EPOCH + STEP)
@@ -228,7 +232,7 @@ def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(
 def test_without_an_agent_the_test_cannot_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(virtual, "AGENT_PATIENCE_S", 0.0)
     with pytest.raises(ServiceSilent, match="lets the application's time go on"):
-        application(TimeAgent(tmp_path)).show((), EPOCH)
+        application(TimeAgent(tmp_path)).begin(EPOCH)
 
 
 def expected(steps: int, every: int) -> list[tuple[int, float]]:
