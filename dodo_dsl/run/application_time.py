@@ -68,9 +68,10 @@ def built() -> ApplicationTime:
     """What ``scripts/setup`` has built, or else builds it in the user's cache; raises BackendError."""
     sources = package_data.services() / "clock" / "native"
     files = sorted(path for path in sources.iterdir() if path.suffix in (".c", ".h") or path.name == "Makefile")
-    ready = sources / "build"
-    if _is_ready(ready) and min(_changed(ready / LIBRARY), _changed(ready / AGENT)) >= max(map(_changed, files)):
-        return ApplicationTime((ready / LIBRARY).resolve(), (ready / AGENT).resolve())
+    if checkout := package_data.checkout():
+        ready = checkout / "build" / "time"
+        if _is_ready(ready) and min(_changed(ready / LIBRARY), _changed(ready / AGENT)) >= max(map(_changed, files)):
+            return ApplicationTime((ready / LIBRARY).resolve(), (ready / AGENT).resolve())
     digest = hashlib.sha256(b"\0".join([platform.machine().encode(), *(path.read_bytes() for path in files)]))
     try:
         folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}")
