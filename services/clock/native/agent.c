@@ -30,6 +30,7 @@ enum {
     END_MS = 100,         /* between looks whether the test is over */
     REPORT_MS = 500,      /* between reports on a busy thread */
     START_PATIENCE_S = 3, /* for services that have not begun yet, since the last one did */
+    UNSEEN_WAIT_MS = 20,  /* that all must sleep, if one of them does not wait in the library but elsewhere */
     SHORTEST_NAP_US = 20,
     LONGEST_NAP_US = 1000,
     DESTROYED = 3,
@@ -46,6 +47,7 @@ static struct options {
 
 static struct time_page *page;
 static int command_file = -1, reply_file = -1, wakers[TIME_SLOTS];
+static uint32_t waits_unseen[TIME_SLOTS]; /* one more than `wake` of a thread that was found to wait elsewhere, or has ended */
 static uint64_t grants;
 static uint32_t notes_told;
 static volatile sig_atomic_t is_over;
@@ -194,6 +196,24 @@ static void free_dead_slots(void)
     }
 }
 
+/* Whether a thread runs by its slot: in wait4, for instance, the kernel calls one asleep that still runs. */
+static bool one_runs(void)
+{
+    for (unsigned at = 0, end = used_slots(); at < end; at++) {
+        struct time_slot *slot = &page->slot[at];
+        if (slot->state == TIME_RUNNING && waits_unseen[at] != slot->wake + 1)
+            return true;
+    }
+    return false;
+}
+
+static void note_unseen_waits(void)
+{
+    for (unsigned at = 0, end = used_slots(); at < end; at++)
+        if (page->slot[at].state == TIME_RUNNING)
+            waits_unseen[at] = page->slot[at].wake + 1;
+}
+
 static void advance(int64_t to_ns)
 {
     if (to_ns > page->now_ns)
@@ -289,16 +309,21 @@ static bool next_command(char *line, size_t size)
 /* Waits until all threads sleep; false when the agent is to end. */
 static bool await_quiet(void)
 {
-    int64_t since = wall_ns(), reported = since;
+    int64_t since = wall_ns(), reported = since, asleep_since = 0;
     int64_t nap = SHORTEST_NAP_US;
     processes_begin_wait();
     while (!has_ended) {
         uint32_t seen = page->activity;
-        if (processes_are_quiet()) {
+        int64_t now = wall_ns();
+        if (!processes_are_quiet()) {
+            asleep_since = 0;
+        } else if (!one_runs() || (asleep_since && now - asleep_since > UNSEEN_WAIT_MS * (SECOND / 1000))) {
+            note_unseen_waits();
             free_dead_slots();
             return true;
+        } else if (!asleep_since) {
+            asleep_since = now;
         }
-        int64_t now = wall_ns();
         if (now - since > 100 * SECOND / 1000) {
             char line[64];
             if (is_serving && next_command(line, sizeof line)) {

@@ -364,6 +364,7 @@ void in_forked_child(void)
     queues_after_fork();
     files_after_fork();
     timers_after_fork();
+    processes_after_fork();
     adopt_slot(child_slot);
     begin_as_ready();
 }

@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 #include <threads.h>
 
-enum { RETRY_NS = 1000000 };
+enum { MOST_CHILDREN = 128, RETRY_NS = 1000000, LOOK_AGAIN_NS = 100000000 };
 
 static pthread_key_t at_end;
 
@@ -136,25 +136,76 @@ PUBLIC int thrd_join(thrd_t thread, int *result)
     return thrd_success;
 }
 
+/* -- processes ------------------------------------------------------------------------------------------------------ */
+
+static _Atomic int children[MOST_CHILDREN];
+
+static void add_child(int pid)
+{
+    for (int at = 0, none = 0; pid > 0 && at < MOST_CHILDREN; at++, none = 0)
+        if (atomic_compare_exchange_strong(&children[at], &none, pid))
+            return;
+}
+
+static void remove_child(int pid)
+{
+    for (int at = 0; pid > 0 && at < MOST_CHILDREN; at++)
+        if (children[at] == pid)
+            children[at] = 0;
+}
+
+void processes_after_fork(void)
+{
+    memset(children, 0, sizeof children);
+}
+
+PUBLIC pid_t fork(void)
+{
+    is_managed();
+    pid_t child = real.fork();
+    add_child(child);
+    return child;
+}
+
 /* The parent of a vfork waits until the child executes a program; that of a fork need not. */
 PUBLIC pid_t vfork(void)
 {
     return fork();
 }
 
-/* -- waits that the kernel ends ------------------------------------------------------------------------------------- */
+/* Until a child may have ended: 0 or EINTR. In wait4 itself, a thread seems to sleep while it takes the child's status,
+ * and the agent would let time go on. */
+static int wait_for_child(pid_t wanted)
+{
+    struct pollfd files[MOST_CHILDREN + 1];
+    unsigned count = 0;
+    for (int at = 0; at < MOST_CHILDREN; at++) {
+        int pid = wanted > 0 ? (at ? 0 : wanted) : children[at];
+        long file = pid ? RAW_2(SYS_pidfd_open, pid, 0) : -1;
+        if (file >= 0)
+            files[count++] = (struct pollfd){.fd = (int)file, .events = POLLIN};
+    }
+    int error = wait_for_files(files, count, later(now_ns(), count ? LOOK_AGAIN_NS : RETRY_NS), NULL);
+    for (unsigned at = 0; at < count; at++)
+        RAW_1(SYS_close, files[at].fd);
+    return error;
+}
 
 PUBLIC pid_t wait4(pid_t pid, int *status, int options, struct rusage *usage)
 {
-    long result = RAW_4(SYS_wait4, pid, status, options | WNOHANG, usage);
-    if (result == 0 && options & WNOHANG)
-        count_spin();
-    if (result != 0 || options & WNOHANG)
+    for (;;) {
+        long result = RAW_4(SYS_wait4, pid, status, options | WNOHANG, usage);
+        if (result == 0 && is_managed()) {
+            if (options & WNOHANG)
+                count_spin();
+            else if (wait_for_child(pid) != EINTR || self.is_restarting)
+                continue;
+            else
+                return fail_with(EINTR);
+        }
+        remove_child((int)result);
         return (pid_t)answer(result);
-    enter_kernel();
-    result = RAW_4(SYS_wait4, pid, status, options, usage);
-    leave_kernel();
-    return (pid_t)answer(result);
+    }
 }
 
 PUBLIC pid_t waitpid(pid_t pid, int *status, int options)
@@ -174,13 +225,23 @@ PUBLIC pid_t wait(int *status)
 
 PUBLIC int waitid(idtype_t type, id_t id, siginfo_t *about, int options)
 {
-    if (!(options & WNOHANG))
-        enter_kernel();
-    long result = RAW_6(SYS_waitid, type, id, about, options, NULL, 0);
-    if (!(options & WNOHANG))
-        leave_kernel();
-    return (int)answer(result);
+    for (;;) {
+        siginfo_t found = {0};
+        long result = RAW_6(SYS_waitid, type, id, &found, options | WNOHANG, NULL, 0);
+        if (!result && !found.si_pid && !(options & WNOHANG) && is_managed()) {
+            if (wait_for_child(type == P_PID ? (pid_t)id : -1) != EINTR || self.is_restarting)
+                continue;
+            return fail_with(EINTR);
+        }
+        if (!(options & WNOWAIT))
+            remove_child(found.si_pid);
+        if (about && !result)
+            *about = found;
+        return (int)answer(result);
+    }
 }
+
+/* -- waits that the kernel ends ------------------------------------------------------------------------------------- */
 
 PUBLIC int semtimedop(int id, struct sembuf *operations, size_t count, const struct timespec *timeout)
 {

@@ -21,6 +21,7 @@ enum { MOST_THREADS = 4096, MOST_PROCESSES = 4096, MOST_TEXT = 4096, MOST_REFUSA
 struct thread {
     int pid, tid;
     int stat, runs; /* descriptors of its files stat, and schedstat or status */
+    bool has_ended;
     uint64_t got;   /* how often it had got a processor at the first look */
     unsigned wait;  /* the wait in which `ran_before_ns` was read */
     uint64_t ran_before_ns;
@@ -32,6 +33,8 @@ static int thread_count, own_depth, own_pid, network = -1, numbers = -1;
 static int others[MOST_PROCESSES], other_count; /* processes that will never be the application's */
 static int undecided[MOST_PROCESSES], undecided_count;
 static long listed_number = -1;
+static bool is_complete; /* two lists with all asleep in between were the same: none is about to begin that has its number */
+static int new_count;    /* threads that the last list had and the one before had not */
 static bool has_schedstat;
 static unsigned current_wait = 1;
 static struct busy_thread busy;
@@ -150,6 +153,7 @@ static void add_threads(int pid, int *kept, int old_count)
         }
         int stat = open_file(pid, tid, "stat"), runs = open_file(pid, tid, has_schedstat ? "schedstat" : "status");
         threads[thread_count++] = (struct thread){.pid = pid, .tid = tid, .stat = stat, .runs = runs};
+        new_count++;
     }
     if (tasks)
         closedir(tasks);
@@ -170,7 +174,7 @@ static bool list(void)
         long number = last_number();
         struct thread *old = threads;
         int old_count = thread_count, kept = 0;
-        threads = before, before = old, thread_count = 0, undecided_count = 0;
+        threads = before, before = old, thread_count = 0, undecided_count = 0, new_count = 0;
         DIR *proc = opendir("/proc");
         for (struct dirent *entry; proc && (entry = readdir(proc));) {
             int pid = atoi(entry->d_name);
@@ -182,6 +186,7 @@ static bool list(void)
         for (int at = 0; at < old_count; at++)
             close_thread(&before[at]);
         listed_number = proc && number == last_number() ? number : -1;
+        is_complete = false;
         if (listed_number >= 0)
             return true;
     }
@@ -190,7 +195,7 @@ static bool list(void)
 
 static bool is_listed(void)
 {
-    if (last_number() != listed_number || listed_number < 0)
+    if (!is_complete || last_number() != listed_number)
         return list();
     for (int at = 0; at < undecided_count; at++)
         if (has_folder(undecided[at]))
@@ -253,8 +258,11 @@ static char state_of(const struct thread *each)
 static bool sleeps(struct thread *each)
 {
     char state = state_of(each);
-    if (strchr("SZXTtx", state))
-        return true;
+    if (strchr("SZXTtx", state)) {
+        bool ends = !strchr("STt", state) && !each->has_ended;
+        each->has_ended |= ends; /* who waits for it may not have been woken yet: look once more */
+        return !ends;
+    }
     note_busy(each, state);
     return false;
 }
@@ -324,7 +332,11 @@ void processes_begin_wait(void)
 
 bool processes_are_quiet(void)
 {
-    return is_listed() && first_look() && network_is_empty() && second_look() && last_number() == listed_number;
+    if (!is_listed() || !first_look() || !network_is_empty() || !second_look() || last_number() != listed_number)
+        return false;
+    if (!is_complete)
+        is_complete = list() && !new_count;
+    return is_complete;
 }
 
 bool processes_have_ended(void)
