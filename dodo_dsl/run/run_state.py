@@ -48,6 +48,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
+from dodo_dsl.spec.model import VIRTUAL
 
 MOST_NOTES = 100
 MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
@@ -313,7 +314,7 @@ class RunState:
                 *use.notes,
             ),
             machine=considered.load,
-            response=self.response,
+            response=None if plan.clock == VIRTUAL else self.response,
             resources=self.resources,
         )
 

@@ -48,7 +48,7 @@ def pool_of(node: Node | None) -> Pool | None:
 class ResourceLimits:
     """Millions of bytes of memory, its growth in such in a minute, seconds on processors, and these by the test's time.
 
-    None where there is no limit.
+    None if there is no limit.
     """
 
     max_memory_mb: float | None = None
@@ -122,19 +122,23 @@ class Use:
     parameters: dict[str, Entry] = field(default_factory=dict)
 
 
+VIRTUAL = "virtual"
+STEPPED_CLOCKS = ("lockstep", VIRTUAL)
+
+
 @dataclass(frozen=True)
 class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
-    ``pool`` says which rigs will do where the spec names none, and the deployment says which ones these are.
-    ``isolation`` is None where the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
+    ``pool`` shows which rigs will do where the spec names none, and the deployment shows which ones these are.
+    ``isolation`` is None if the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
     to take what only a simulation knows. ``frames`` is one of FRAMES, ``frames_hz`` None for the cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``resources`` are the limits of what each of the application's services uses, None without any.
     ``variables`` are those that the application gets from the test, ``goals`` the soft ones by the names of checks.
     ``baseline`` names an earlier result, than which checks must not be worse.
-    ``is_whole`` is False where services could not be read, so that missing producers are not reported.
+    ``is_whole`` is False if services could not be read, so that missing producers are not reported.
     ``ranges`` are those of ``vary``, ``template`` is the instance before their values were filled in, and ``corners``
     are the same instance at the ends of the ranges, which are checked but never run.
     """
@@ -183,6 +187,11 @@ class Spec:
     def slug(self) -> str:
         """The instance's name in folders, projects and jobs: ``name--light-dark``"""
         return (self.name or self.location.stem) + self.choice.slug
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether the world waits for the application: in lockstep, with its own time or the test's."""
+        return self.clock in STEPPED_CLOCKS
 
     def span(self, key: str) -> Span:
         return self.spans.get(key, Span(str(self.path)))

@@ -106,6 +106,9 @@ class JudgedFigures:
     notes: tuple[str, ...] = ()
 
 
+UNTIMED = "the time of answers is not judged, as with clock virtual computing takes no test time"
+
+
 def judged_response(response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> JudgedFigures:
     """Judges the answers by the limits of the test; ``services`` are the application's."""
     if response is None or lockstep is None:
@@ -146,6 +149,8 @@ def _notes(response: Response, lockstep: Lockstep) -> Iterator[str]:
         waits = " with what it waited for a processor" if response.processor_median_s is None else ""
         frames = f"{response.worst_s / response.period_s:.0f} frames, which outside lockstep would not have waited"
         yield f"the answer{which} took {response.worst_s:.3g} s{waits}, as long as {frames}"
+    if lockstep.max_response_s is not None and response.over is None:
+        yield UNTIMED
     is_unseen = response.processor_median_s is None and response.over is not None
     if is_unseen and (response.over or 0) > lockstep.response_over * response.answers:
         yield UNSEEN

@@ -351,6 +351,14 @@ bool processes_are_quiet(bool is_strict)
     return is_complete;
 }
 
+bool processes_have_ended(void)
+{
+    for (int at = 0; at < thread_count; at++)
+        if (!strchr("ZX", state_of(&threads[at])))
+            return false;
+    return true;
+}
+
 struct busy_thread processes_busy(void)
 {
     return busy;

@@ -27,5 +27,7 @@ void processes_begin_wait(void);
 bool processes_are_quiet(bool is_strict);
 /* The thread that was found busy at last. */
 struct busy_thread processes_busy(void);
+/* Whether nothing of the application is left. */
+bool processes_have_ended(void);
 
 #endif
