@@ -30,7 +30,7 @@ enum {
     END_MS = 100,         /* between looks whether the test is over */
     REPORT_MS = 500,      /* between reports on a busy thread */
     START_PATIENCE_S = 3, /* for services that have not begun yet, since the last one did */
-    UNSEEN_WAIT_MS = 20,  /* that all must sleep, if one of them does not wait in the library but elsewhere */
+    UNSEEN_WAIT_MS = 1000, /* that all must sleep, if one of them does not wait in the library and it is not known where */
     SHORTEST_NAP_US = 20,
     LONGEST_NAP_US = 1000,
     DESTROYED = 3,
@@ -315,15 +315,13 @@ static bool await_quiet(void)
     while (!has_ended) {
         uint32_t seen = page->activity;
         int64_t now = wall_ns();
-        if (!processes_are_quiet()) {
-            asleep_since = 0;
-        } else if (!one_runs() || (asleep_since && now - asleep_since > UNSEEN_WAIT_MS * (SECOND / 1000))) {
+        bool is_strict = one_runs() && (!asleep_since || now - asleep_since < UNSEEN_WAIT_MS * (SECOND / 1000));
+        if (processes_are_quiet(is_strict)) {
             note_unseen_waits();
             free_dead_slots();
             return true;
-        } else if (!asleep_since) {
-            asleep_since = now;
         }
+        asleep_since = !is_strict || !processes_are_quiet(false) ? 0 : asleep_since ? asleep_since : now;
         if (now - since > 100 * SECOND / 1000) {
             char line[64];
             if (is_serving && next_command(line, sizeof line)) {

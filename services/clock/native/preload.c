@@ -346,6 +346,23 @@ __attribute__((constructor)) static void on_load(void)
     is_managed();
 }
 
+__attribute__((destructor)) static void on_unload(void)
+{
+    release_slot();
+}
+
+PUBLIC void _exit(int status)
+{
+    release_slot();
+    for (;;)
+        RAW_1(SYS_exit_group, status);
+}
+
+PUBLIC void _Exit(int status)
+{
+    _exit(status);
+}
+
 /* -- fork ----------------------------------------------------------------------------------------------------------- */
 
 static uint32_t child_process;

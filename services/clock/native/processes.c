@@ -277,6 +277,18 @@ static bool first_look(void)
     return true;
 }
 
+/* Whether no thread is on a processor or waits for one: the kernel then says where it sleeps, if we may know. */
+static bool all_are_off(void)
+{
+    for (int at = 0; at < thread_count; at++) {
+        char path[64], text[128];
+        snprintf(path, sizeof path, "/proc/%d/task/%d/wchan", threads[at].pid, threads[at].tid);
+        if (read_file(path, text, sizeof text) > 0 && !strcmp(text, "0") && !strchr("ZX", state_of(&threads[at])))
+            return false;
+    }
+    return true;
+}
+
 static bool second_look(void)
 {
     for (int at = 0; at < thread_count; at++)
@@ -330,9 +342,9 @@ void processes_begin_wait(void)
     busy = (struct busy_thread){0};
 }
 
-bool processes_are_quiet(void)
+bool processes_are_quiet(bool is_strict)
 {
-    if (!is_listed() || !first_look() || !network_is_empty() || !second_look() || last_number() != listed_number)
+    if (!is_listed() || !first_look() || !network_is_empty() || (is_strict && !all_are_off()) || !second_look() || last_number() != listed_number)
         return false;
     if (!is_complete)
         is_complete = list() && !new_count;
