@@ -270,6 +270,7 @@ class _Builder:
             baseline=resolved_baseline(spec).values,
             import_paths=self.shared.imports,
             source_map=self.places,
+            timed=tuple(name for name, _ in self.application.timed),
         )
 
     def _subnet(self, services: Sequence[PlannedService]) -> str:

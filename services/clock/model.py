@@ -98,6 +98,7 @@ class Stepper:
         self._deliver([encode(begin)], "")
         self.application.begin(self.now)
         while not self.stopped():
+            self.application.pause()
             if not self._memories:
                 self.application.expect_at(self.now)
             going = self._go_each((*self.roles.advance, *self.roles.sense))
