@@ -5,6 +5,7 @@ from decimal import Decimal
 
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.spec.arguments import ResolvedService
+from dodo_dsl.spec.model import VIRTUAL
 
 DEFAULT_HZ = 10.0
 DETECTIONS = "opendlv.logic.perception.Detection"
@@ -28,9 +29,17 @@ def rates(services: Iterable[ResolvedService]) -> dict[str, float]:
     return found
 
 
-def step_hz(wiring: Wiring, rates: Mapping[str, float]) -> float:
-    """Steps per second: the rate of the fastest camera; ``rates`` are the services' in Hz."""
-    return max((rates[name] for name in cameras_of(wiring) if name in rates), default=DEFAULT_HZ)
+def step_hz(wiring: Wiring, rates: Mapping[str, float], clock: str = "lockstep") -> float:
+    """Steps per second: the rate of the fastest camera; ``rates`` are the services' in Hz.
+
+    Where the application's own time is the test's, without a camera that of the fastest service that it hears.
+    """
+    sources = cameras_of(wiring)
+    if clock == VIRTUAL and not sources:
+        sources = {
+            e.service for e in wiring.produced if any(i.port.consumes(e.port) for i in wiring.application_consumes)
+        }
+    return max((rates[name] for name in sources if name in rates), default=DEFAULT_HZ)
 
 
 def rates_fit(rate: float, step: float) -> bool:
@@ -65,6 +74,11 @@ def other_inputs(wiring: Wiring) -> list[str]:
     """Other messages of the application that services of the test consume."""
     chosen = answers(wiring)
     return [name for name in _names(_from_application(wiring)) if name not in chosen]
+
+
+def all_inputs(wiring: Wiring) -> list[str]:
+    """All messages of the application that services of the test consume."""
+    return _names(_from_application(wiring))
 
 
 def _from_application(wiring: Wiring) -> list[End]:

@@ -7,6 +7,7 @@
 ``clock-rate``: in lockstep a test steps from frame to frame, so all rates have to fit the camera's.
 ``clock-answers``: in lockstep a message has to complete the application's answer to a frame.
 ``clock-timed``: in lockstep only time that frames bring goes on, and not that of an application's own timers.
+``clock-virtual``: where the application's time is the test's, no answer is slow, and no printed line has a time.
 ``rig-pool``: any rig of a pool can run the test: there are some, of one kind, and they can be distinguished.
 ``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
 ``rig-isolation``: hardware is on the host's network.
@@ -28,7 +29,7 @@ from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.deployment import RESERVED_CIDS
 from dodo_dsl.spec.load import members
-from dodo_dsl.spec.model import Use
+from dodo_dsl.spec.model import VIRTUAL, Use
 from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, as_file, is_free, is_name
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, EMULATED_RIGS, KIND_TAGS, MEMORY, PORT, Rig, is_simulated
 
@@ -58,29 +59,48 @@ def check_levels(context: RuleContext) -> Iterator[Diagnostic]:
         yield Diagnostic(
             spec.span("kind"), "level-kind", message, "use kind open-loop or perception, or level sil or hil"
         )
-    if spec.level == "hil" and spec.clock == "lockstep":
-        message = "a hil test cannot run in lockstep: hardware does not wait"
+    if spec.level == "hil" and spec.is_stepped:
+        how = "in lockstep" if spec.clock != VIRTUAL else "with clock virtual"
+        message = f"a hil test cannot run {how}: hardware does not wait"
         yield Diagnostic(spec.span("clock"), "clock-level", message, "use clock realtime")
 
 
 def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
-    if context.spec.clock != "lockstep" or not context.spec.is_whole:
+    if not context.spec.is_stepped or not context.spec.is_whole:
         return
     wiring = context.wiring
     yield from _rates(context)
-    if wiring.has_application and not wiring.done and not answers(wiring):
+    if context.spec.clock == VIRTUAL:
+        yield from _own_time(context)
+    elif wiring.has_application and not wiring.done and not answers(wiring):
         message = "no declared message completes a frame: the application's answer ends when it waits for the next one"
         hint = "declare x-dodo.answers, or x-dodo.done, at the application's service that sends last"
         yield Diagnostic(context.spec.span("clock"), "clock-answers", message, hint, severity="warning")
-    for name, span in context.application.timed if context.application else ():
+    timed = context.application.timed if context.application and context.spec.clock != VIRTUAL else ()
+    for name, span in timed:
         message = f"this application acts by its own clock: '{name}' has timers, which in lockstep do not wait"
         hint = "run it with 'clock: realtime', or 'clock: virtual'"
         yield Diagnostic(span, "clock-timed", message, hint, severity="warning")
 
 
+def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
+    spec = context.spec
+    if spec.level == "hil":
+        return
+    if spec.max_response_s is not None and "clock" in spec.spans:  # else the command line chose it
+        message = "with clock virtual computing takes no test time, so that no answer is slow"
+        hint = "limit answers with clock lockstep, or processor time with 'resources'"
+        yield Diagnostic(spec.span("response"), "clock-virtual", message, hint)
+    for printed in context.wiring.printed:
+        message = f"'{printed.service}' prints its messages, and lines have no time of the test"
+        hint = "send them on the bus, or use clock lockstep"
+        yield Diagnostic(spec.span("clock"), "clock-virtual", message, hint)
+        return
+
+
 def _rates(context: RuleContext) -> Iterator[Diagnostic]:
     known = rates(context.services)
-    step = step_hz(context.wiring, known)
+    step = step_hz(context.wiring, known, context.spec.clock)
     for use in context.spec.uses:
         rate = known.get(use.name)
         if rate is None or rates_fit(rate, step):

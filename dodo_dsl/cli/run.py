@@ -136,7 +136,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
     )
-    parser.add_argument("--clock", choices=("realtime", "lockstep"), help="override the specs' clock")
+    parser.add_argument("--clock", choices=("realtime", "lockstep", "virtual"), help="override the specs' clock")
     parser.add_argument("--wall-timeout", type=seconds, metavar="S", help="maximum wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
     parser.add_argument(

@@ -78,7 +78,8 @@ def _is_built() -> bool:
 
 def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
     """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
-    settings = Settings(options.clock, options.isolation, options.seed, options.wall_timeout, options.repeat)
+    kept = getattr(options, "keeps_virtual", False)
+    settings = Settings(options.clock, options.isolation, options.seed, options.wall_timeout, options.repeat, kept)
     tests: dict[str, str] = {}
     if options.compiled:
         if options.test or options.level or options.application or options.samples:
@@ -175,7 +176,7 @@ def compile_tests(
     if not checked.specs:
         raise UsageError("no tests to run")
     if settings.clock:
-        stdout.write(_kept_clock([s.title for s in checked.specs if s.clock != settings.clock]))
+        stdout.write(_kept_clock([s.title for s in checked.specs if s.level == "hil" and s.clock != settings.clock]))
     if not checked.ok:
         write_diagnostics(stdout, told_once(checked.diagnostics, SUFFIX))
         raise UsageError("the tests above cannot be compiled")

@@ -46,7 +46,9 @@ class SearchSession:
     def selected(self, words: Sequence[str]) -> compiler.Checked:
         """The tests that the words mean."""
         options = self.options
-        return selection.select(words, (), options.application, Settings("lockstep", options.isolation))
+        return selection.select(
+            words, (), options.application, Settings("lockstep", options.isolation, keeps_virtual=True)
+        )
 
     def compiled(self, checked: compiler.Checked) -> compiler.Compilation:
         """The tests at their nominal values, with their problems shown; raises UsageError if some are errors."""
@@ -203,7 +205,7 @@ def search_jobs(words: Sequence[str], workers: int, application: Sequence[Path])
     files = tuple(path.as_posix() for path in application)
     found: dict[str, SearchJobs] = {}
     for word in words:
-        checked = selection.select([word], (), application, Settings("lockstep"))
+        checked = selection.select([word], (), application, Settings("lockstep", keeps_virtual=True))
         if has_errors(checked.diagnostics):
             raise UsageError(f"'{word}' cannot be searched:\n{format_text(ordered(checked.diagnostics))}")
         refuse_search(word, checked.tests)

@@ -81,6 +81,7 @@ def main(options: argparse.Namespace, stdout: TextIO) -> int:
     for name in ("compiled", "keep"):
         if getattr(options, name):
             raise UsageError(f"--watch and --{name} do not go together")
+    options.keeps_virtual = options.clock is None
     options.clock = options.clock or "lockstep"
     with work_folder() as folder:
         watch = Watch(options, folder, stdout)

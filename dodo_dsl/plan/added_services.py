@@ -9,16 +9,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from dodo_dsl.application.model import Declared
-from dodo_dsl.check.lockstep import answers, cameras_of, other_inputs, rates, step_hz
+from dodo_dsl.check.lockstep import all_inputs, answers, cameras_of, other_inputs, rates, step_hz
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, Wiring
 from dodo_dsl.plan.model import Flag, Lockstep, PlannedService
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.model import NEVER, ON_FAILURE, Spec
+from dodo_dsl.spec.model import NEVER, ON_FAILURE, VIRTUAL, Spec
 
 CLOCK = "dodo-clock"
 CLOCK_MANIFEST = "clock"
+TIME = "dodo-time"
+"""What gives the application the test's time, where the clock is virtual; its folder has that name, too."""
 RUNNER_VARIABLE = "DODO_RUNNER"
 """Empty in the clock's container where no runner announces the start of the test, as with ``docker compose up``."""
 
@@ -29,35 +31,48 @@ def lockstep(
     spec: Spec, declared: Mapping[str, Declared | None], wall_timeout_s: float | None = None
 ) -> Lockstep | None:
     """The lockstep of a test, None in real time; its wall time is by default limited to ten timeouts and 60 s."""
-    if spec.clock != "lockstep":
+    if not spec.is_stepped:
         return None
     readers = sum(own.readers for own in declared.values() if own)
     wall = (spec.timeout_s or 0.0) * _WALL_FACTOR + _WALL_SPARE_S if wall_timeout_s is None else wall_timeout_s
     return Lockstep(readers or 1, wall, spec.max_response_s, spec.response_over, spec.copies_times)
 
 
-def clock(test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[str], cid: int) -> PlannedService:
-    """The service that steps a test; ``watch`` are services that only observe."""
+TIME_FOLDER = "time-folder"
+"""The clock's flag where the application's own time is the test's; on the host its value is another."""
+_OWN_TIME = f"/dev/shm/{TIME}"
+
+
+def clock(
+    test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[str], cid: int, application: Sequence[str] = ()
+) -> PlannedService:
+    """The service that steps a test; ``watch`` are services that only observe, ``application`` those under test."""
     spec, wiring = test.spec, test.wiring
     layers = {layer: [u.name for u in spec.uses if u.layer == layer] for layer in ("environment", "action")}
     sense = _ordered(layers["environment"], wiring)
     cameras = cameras_of(wiring)
     sense.sort(key=lambda name: name in cameras)
     values = {
-        "freq": f"{step_hz(wiring, rates(test.services)):.12g}",
+        "freq": f"{step_hz(wiring, rates(test.services), spec.clock):.12g}",
         "advance": ",".join(_ordered(layers["action"], wiring)),
         "sense": ",".join(sense),
         "judge": ",".join(u.name for u in spec.uses if u.layer == "evaluation"),
         "watch": ",".join(watch),
-        "answers": ",".join(answers(wiring)),
-        "hears": ",".join(other_inputs(wiring)),
-        "done": wiring.done,
+        **_expected(spec, wiring, application),
         "timeout": f"{spec.timeout_s or 0.0:g}",
         "max-response": "" if spec.max_response_s is None else f"{spec.max_response_s:g}",
         "cid": str(cid),
     }
     flags = tuple(Flag(name, value) for name, value in values.items() if value)
     return PlannedService("environment", CLOCK, manifest.name, image, manifest.process, flags)
+
+
+def _expected(spec: Spec, wiring: Wiring, application: Sequence[str]) -> dict[str, str]:
+    """What the clock is to expect of the application: answers to frames, or messages whenever it sends them."""
+    if spec.clock == VIRTUAL:
+        own = {TIME_FOLDER: _OWN_TIME, "application": ",".join(application)}
+        return {"hears": ",".join(all_inputs(wiring)), **own}
+    return {"answers": ",".join(answers(wiring)), "hears": ",".join(other_inputs(wiring)), "done": wiring.done}
 
 
 def _ordered(names: Sequence[str], wiring: Wiring) -> list[str]:

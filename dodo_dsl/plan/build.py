@@ -327,10 +327,12 @@ class _Builder:
         """The services that DoDo adds: the recorder, and in lockstep the clock."""
         own = self.manifests[added_services.RECORDER_MANIFEST]
         yield added_services.recorder(self.test, own, self._image(own.image), self.cid)
-        if self.spec.clock == "lockstep":
+        if self.spec.is_stepped:
             own = self.manifests[added_services.CLOCK_MANIFEST]
             watch = (added_services.RECORDER,)
-            yield added_services.clock(self.test, own, self._image(own.image), watch, self.cid)
+            yield added_services.clock(
+                self.test, own, self._image(own.image), watch, self.cid, tuple(self.application.services)
+            )
 
     def _distinct_names(self, services: Sequence[PlannedService]) -> None:
         for service in services:

@@ -48,6 +48,7 @@ from dodo_dsl.run.protocol import (
     Unstartable,
     VerdictEvent,
 )
+from dodo_dsl.spec.model import VIRTUAL
 
 MOST_NOTES = 100
 MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
@@ -285,8 +286,9 @@ class RunState:
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
+        timed = () if plan.clock == VIRTUAL else plan.timed
         answers = judgement.judged_response(
-            self.response, plan.lockstep, [s.name for s in plan.application.services], plan.timed
+            self.response, plan.lockstep, [s.name for s in plan.application.services], timed
         )
         use = judgement.judged_use(self.resources, plan.resources)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
@@ -315,7 +317,7 @@ class RunState:
                 *use.notes,
             ),
             machine=considered.load,
-            response=self.response,
+            response=None if plan.clock == VIRTUAL else self.response,
             resources=self.resources,
         )
 

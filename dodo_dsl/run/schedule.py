@@ -31,7 +31,7 @@ def cores_needed(plan: Plan, used: float | None = None) -> float:
     """
     if plan.rig:
         return _RIG
-    if plan.clock == "lockstep":
+    if plan.clock != "realtime":
         return 1.0
     if used is not None:
         return max(round(_MARGIN * used, 2), _LEAST)

@@ -223,7 +223,7 @@ def text_of(spec: Spec, name: str, values: Values, reason: str) -> str:
         f"name: {name}",
         f"extends: {_quoted(base)}",
         f"description: {_quoted(f'Found by dodo search: {reason}')}",
-        "clock: lockstep",
+        f"clock: {spec.clock if spec.is_stepped else 'lockstep'}",
     ]
     if spec.choice.values:
         chosen = ", ".join(f"{key}: [{_written(value)}]" for key, value in spec.choice.values)

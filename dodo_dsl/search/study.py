@@ -55,7 +55,7 @@ def refuse_search(word: str, tests: Sequence[ResolvedTest]) -> None:
         names = ", ".join(test.spec.slug for test in tests[:5])
         raise NotSearchable(f"'{word}' means {len(tests)} tests, expected one: {names}")
     spec = tests[0].spec
-    if spec.clock != "lockstep":
+    if not spec.is_stepped:
         raise NotSearchable(f"{spec.title} runs on hardware, which does not wait; a search needs lockstep")
     if not spec.ranges:
         raise NotSearchable(
@@ -82,7 +82,7 @@ def _refuse_tuning(space: Space, specs: Sequence[Spec], samples: int) -> None:
     if not space.ranges:
         raise NotSearchable("the application has no parameters to tune: write them under 'x-dodo: {tune: ...}'")
     for spec in specs:
-        if spec.clock != "lockstep" and not spec.rig:
+        if not spec.is_stepped and not spec.rig:
             raise NotSearchable(f"{spec.title} is in real time and on no rig; tuning needs lockstep or a rig")
         if both := [one.name for one in space.ranges if one.name in spec.variables]:
             raise NotSearchable(f"{spec.title} sets '{both[0]}' itself, so it cannot be tuned there")

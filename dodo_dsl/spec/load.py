@@ -12,7 +12,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Mapping, Node, Reader, Scalar, read, walk
 from dodo_dsl.spec import extends, matrix, slips, vary
 from dodo_dsl.spec.matrix import Choice
-from dodo_dsl.spec.model import LAYERS, Pool, Spec, spec_of
+from dodo_dsl.spec.model import LAYERS, VIRTUAL, Pool, Spec, spec_of
 from dodo_dsl.spec.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import Rig
@@ -140,6 +140,7 @@ class Settings:
     """Inputs of a compilation; None keeps the value of the specs.
 
     ``wall_timeout_s`` limits the wall time of a test in lockstep, in seconds. ``repeat`` is how often each test runs.
+    ``keeps_virtual`` leaves those in lockstep that have the clock virtual.
     """
 
     clock: str | None = None
@@ -147,12 +148,16 @@ class Settings:
     seed: int | None = None
     wall_timeout_s: float | None = None
     repeat: int = 1
+    keeps_virtual: bool = False
 
 
 def applied(spec: Spec, settings: Settings) -> Spec:
     """The spec with the settings; a test on hardware keeps its clock."""
-    if settings.clock and spec.level != "hil":
-        spec = replace(spec, clock=settings.clock)
+    is_kept = settings.keeps_virtual and spec.clock == VIRTUAL
+    if settings.clock and spec.level != "hil" and not is_kept:
+        left_out = {"clock"} if settings.clock == VIRTUAL else set()
+        spans = {key: span for key, span in spec.spans.items() if key not in left_out}
+        spec = replace(spec, clock=settings.clock, spans=spans)
     if settings.isolation:
         spans = {key: span for key, span in spec.spans.items() if key != "isolation"}
         spec = replace(spec, isolation=settings.isolation, spans=spans)

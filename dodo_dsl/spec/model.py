@@ -122,6 +122,10 @@ class Use:
     parameters: dict[str, Entry] = field(default_factory=dict)
 
 
+VIRTUAL = "virtual"
+STEPPED_CLOCKS = ("lockstep", VIRTUAL)
+
+
 @dataclass(frozen=True)
 class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
@@ -183,6 +187,11 @@ class Spec:
     def slug(self) -> str:
         """The instance's name in folders, projects and jobs: ``name--light-dark``"""
         return (self.name or self.location.stem) + self.choice.slug
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether the world waits for the application: in lockstep, with its own time or the test's."""
+        return self.clock in STEPPED_CLOCKS
 
     def span(self, key: str) -> Span:
         return self.spans.get(key, Span(str(self.path)))

@@ -233,8 +233,15 @@ class LockstepClock:
     relays = True
 
     def __init__(
-        self, session: Session, name: str, readers: int, source: StepSource | None = None, key: bytes = b""
+        self,
+        session: Session,
+        name: str,
+        readers: int,
+        source: StepSource | None = None,
+        key: bytes = b"",
+        is_virtual: bool = False,
     ) -> None:
+        """``is_virtual`` tells that the application's own time is the test's: pictures are shown when they are due."""
         self._session, self._name = session, name
         self._step_done = session.messages.type(STEP_DONE)
         self._client: StepSource = source or ClockClient(session, name, key)
@@ -246,6 +253,8 @@ class LockstepClock:
         self._observer = Observer(StepMarks(session.messages).of)
         self._next = 0
         self._consumed = ""
+        self.is_virtual = is_virtual
+        self._has_shown = False
 
     def now(self) -> int:
         return self._now
@@ -269,7 +278,7 @@ class LockstepClock:
             messages = in_order(step.messages)
             while due <= step.time:
                 while messages and messages[0][0] <= due:
-                    inbox.handle(messages.popleft()[1])
+                    self._hand(messages.popleft()[1], inbox)
                 if stopped():
                     return
                 self._now = due
@@ -278,10 +287,22 @@ class LockstepClock:
                 due = EPOCH + round(number * period)
             self._now = step.time
             for _, envelope in messages:
-                inbox.handle(envelope)
-            if stopped() or (step.show and not self._announcer.await_readers(stopped)):
+                self._hand(envelope, inbox)
+            if stopped() or (step.show and self._waits and not self._announcer.await_readers(stopped)):
                 return
             self._answer(step.show)
+
+    def _hand(self, envelope: Envelope, inbox: Inbox) -> None:
+        """Where the application's time is the test's, the service learns when it was sent."""
+        now = self._now
+        self._now = envelope.received if _is_of_test(envelope.received) else now
+        inbox.handle(envelope)
+        self._now = now
+
+    @property
+    def _waits(self) -> bool:
+        """Whether a picture waits for its readers: the first one does in any case."""
+        return not (self.is_virtual and self._has_shown)
 
     def sent(self, frame: bytes) -> None:
         """The service has sent this frame."""
@@ -323,10 +344,16 @@ class LockstepClock:
         return None
 
     def _answer(self, show: bool) -> None:
-        """A picture is announced after the answer, so that its readers' messages come after that, too."""
+        """A picture is announced after the answer, so that its readers' messages come after that, too.
+
+        Where the application's time is the test's, it must not go on before the picture is there.
+        """
         self._open = False
-        self._client.answer(self._reply(ended=False), on_the_bus=show)
-        if show:
+        if show and self.is_virtual:
+            self._announcer.announce()
+            self._has_shown = True
+        self._client.answer(self._reply(ended=False), on_the_bus=show and not self.is_virtual)
+        if show and not self.is_virtual:
             self._announcer.announce()
 
     def _reply(self, ended: bool) -> Reply:
@@ -349,10 +376,19 @@ class LockstepClock:
 
 
 def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:
-    """Messages by when they are due: at their sample time, or after those before if that is not of the test."""
+    """Messages by when they are due: at their sample time, or after those before if that is not of the test.
+
+    Where the application's time is the test's, its messages are due when it sent them.
+    """
     due, timed = EPOCH, []
     for envelope in messages:
-        if EPOCH <= envelope.sample_time <= EPOCH + LONGEST:
+        if _is_of_test(envelope.received):
+            due = envelope.received
+        elif _is_of_test(envelope.sample_time):
             due = envelope.sample_time
         timed.append((due, envelope))
     return deque(sorted(timed, key=lambda each: each[0]))
+
+
+def _is_of_test(time_us: int) -> bool:
+    return EPOCH <= time_us <= EPOCH + LONGEST

@@ -245,11 +245,17 @@ def _clock(session: Session, role: str, key: bytes) -> Clock:
         from services.base.recorded_clock import clock_of
 
         return clock_of(recording, session, role)
-    if os.environ.get("DODO_CLOCK") != "lockstep":
+    if os.environ.get("DODO_CLOCK") not in ("lockstep", "virtual"):
         return RealTimeClock()
     from services.base.lockstep_clock import LockstepClock
 
-    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1), key=key)
+    return LockstepClock(
+        session,
+        role,
+        int(os.environ.get("DODO_READERS") or 1),
+        key=key,
+        is_virtual=os.environ["DODO_CLOCK"] == "virtual",
+    )
 
 
 @contextmanager

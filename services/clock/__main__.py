@@ -1,23 +1,30 @@
 """The clock of a test in lockstep as a program."""
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from services.base import Context, Service, run
 from services.base.clock import MICROSECONDS
 from services.base.clock_link import ClockChannel
+from services.base.flags import Flags
 from services.base.members import SenderTable
 from services.base.service import period_of
 from services.clock.answers import Answers, filters
 from services.clock.exchange import Patience, Roles, Timing
-from services.clock.service import CONSUMED, ClockService
+from services.clock.service import CONSUMED, ClockService, OwnTime
+from services.clock.virtual import SentMessages, TimeAgent
 
 
 def build(context: Context) -> Service:
     flags = context.flags
     ids = {name: context.messages.id(name) for name in context.messages.names()}
-    done = filters([flags["done"]] if flags["done"] else [], ids)
-    answers = Answers(filters(flags["answers"], ids), filters(flags["hears"], ids), done[0] if done else None)
+    answers: Answers | SentMessages = _answers(flags, ids)
+    own_time = None
+    if flags["time-folder"]:
+        own_time = OwnTime(TimeAgent(Path(flags["time-folder"])), tuple(flags["application"]))
+        context.resources.callback(own_time.agent.close)
+        answers = SentMessages(answers.filters)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"
     senders = SenderTable.load(context.messages, context.key)
@@ -28,7 +35,12 @@ def build(context: Context) -> Service:
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])
     timing = Timing(period_of(flags["freq"]), timeout, patience, flags["max-response"])
-    return ClockService(context.session, channel, roles, answers, timing, senders)
+    return ClockService(context.session, channel, roles, answers, timing, senders, own_time)
+
+
+def _answers(flags: Flags, ids: Mapping[str, int]) -> Answers:
+    done = filters([flags["done"]] if flags["done"] else [], ids)
+    return Answers(filters(flags["answers"], ids), filters(flags["hears"], ids), done[0] if done else None)
 
 
 if __name__ == "__main__":

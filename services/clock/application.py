@@ -106,6 +106,8 @@ MOST_CONTENTION_S = 20.0
 class SteppedApplication:
     """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
 
+    has_own_time = False
+
     def __init__(
         self,
         answers: Answers,
@@ -137,6 +139,9 @@ class SteppedApplication:
         self._first: list[EncodedEnvelope] = []
         self._reading: set[str] = set()
         """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
+
+    def begin(self, now: int) -> None:
+        """It may still be starting: the first picture waits for it."""
 
     def expect_at(self, now: int) -> None:
         """Without cameras, the application answers the services' messages in the step of this time (us)."""
@@ -174,8 +179,11 @@ class SteppedApplication:
             self._link.send([StepCommand(camera.service, now, (), show=True) for camera in shown])
         self._shown, self._own_wait = time.monotonic(), own_wait_s()
 
-    def await_answer(self) -> None:
-        """Wait for the answer to what was shown; raises ApplicationSilent and ApplicationFloods."""
+    def await_answer(self, until: int = 0) -> None:
+        """Wait for the answer to what was shown, whenever (``until``) the next step is.
+
+        Raises ApplicationSilent and ApplicationFloods.
+        """
         while not (self._stopped() or self._is_answered):
             if self._left <= 0:
                 where = f"; the test is on CID {self._cid}" if self._cid and self.answers.is_silent else ""

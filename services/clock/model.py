@@ -2,14 +2,14 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Protocol
 
 from dodo_dsl.opendlv.envelope import Envelope
 from services.base.clock_link import EncodedEnvelope, encode
 from services.base.lockstep_clock import EPOCH
-from services.clock.application import SteppedApplication
 from services.clock.exchange import (
     SLICE_S,
     ApplicationSilent,
@@ -31,6 +31,25 @@ Compose then starts one layer after the other, of which each may take as long.
 """
 
 
+class Application(Protocol):
+    """The application as SteppedApplication and VirtualApplication show it to a Stepper.
+
+    ``has_own_time`` is whether it goes on without pictures, too, as its time is the test's.
+    """
+
+    has_own_time: bool
+    frames: int
+    waited_first: float
+    waited: float
+
+    def begin(self, now: int) -> None: ...
+    def expect_at(self, now: int) -> None: ...
+    def remember(self, messages: Iterable[EncodedEnvelope]) -> None: ...
+    def show(self, shown: Sequence[StepResult], now: int) -> None: ...
+    def await_answer(self, until: int) -> None: ...
+    def collect(self) -> list[Envelope]: ...
+
+
 @dataclass
 class Stepper:
     """Steps a test; ``period`` and ``timeout`` in us of test time.
@@ -41,7 +60,7 @@ class Stepper:
     roles: Roles
     period: Fraction | int
     timeout: int
-    application: SteppedApplication
+    application: Application
     link: ServiceLink
     stopped: IsStopped
     now: int = EPOCH
@@ -77,6 +96,7 @@ class Stepper:
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
         self._deliver([encode(begin)], "")
+        self.application.begin(self.now)
         while not self.stopped():
             self.application.pause()
             if not self._memories:
@@ -85,7 +105,7 @@ class Stepper:
             shown = [result for result in going if result.pictures]
             if self._is_over():
                 return
-            awaits_answer = bool(shown) or not self._memories
+            awaits_answer = bool(shown) or not self._memories or self.application.has_own_time
             if awaits_answer:
                 self.application.show(shown, self.now)
             self._judge()
@@ -113,7 +133,7 @@ class Stepper:
     def _is_answered(self) -> bool:
         """Wait for the answer; a missing one does not matter when the test is over. Raises ApplicationSilent."""
         try:
-            self.application.await_answer()
+            self.application.await_answer(round(self._following()))
         except ApplicationSilent:
             if not self._is_over():
                 raise
@@ -178,8 +198,11 @@ class Stepper:
                 consumed = self._consumed.get(name)
                 backlog.extend(m for m in messages if consumed is None or m.envelope.data_type in consumed)
 
-    def _go_on(self) -> None:
-        """To the time of the next step: a period later, or the earliest that a source announced."""
+    def _following(self) -> Fraction:
+        """The time of the next step: a period later, or the earliest that a source announced."""
         announced = [time for name, time in self._next.items() if time > self.now and name not in self._ended]
-        self._exact = Fraction(min(announced)) if announced else self._exact + self.period
+        return Fraction(min(announced)) if announced else self._exact + self.period
+
+    def _go_on(self) -> None:
+        self._exact = self._following()
         self.now = round(self._exact)

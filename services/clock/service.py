@@ -5,7 +5,7 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.opendlv.envelope import Envelope
@@ -21,6 +21,7 @@ from services.clock.application import ResponseTimes, SteppedApplication
 from services.clock.exchange import Exchange, Roles, TestEnded, Timing
 from services.clock.model import Stepper
 from services.clock.processor_time import ApplicationProcesses
+from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
 
 _FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
 """Seconds between reports at first and later, and their share of the time that passed.
@@ -35,6 +36,13 @@ CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone", SENDER)
 _log = logging.getLogger(__name__)
 
 
+class OwnTime(NamedTuple):
+    """What lets the time of the application go on, and the ``names`` of its services."""
+
+    agent: TimeAgent
+    names: tuple[str, ...]
+
+
 class ClockService(Service):
     """Drives a test by its Stepper."""
 
@@ -43,10 +51,12 @@ class ClockService(Service):
         session: Session,
         channel: ClockChannel,
         roles: Roles,
-        answers: Answers,
+        answers: Answers | SentMessages,
         timing: Timing,
         senders: SenderTable | None = None,
+        own_time: OwnTime | None = None,
     ) -> None:
+        """With ``own_time`` the application's time is the test's, and ``answers`` are SentMessages."""
         self._session, self._channel = session, channel
         self._begin_id = session.messages.id("dodo.TestBegin")
         self._senders = senders or SenderTable(session.messages)
@@ -55,10 +65,17 @@ class ClockService(Service):
         self._guarded = self._senders.ids | {session.messages.id(name) for name in CONSUMED}
         self._early: list[tuple[Envelope, Address]] = []
         self._exchange = exchange = Exchange(session, channel, answers.take, self._senders)
-        self._response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
-        self._application = SteppedApplication(
-            answers, timing.patience, exchange, self._over, self._response, session.cid
-        )
+        self._application: SteppedApplication | VirtualApplication
+        if isinstance(answers, SentMessages):
+            assert own_time is not None, "the program gives it"
+            self._application = VirtualApplication(
+                answers, own_time.agent, timing.patience, exchange, self._over, own_time.names, self._note
+            )
+        else:
+            response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
+            self._application = SteppedApplication(
+                answers, timing.patience, exchange, self._over, response, session.cid
+            )
         self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
         self._reported = self._begun = 0.0
         self._reached = 0
@@ -131,6 +148,9 @@ class ClockService(Service):
         self._report(
             "time", s=seconds, frames=self._application.frames, surplus=self._application.answers.surplus, last=last
         )
+
+    def _note(self, text: str) -> None:
+        self._report("note", text=text)
 
     @staticmethod
     def _report(kind: str, **facts: object) -> None:

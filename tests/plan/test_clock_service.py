@@ -63,6 +63,27 @@ services:
     )
 
 
+def test_where_the_applications_time_is_the_tests_the_clock_takes_all_that_it_sends(tmp_path: Path) -> None:
+    example = """\
+clock: virtual
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=1
+    x-dodo:
+      out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]
+      answers: [opendlv.proxy.PedalPositionRequest]
+      done: opendlv.proxy.ImageReadingShm
+"""
+    test = resolved(example, tmp_path)
+    service = clock(test, MANIFEST, "dodo/clock:1", (), 140, ("driver", "eye"))
+    found = {flag.name: flag.value for flag in service.flags}
+    assert found["hears"] == "opendlv.proxy.GroundSteeringRequest,opendlv.proxy.PedalPositionRequest"
+    assert (found["application"], found["time-folder"]) == ("driver,eye", "/dev/shm/dodo-time")
+    assert not {"answers", "done", "max-response"} & found.keys()
+
+
 @pytest.mark.parametrize(
     ("declared", "wall_timeout_s", "expected"),
     [

@@ -24,6 +24,7 @@ def test_larger_pictures_need_more_cores() -> None:
     large = replace(empty, services=(camera(width="1280", height="720", freq="30"),))
     assert cores_needed(empty) < cores_needed(small) < 0.5 < 1 < cores_needed(large)
     assert cores_needed(replace(small, clock="lockstep")) == 1.0
+    assert cores_needed(replace(small, clock="virtual")) == 1.0
     endless = replace(empty, services=(camera(width="nan", height="240", freq="inf"),))
     assert cores_needed(endless) == cores_needed(empty)
     assert cores_needed(replace(empty, rig="kiwi")) == 2.0

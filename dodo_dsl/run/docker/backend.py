@@ -32,6 +32,7 @@ from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, one_off, optional
+from dodo_dsl.spec.model import VIRTUAL
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
@@ -102,6 +103,11 @@ class DockerBackend:
         return self.plan.isolation == "host"
 
     async def open(self) -> None:
+        if self.plan.clock == VIRTUAL:
+            raise BackendError(
+                "clock: virtual runs on processes only: give each service of the application 'x-dodo-process', "
+                "and run with --backend process"
+            )
         await self._compose.read()
         await self._require_files()
         await self._compose.provide_images(self._pulls)

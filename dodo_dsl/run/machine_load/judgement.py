@@ -113,6 +113,9 @@ class JudgedFigures:
     notes: tuple[str, ...] = ()
 
 
+UNTIMED = "the time of answers is not judged, as with clock virtual computing takes no test time"
+
+
 def judged_response(
     response: Response | None, lockstep: Lockstep | None, services: Sequence[str], timed: Sequence[str] = ()
 ) -> JudgedFigures:
@@ -159,6 +162,8 @@ def _notes(response: Response, lockstep: Lockstep, timed: Sequence[str]) -> Iter
         waits = " with what it waited for a processor" if response.processor_median_s is None else ""
         frames = f"{response.worst_s / response.period_s:.0f} frames, which outside lockstep would not have waited"
         yield f"the answer{which} took {response.worst_s:.3g} s{waits}, as long as {frames}"
+    if lockstep.max_response_s is not None and response.over is None:
+        yield UNTIMED
     is_unseen = response.processor_median_s is None and response.over is not None
     if is_unseen and (response.over or 0) > lockstep.response_over * response.answers:
         yield UNSEEN

@@ -13,12 +13,14 @@ import msgspec
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.address import Address
+from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run import service_protocol
+from dodo_dsl.run import application_time, service_protocol
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.application_files import Found, application_paths, files_of_tests, hidden_paths, in_few
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.outcomes import how_it_ended
 from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
@@ -29,9 +31,13 @@ from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off
+from dodo_dsl.spec.model import VIRTUAL
 
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
+TIME_PATIENCE_S = 10.0
+PAGE_DESTROYED = 3
+"""The exit code of what gives the application the test's time, where that destroyed its page."""
 MOST_NAMED = 5
 """Hidden files that a note names."""
 _OF_SANDBOX = ("bwrap:", "setpriv:")
@@ -80,6 +86,9 @@ class ProcessBackend:
         self._is_noted = False
         self._turns: dict[str, asyncio.Task[None]] = {}
         """The services of the application that wait for the end of others."""
+        self._time_ready: asyncio.Event | None = None
+        """Set when what gives the application the test's time is ready, or has ended."""
+        self._has_time = False
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
         self._sandbox = SandboxClient(
@@ -93,6 +102,10 @@ class ProcessBackend:
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
         needed = needed_paths(self.plan, self._folder, self.report)
+        if self.plan.clock == VIRTUAL:
+            time = await asyncio.to_thread(application_time.built)
+            self._commands = replace(self._commands, time=time)
+            needed += [time.library.parent, time.agent.parent]
         entered = None if self.is_on_host else Entered.with_own(container, *needed)
         await self._sandbox.open(self.slot, self.report, entered)
 
@@ -119,6 +132,12 @@ class ProcessBackend:
         if output is not None:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
                 await asyncio.wait_for(output.done.wait(), 1.0)
+        if exited == TIME:
+            if self._time_ready:
+                self._time_ready.set()
+            if self._has_time and code not in (0, PAGE_DESTROYED):  # which the clock says
+                self._events.put_nowait(Lost(f"what gives the application the test's time {how_it_ended(code)}"))
+            return
         if failed:
             said = " ".join(self.tail(exited)[-1:])
             starts = self._starts[exited]
@@ -162,6 +181,8 @@ class ProcessBackend:
             problem = (await asyncio.to_thread(lambda: self._found)).problem
             if problem:
                 self._events.put_nowait(Noted(problem))
+        if layer == "application" and self.plan.clock == VIRTUAL:
+            await self._start_time()
         commands = []
         for service in self._services(layer):
             try:
@@ -177,6 +198,26 @@ class ProcessBackend:
                 self._start(by_name[name])
         ready = {*self._turns} - one_off(self.plan.application.services)
         return {name: layer != "application" or name in ready for name in by_name}
+
+    async def _start_time(self) -> None:
+        """Starts what gives the application the test's time; raises BackendError."""
+        if not self._is_confined:
+            raise BackendError(
+                "clock: virtual needs process namespaces, which this machine refuses: dodo doctor says why"
+            )
+        for service in self.plan.application.services:
+            with contextlib.suppress(EnvironmentProblem, IndexError):  # it is told when the service is started
+                command = self._commands.of(service)
+                if why := application_time.refusal(service.name, command.argv[0], command.environment, command.folder):
+                    raise BackendError(why)
+        self._time_ready = asyncio.Event()
+        self._start(self._commands.of_time(self.is_on_host))
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(TIME_PATIENCE_S):
+                await self._time_ready.wait()
+        if not self._has_time:
+            said = " ".join(self.tail(TIME)[-1:]) or f"{TIME} does not start"
+            raise BackendError(f"the application cannot be given the test's time: {said}")
 
     async def connect(self, lines: PrintedLines) -> None:
         """Lets ``lines`` send on the test's bus; raises BackendError."""
@@ -214,6 +255,10 @@ class ProcessBackend:
                     self._lines.take(command.name, line)
             else:
                 event = service_protocol.read_line(command.name, command.is_evaluator, line)
+            if isinstance(event, Ready) and command.name == TIME and self._time_ready:
+                self._has_time = True
+                self._time_ready.set()
+                return True
             if isinstance(event, Ready) and event.address:
                 self._addresses[command.name] = event.address
             if event is not None:
@@ -254,7 +299,10 @@ class ProcessBackend:
             return None
         application = self.plan.application
         hidden = [] if self.is_on_host else self._hidden
-        confined = confinement(command.folder, self.isolation, self.cid, application.limits, hidden)
+        limits = application.limits
+        if self._commands.time is not None:
+            limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
+        confined = confinement(command.folder, self.isolation, self.cid, limits, hidden)
         return asdict(replace(confined, masked=command.masked))
 
     @functools.cached_property

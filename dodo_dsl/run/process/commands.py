@@ -11,8 +11,10 @@ from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, 
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
+from dodo_dsl.plan.added_services import TIME, TIME_FOLDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, OFFSCREEN, ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths
+from dodo_dsl.run.application_time import ApplicationTime, folder_of
 from dodo_dsl.run.process.environment import (
     application_environment,
     base_environment,
@@ -51,6 +53,8 @@ class Commands:
     folder: Path
     report: Path
     slot: Slot
+    time: ApplicationTime | None = None
+    """What gives the application the test's time, where its clock is virtual."""
 
     def of(self, service: PlannedService | ApplicationService) -> Command:
         """The service's command; raises EnvironmentProblem."""
@@ -80,7 +84,19 @@ class Commands:
             "memories": lambda: ",".join(memory_name(m, self.slot.memory_prefix) for m in flag.value.split(",")),
         }
         value = values.get(flag.kind, lambda: flag.value)()
-        return f"--{flag.name}={self.slot.cid if flag.name == 'cid' else value}"
+        own = {"cid": str(self.slot.cid), TIME_FOLDER: self.time_folder}
+        return f"--{flag.name}={own.get(flag.name, value)}"
+
+    @property
+    def time_folder(self) -> str:
+        return folder_of(self.slot.name)
+
+    def of_time(self, on_host: bool) -> Command:
+        """The command of what gives the application the test's time."""
+        assert self.time is not None
+        words = self.time.words(self.plan, self.time_folder, on_host=on_host)
+        environment = {**base_environment(self.plan.application.access.passed), SLOT_VARIABLE: self.slot.name}
+        return Command(TIME, "environment", words, environment, self.folder)
 
     def _application(self, service: ApplicationService) -> Command:
         folder = (self.folder / self.plan.application.folder).resolve()
@@ -105,6 +121,8 @@ class Commands:
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.slot.cid), self.slot.memory_prefix)
         environment = {**_without_windows(argv, {**inherited, **own}), SLOT_VARIABLE: self.slot.name}
+        if self.time is not None:
+            environment = self.time.variables(environment, self.plan, service.name, self.time_folder)
         broken = [f"variable {name.partition(_NUL)[0]}" for name, value in own.items() if _NUL in name + value]
         if broken or _NUL in "".join(argv):
             what = (*broken, "the command")[0]

@@ -3,11 +3,12 @@
 import contextlib
 import os
 import re
+import shutil
 import signal
 import time
 from pathlib import Path
 
-from dodo_dsl.run import leases
+from dodo_dsl.run import application_time, leases
 from dodo_dsl.run.process import process_group
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
 
@@ -70,6 +71,8 @@ def remove_memories(prefix: str) -> int:
     from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
     removed = 0
+    if SLOT_NAME.fullmatch(prefix):
+        shutil.rmtree(application_time.folder_of(prefix), ignore_errors=True)
     for token in [p for p in Path("/tmp").glob(f"{prefix}*") if p.is_file() and not p.is_symlink()]:
         if token.name.startswith(f"{prefix}ready-"):
             token.unlink(missing_ok=True)

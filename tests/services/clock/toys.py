@@ -19,8 +19,9 @@ from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, filters
 from services.clock.application import ResponseTimes, SteppedApplication
-from services.clock.exchange import Exchange, Patience, Roles
+from services.clock.exchange import Exchange, IsStopped, Patience, Roles
 from services.clock.model import Stepper
+from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
@@ -235,6 +236,8 @@ class Toys:
     readers: int = 1
     cast: dict[str, Maker] = field(default_factory=lambda: DRIVE)
     watch: tuple[str, ...] = ()
+    agent: TimeAgent | None = None
+    """Where the application's own time is the test's."""
 
     def __post_init__(self) -> None:
         self.evaluator = ToyEvaluator(self.seconds)
@@ -257,12 +260,14 @@ class Toys:
                     started.append(app)
                 channel = ClockChannel(self.cid, session.messages, KEY)
                 ids = {name: session.messages.id(name) for name in session.messages.names()}
-                answers = Answers(filters(self.answers, ids), filters(self.relayed, ids))
+                answers: Answers | SentMessages = Answers(filters(self.answers, ids), filters(self.relayed, ids))
+                if self.agent:
+                    answers = SentMessages(answers.filters)
                 exchange = Exchange(session, channel, answers.take)
                 advance = tuple(name for name in self.cast if name == "mover")
                 sense = tuple(name for name in self.cast if name not in (*advance, *self.watch))
                 roles = Roles(advance, sense, ("judge",), self.watch)
-                application = SteppedApplication(answers, self.patience, exchange, stop.is_set, ResponseTimes())
+                application = self._under_test(answers, exchange, stop.is_set)
                 stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
                 try:
                     stepper.connect()
@@ -274,6 +279,11 @@ class Toys:
             for app in started:  # the services have removed the memory that it waits for
                 app.join()
         return self.evaluator.path, stepper
+
+    def _under_test(self, answers: Any, link: Exchange, stopped: IsStopped) -> Any:
+        if self.agent:
+            return VirtualApplication(answers, self.agent, self.patience, link, stopped, ("toy",), lambda _: None)
+        return SteppedApplication(answers, self.patience, link, stopped, ResponseTimes())
 
     @contextmanager
     def _services(self, stop: threading.Event) -> Iterator[None]:
@@ -292,6 +302,6 @@ class Toys:
 
     def _loop(self, name: str, maker: Maker, resources: ExitStack) -> Loop:
         session = resources.enter_context(Session(self.cid))
-        clock = LockstepClock(session, name, self.readers, key=KEY)
+        clock = LockstepClock(session, name, self.readers, key=KEY, is_virtual=self.agent is not None)
         service = maker(session, lambda: resources.enter_context(clock.memory(self.memory_name(name), 8)))
         return Loop(name, service, session, clock, 0)

@@ -1,0 +1,178 @@
+"""What gives an application the test's time (``clock: virtual``): built where it is not yet, and who cannot have it.
+
+It is a library that is preloaded into the application's processes, and an agent that lets their time go on; their C
+sources are in ``services/clock/native``.
+"""
+
+import fcntl
+import functools
+import hashlib
+import os
+import platform
+import shutil
+import struct
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from dodo_dsl import package_data
+from dodo_dsl.plan.added_services import TIME
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.state_folder import secured
+from dodo_dsl.template_cache import cache_home
+
+LIBRARY, AGENT = "libdodo-time.so", "dodo-time"
+SPARE_S = 10
+"""Seconds of its own time that the application has before the test begins."""
+_EPOCH_S = 1_700_000_000
+_SECOND = 1_000_000_000
+_BUILD_S = 120.0
+_POOLS = ("OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""Threads of the application run one at a time, so that pools of them only cost time."""
+_WAY_OUT = "run it with --clock lockstep or --clock realtime"
+
+
+@dataclass(frozen=True)
+class ApplicationTime:
+    """The library and the agent, ready to run."""
+
+    library: Path
+    agent: Path
+
+    def words(self, plan: Plan, folder: str, *, on_host: bool) -> tuple[str, ...]:
+        """The agent's command, for a sandbox whose applications have process namespaces of their own."""
+        begin = _EPOCH_S * _SECOND
+        others = ("--by-environment",) if on_host else ()
+        return (
+            str(self.agent), f"--folder={folder}", f"--services={len(plan.application.services)}",
+            f"--start={begin - SPARE_S * _SECOND}", f"--begin={begin}", f"--seed={plan.seed}", "--nested", *others,
+        )  # fmt: skip
+
+    def variables(self, given: Mapping[str, str], plan: Plan, service: str, folder: str) -> dict[str, str]:
+        """The ``given`` variables of a service of the application, with those that give it the test's time."""
+        number = [each.name for each in plan.application.services].index(service)
+        preloaded = ":".join(filter(None, (str(self.library), given.get("LD_PRELOAD", ""))))
+        own = {"LD_PRELOAD": preloaded, "DODO_TIME": folder, "DODO_TIME_SERVICE": str(number)}
+        return {**dict.fromkeys(_POOLS, "1"), "PYTHONHASHSEED": str(plan.seed), **given, **own}
+
+
+def folder_of(slot: str) -> str:
+    """Where library and agent meet; on the host, by the name of the test's slot."""
+    return f"/dev/shm/{slot}{TIME.partition('-')[2]}" if slot else f"/dev/shm/{TIME}"
+
+
+@functools.cache
+def built() -> ApplicationTime:
+    """What ``scripts/setup`` has built, or else builds it in the user's cache; raises BackendError."""
+    sources = package_data.services() / "clock" / "native"
+    files = sorted(path for path in sources.iterdir() if path.suffix in (".c", ".h") or path.name == "Makefile")
+    if checkout := package_data.checkout():
+        ready = checkout / "build" / "time"
+        if _is_ready(ready) and min(_changed(ready / LIBRARY), _changed(ready / AGENT)) >= max(map(_changed, files)):
+            return ApplicationTime((ready / LIBRARY).resolve(), (ready / AGENT).resolve())
+    digest = hashlib.sha256(b"\0".join([platform.machine().encode(), *(path.read_bytes() for path in files)]))
+    try:
+        folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}")
+    except (OSError, KeyError) as error:
+        raise BackendError(f"clock: virtual needs a cache folder of this user: {error}") from None
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not _is_ready(folder):
+            _build(sources, folder)
+    return ApplicationTime((folder / LIBRARY).resolve(), (folder / AGENT).resolve())
+
+
+def _changed(path: Path) -> int:
+    return path.stat().st_mtime_ns
+
+
+def _is_ready(folder: Path) -> bool:
+    """Whether both are there, for this machine's processor."""
+    own = _machine(Path("/proc/self/exe"))
+    return all((folder / name).is_file() and _machine(folder / name) == own for name in (AGENT, LIBRARY))
+
+
+def _build(sources: Path, folder: Path) -> None:
+    if not shutil.which("make") or not shutil.which(os.environ.get("CC", "cc")):
+        raise BackendError("clock: virtual needs a C compiler and make: apt-get install gcc make, or run scripts/setup")
+    words = ["make", "--silent", "-C", str(sources), f"BUILD={folder}"]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=_BUILD_S)
+        said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise BackendError(f"clock: virtual cannot be built: {error}") from None
+    if done.returncode:
+        for name in (LIBRARY, AGENT):
+            (folder / name).unlink(missing_ok=True)
+        raise BackendError(f"clock: virtual cannot be built: {said[0]}")
+
+
+_INTERPRETER = 3
+"""The type of a program header that names the dynamic linker (elf(5), PT_INTERP)."""
+_LONGEST_CHAIN = 4
+
+
+def _machine(program: Path) -> bytes:
+    """Class, byte order and processor by an ELF header; empty for anything else."""
+    head = _head(program, 20)
+    return head[4:6] + head[18:20] if head[:4] == b"\x7fELF" else b""
+
+
+def _head(path: Path, size: int) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(size)
+    except OSError:
+        return b""
+
+
+def refusal(service: str, name: str, environment: Mapping[str, str], folder: Path) -> str:
+    """Why a service whose program has this ``name`` cannot have the test's time; empty where nothing says so."""
+    found = shutil.which(folder / name if "/" in name else name, path=environment.get("PATH", os.defpath))
+    program = Path(found) if found else None
+    for _ in range(_LONGEST_CHAIN):
+        if program is None:
+            return ""
+        if why := _unreachable(program):
+            return f"service '{service}' starts '{program}', {why}: it would keep the machine's time; {_WAY_OUT}"
+        head = _head(program, 256)
+        if head[:2] != b"#!":
+            return ""
+        words = head[2:].partition(b"\n")[0].decode(errors="replace").split()
+        program = Path(words[0]) if words else None
+    return ""
+
+
+def _unreachable(program: Path) -> str:
+    try:
+        if program.stat().st_mode & 0o6000:
+            return "which changes its user"
+    except OSError:
+        return ""
+    head = _head(program, 1 << 16)
+    if head[:4] != b"\x7fELF":
+        return ""
+    if _machine(program) != _machine(Path("/proc/self/exe")):
+        return "a program for another processor than DoDo's own"
+    linker = _linker(head)
+    if not linker:
+        return "a statically linked program"
+    return "a program of another C library" if b"musl" in linker else ""
+
+
+def _linker(head: bytes) -> bytes:
+    """The dynamic linker that a 64-bit ELF file names; empty without one. Its beginning holds the program headers."""
+    order = "<" if head[5:6] == b"\x01" else ">"
+    try:
+        (offset,) = struct.unpack_from(f"{order}Q", head, 32)
+        size, count = struct.unpack_from(f"{order}HH", head, 54)
+        for start in range(offset, offset + size * count, size):
+            (kind,) = struct.unpack_from(f"{order}I", head, start)
+            if kind == _INTERPRETER:
+                place, length = struct.unpack_from(f"{order}Q16xQ", head, start + 8)
+                return head[place : place + length] or b"?"
+    except (struct.error, ValueError):
+        pass
+    return b""

@@ -1,0 +1,530 @@
+/* dodo-time: decides which thread of the application runs next, and lets test time go on when all of them sleep.
+ *
+ * The clock of the test (services/clock/virtual.py) says over FIFOs how far time may go; docs/explanation/lockstep.md
+ * has the whole. Nothing that the application writes into the page is trusted: it can only make itself wait.
+ */
+#define _GNU_SOURCE
+#include "processes.h"
+#include "time_page.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <getopt.h>
+#include <linux/futex.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+#define SECOND INT64_C(1000000000)
+
+enum {
+    FREE_IN_A_ROW = 64,   /* slots are taken from the first on: behind so many free ones there is none */
+    END_MS = 100,         /* between looks whether the test is over */
+    REPORT_MS = 500,      /* between reports on a busy thread */
+    START_PATIENCE_S = 3, /* for services that have not begun yet, since the last one did */
+    UNSEEN_WAIT_MS = 1000, /* that all must sleep, if one of them does not wait in the library and it is not known where */
+    SHORTEST_NAP_US = 20,
+    LONGEST_NAP_US = 1000,
+    DESTROYED = 3,
+};
+
+static struct options {
+    const char *folder;
+    unsigned services;
+    int64_t start_ns, begin_ns;
+    uint64_t seed;
+    long clock_uid;
+    bool nested, by_environment;
+} options = {.services = 1, .clock_uid = -1};
+
+static struct time_page *page;
+static int command_file = -1, reply_file = -1, wakers[TIME_SLOTS];
+static uint32_t waits_unseen[TIME_SLOTS]; /* one more than `wake` of a thread that was found to wait elsewhere, or has ended */
+static uint64_t grants;
+static uint32_t notes_told;
+static volatile sig_atomic_t is_over;
+static bool is_repeatable = true, has_ended, is_serving; /* before that, the clock's commands wait */
+
+static int64_t wall_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * SECOND + now.tv_nsec;
+}
+
+static void fail(const char *what)
+{
+    fprintf(stderr, "dodo-time: %s: %s\n", what, strerror(errno));
+    exit(1);
+}
+
+static void path_of(char *path, size_t size, const char *name)
+{
+    if (snprintf(path, size, "%s/%s", options.folder, name) >= (int)size) {
+        errno = ENAMETOOLONG;
+        fail(options.folder);
+    }
+}
+
+/* One line; without a reader, or one that takes nothing, it is lost. */
+static void reply(const char *line)
+{
+    ssize_t length = (ssize_t)strlen(line);
+    if (write(reply_file, line, (size_t)length) != length)
+        fprintf(stderr, "dodo-time: a reply was lost\n");
+}
+
+static void on_truncated_page(int number)
+{
+    static const char line[] = "{\"destroyed\": true}\n";
+    (void)number;
+    if (write(reply_file, line, sizeof line - 1) < 0)
+        _exit(1);
+    _exit(DESTROYED);
+}
+
+/* The test is over: the application, which ends now, too, goes on as it likes until nothing of it is left. */
+static void on_end(int number)
+{
+    (void)number;
+    is_over = 1;
+}
+
+static long futex(_Atomic uint32_t *word, int operation, uint32_t value, const struct timespec *timeout)
+{
+    return syscall(SYS_futex, word, operation, value, timeout, NULL, 0);
+}
+
+/* Text from strangers as it can stand in JSON. */
+static void plain(char *to, const char *from, size_t size)
+{
+    size_t at = 0;
+    for (; at < size - 1 && from[at]; at++)
+        to[at] = (from[at] >= ' ' && from[at] <= '~' && from[at] != '"' && from[at] != '\\') ? from[at] : '?';
+    to[at] = 0;
+}
+
+/* -- slots ---------------------------------------------------------------------------------------------------------- */
+
+/* One more than the number of the last slot in use. */
+static unsigned used_slots(void)
+{
+    unsigned end = 0;
+    for (unsigned at = 0; at < TIME_SLOTS && at < end + FREE_IN_A_ROW; at++)
+        if (page->slot[at].state != TIME_FREE)
+            end = at + 1;
+    return end;
+}
+
+static bool is_before(struct time_slot *one, struct time_slot *other)
+{
+    if (one->service != other->service)
+        return one->service < other->service;
+    if (one->process != other->process)
+        return one->process < other->process;
+    return one->thread < other->thread;
+}
+
+static struct time_slot *first_ready(void)
+{
+    struct time_slot *found = NULL;
+    for (unsigned at = 0, end = used_slots(); at < end; at++) {
+        struct time_slot *slot = &page->slot[at];
+        if (slot->state == TIME_READY && (!found || is_before(slot, found)))
+            found = slot;
+    }
+    return found;
+}
+
+/* The slot whose deadline comes first, and before `limit_ns`. */
+static struct time_slot *first_due(int64_t limit_ns, int64_t *due_ns)
+{
+    struct time_slot *found = NULL;
+    *due_ns = limit_ns;
+    for (unsigned at = 0, end = used_slots(); at < end; at++) {
+        struct time_slot *slot = &page->slot[at];
+        int64_t deadline = slot->deadline_ns;
+        if (slot->state != TIME_WAITING || deadline >= limit_ns)
+            continue;
+        if (!found || deadline < *due_ns || (deadline == *due_ns && is_before(slot, found))) {
+            found = slot;
+            *due_ns = deadline;
+        }
+    }
+    return found;
+}
+
+/* Wakes a thread that polls; what is in the folder is the agent's own. */
+static void write_waker(unsigned at)
+{
+    char name[16], path[4096];
+    if (!wakers[at]) {
+        snprintf(name, sizeof name, "w%u", at);
+        path_of(path, sizeof path, name);
+        wakers[at] = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW);
+    }
+    if (wakers[at] < 0 || (write(wakers[at], "!", 1) < 0 && errno != EAGAIN))
+        fail("a thread cannot be woken");
+}
+
+static void grant(struct time_slot *slot, uint32_t state)
+{
+    bool is_polling = state == TIME_WAITING && slot->kind == TIME_FD;
+    if (!atomic_compare_exchange_strong(&slot->state, &state, TIME_GRANTED))
+        return;
+    grants++;
+    slot->wake++;
+    futex(&slot->wake, FUTEX_WAKE, INT32_MAX, NULL);
+    if (is_polling)
+        write_waker((unsigned)(slot - page->slot));
+}
+
+/* All sleep, so whoever was granted and did not go on has ended. */
+static void free_dead_slots(void)
+{
+    for (unsigned at = 0, end = used_slots(); at < end; at++) {
+        uint32_t granted = TIME_GRANTED;
+        atomic_compare_exchange_strong(&page->slot[at].state, &granted, TIME_FREE);
+    }
+}
+
+/* Whether a thread runs by its slot: in wait4, for instance, the kernel calls one asleep that still runs. */
+static bool one_runs(void)
+{
+    for (unsigned at = 0, end = used_slots(); at < end; at++) {
+        struct time_slot *slot = &page->slot[at];
+        if (slot->state == TIME_RUNNING && waits_unseen[at] != slot->wake + 1)
+            return true;
+    }
+    return false;
+}
+
+static void note_unseen_waits(void)
+{
+    for (unsigned at = 0, end = used_slots(); at < end; at++)
+        if (page->slot[at].state == TIME_RUNNING)
+            waits_unseen[at] = page->slot[at].wake + 1;
+}
+
+static void advance(int64_t to_ns)
+{
+    if (to_ns > page->now_ns)
+        page->now_ns = to_ns;
+}
+
+/* -- replies -------------------------------------------------------------------------------------------------------- */
+
+static int service_of(const struct busy_thread *busy)
+{
+    for (unsigned at = 0, end = used_slots(); at < end; at++) {
+        struct time_slot *slot = &page->slot[at];
+        if (slot->state != TIME_FREE && slot->tid == busy->inner_tid && slot->service < options.services)
+            return (int)slot->service;
+    }
+    return -1;
+}
+
+static void report_busy(int64_t since_ns)
+{
+    struct busy_thread busy = processes_busy();
+    char line[512], name[sizeof busy.name];
+    plain(name, busy.name, sizeof name);
+    snprintf(line, sizeof line,
+             "{\"busy\": {\"service\": %d, \"pid\": %d, \"tid\": %d, \"name\": \"%s\", \"state\": \"%c\", \"wall_s\": %.3f, "
+             "\"processor_s\": %.3f}}\n",
+             service_of(&busy), busy.pid, busy.tid, name, busy.state ? busy.state : '-',
+             (double)(wall_ns() - since_ns) / SECOND, busy.processor_s);
+    reply(line);
+}
+
+static int add_notes(char *text, size_t size)
+{
+    static const char *const kinds[] = {"", "static", "setuid", "slots", "spin"};
+    uint32_t written = page->notes, first = notes_told;
+    if (written - first > TIME_NOTES)
+        first = written - TIME_NOTES;
+    int length = 0;
+    for (uint32_t at = first; at != written && (size_t)length < size - 160; at++) {
+        struct time_message *note = &page->note[at % TIME_NOTES];
+        uint32_t kind = note->kind;
+        char raw[sizeof note->name + 1] = {0}, name[sizeof raw];
+        memcpy(raw, note->name, sizeof note->name);
+        plain(name, raw, sizeof name);
+        if (kind == TIME_NOTE_NONE || kind > TIME_NOTE_SPIN)
+            continue;
+        length += snprintf(text + length, size - (size_t)length, "%s{\"kind\": \"%s\", \"service\": %u, \"name\": \"%s\"}",
+                           length ? ", " : "", kinds[kind], note->service % TIME_SERVICES, name);
+    }
+    notes_told = written;
+    return length;
+}
+
+static void report_time(void)
+{
+    char line[4000], services[512] = "", notes[2800] = "";
+    int length = 0;
+    for (unsigned at = 0; at < options.services; at++)
+        if (page->processes[at])
+            length += snprintf(services + length, sizeof services - (size_t)length, "%s%u", length ? ", " : "", at);
+    add_notes(notes, sizeof notes);
+    snprintf(line, sizeof line,
+             "{\"now\": %lld, \"grants\": %llu, \"services\": [%s], \"repeatable\": %s, \"notes\": [%s]}\n",
+             (long long)page->now_ns, (unsigned long long)grants, services, is_repeatable ? "true" : "false", notes);
+    reply(line);
+}
+
+/* -- commands ------------------------------------------------------------------------------------------------------- */
+
+/* A line of the clock's, without waiting; false when there is none. */
+static bool next_command(char *line, size_t size)
+{
+    static char text[1024];
+    static size_t length;
+    for (;;) {
+        char *end = memchr(text, '\n', length);
+        if (end) {
+            size_t taken = (size_t)(end - text);
+            snprintf(line, size, "%.*s", (int)taken, text);
+            memmove(text, end + 1, length - taken - 1);
+            length -= taken + 1;
+            return true;
+        }
+        if (length == sizeof text)
+            length = 0; /* no command is as long */
+        ssize_t more = read(command_file, text + length, sizeof text - length);
+        if (more <= 0)
+            return false;
+        length += (size_t)more;
+    }
+}
+
+/* Waits until all threads sleep; false when the agent is to end. */
+static bool await_quiet(void)
+{
+    int64_t since = wall_ns(), reported = since, asleep_since = 0;
+    int64_t nap = SHORTEST_NAP_US;
+    processes_begin_wait();
+    while (!has_ended) {
+        uint32_t seen = page->activity;
+        int64_t now = wall_ns();
+        bool is_strict = one_runs() && (!asleep_since || now - asleep_since < UNSEEN_WAIT_MS * (SECOND / 1000));
+        if (processes_are_quiet(is_strict)) {
+            note_unseen_waits();
+            free_dead_slots();
+            return true;
+        }
+        asleep_since = !is_strict || !processes_are_quiet(false) ? 0 : asleep_since ? asleep_since : now;
+        if (now - since > 100 * SECOND / 1000) {
+            char line[64];
+            if (is_serving && next_command(line, sizeof line)) {
+                has_ended |= !strcmp(line, "end");
+                if (!strcmp(line, "who"))
+                    report_busy(since);
+            }
+            if (now - reported > REPORT_MS * (SECOND / 1000)) {
+                reported = now;
+                report_busy(since);
+            }
+        }
+        struct timespec pause = {0, nap * 1000};
+        futex(&page->activity, FUTEX_WAIT, seen, &pause);
+        nap = nap * 3 / 2 < LONGEST_NAP_US ? nap * 3 / 2 : LONGEST_NAP_US;
+    }
+    return false;
+}
+
+/* Lets the application run until `limit_ns`: what is due before that, and what is ready. */
+static void run(int64_t limit_ns)
+{
+    while (await_quiet()) {
+        if (is_over && processes_have_ended())
+            return;
+        if (is_over)
+            limit_ns = TIME_NEVER;
+        struct time_slot *slot = first_ready();
+        int64_t due_ns;
+        if (slot) {
+            grant(slot, TIME_READY);
+        } else if ((slot = first_due(limit_ns, &due_ns))) {
+            advance(due_ns);
+            grant(slot, TIME_WAITING);
+        } else if (is_over) {
+            usleep(LONGEST_NAP_US);
+        } else {
+            advance(limit_ns);
+            return;
+        }
+    }
+}
+
+static unsigned begun_services(void)
+{
+    unsigned count = 0;
+    for (unsigned at = 0; at < options.services; at++)
+        count += page->processes[at] > 0;
+    return count;
+}
+
+/* Until each service has a process; then to the begin of the test. */
+static void start(void)
+{
+    unsigned known = 0;
+    int64_t since = wall_ns();
+    while (begun_services() < options.services && !has_ended && !is_over) {
+        if (begun_services() != known) {
+            known = begun_services();
+            since = wall_ns();
+        }
+        int64_t late = wall_ns() - since - START_PATIENCE_S * SECOND;
+        if (known && late > 0) { /* others wait for what these do: time goes on as on the wall */
+            is_repeatable = false;
+            int64_t limit = options.start_ns + late;
+            run(limit < options.begin_ns ? limit : options.begin_ns);
+        }
+        usleep(2000);
+    }
+    run(options.begin_ns);
+    is_serving = true;
+}
+
+static void serve(void)
+{
+    while (!has_ended) {
+        char line[256];
+        struct pollfd commands = {command_file, POLLIN, 0};
+        if (is_over) {
+            run(TIME_NEVER);
+            return;
+        }
+        if (!next_command(line, sizeof line)) {
+            poll(&commands, 1, END_MS);
+            continue;
+        }
+        if (!strncmp(line, "run ", 4)) {
+            run(strtoll(line + 4, NULL, 10));
+            if (!has_ended)
+                report_time();
+        } else if (!strcmp(line, "who")) {
+            report_busy(wall_ns());
+        } else if (!strcmp(line, "end")) {
+            has_ended = true;
+        }
+    }
+}
+
+/* -- setting up ----------------------------------------------------------------------------------------------------- */
+
+static void make_fifo(const char *name, mode_t mode)
+{
+    char path[4096];
+    path_of(path, sizeof path, name);
+    if (mkfifo(path, mode))
+        fail(path);
+}
+
+static int make_channel(const char *name)
+{
+    char path[4096];
+    make_fifo(name, 0600);
+    path_of(path, sizeof path, name);
+    if (options.clock_uid >= 0 && chown(path, (uid_t)options.clock_uid, (gid_t)-1))
+        fail(path);
+    int file = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW);
+    if (file < 0)
+        fail(path);
+    return file;
+}
+
+static void make_page(void)
+{
+    char path[4096];
+    path_of(path, sizeof path, "page");
+    int file = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file < 0 || posix_fallocate(file, 0, sizeof *page))
+        fail(path);
+    page = mmap(NULL, sizeof *page, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+    if (page == MAP_FAILED)
+        fail(path);
+    close(file);
+    page->version = TIME_VERSION;
+    page->slots = TIME_SLOTS;
+    page->now_ns = options.start_ns;
+    page->monotonic_base_ns = options.start_ns - 1000 * SECOND;
+    page->seed = options.seed;
+    page->magic = TIME_MAGIC;
+}
+
+static void set_up(void)
+{
+    struct rlimit files;
+    if (!getrlimit(RLIMIT_NOFILE, &files)) {
+        files.rlim_cur = files.rlim_max;
+        setrlimit(RLIMIT_NOFILE, &files);
+    }
+    umask(0);
+    if (mkdir(options.folder, 0755))
+        fail(options.folder);
+    make_page();
+    for (unsigned at = 0; at < TIME_SLOTS; at++) {
+        char name[16];
+        snprintf(name, sizeof name, "w%u", at);
+        make_fifo(name, 0666);
+    }
+    command_file = make_channel("command");
+    reply_file = make_channel("reply");
+    signal(SIGTERM, on_end);
+    signal(SIGBUS, on_truncated_page);
+    char path[4096];
+    path_of(path, sizeof path, "ready");
+    int file = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (file < 0)
+        fail(path);
+    close(file);
+    puts("{\"dodo\": \"ready\"}"); /* to the runner, which cannot see the folder */
+    fflush(stdout);
+}
+
+static void read_options(int count, char **words)
+{
+    static const struct option known[] = {
+        {"folder", required_argument, NULL, 'f'}, {"services", required_argument, NULL, 'n'},
+        {"start", required_argument, NULL, 's'}, {"begin", required_argument, NULL, 'b'},
+        {"seed", required_argument, NULL, 'r'}, {"clock-uid", required_argument, NULL, 'u'},
+        {"nested", no_argument, NULL, 'p'}, {"by-environment", no_argument, NULL, 'e'}, {0}};
+    for (int option; (option = getopt_long(count, words, "", known, NULL)) != -1;)
+        switch (option) {
+        case 'f': options.folder = optarg; break;
+        case 'n': options.services = (unsigned)strtoul(optarg, NULL, 10); break;
+        case 's': options.start_ns = strtoll(optarg, NULL, 10); break;
+        case 'b': options.begin_ns = strtoll(optarg, NULL, 10); break;
+        case 'r': options.seed = strtoull(optarg, NULL, 10); break;
+        case 'u': options.clock_uid = strtol(optarg, NULL, 10); break;
+        case 'p': options.nested = true; break;
+        case 'e': options.by_environment = true; break;
+        default: exit(2);
+        }
+    if (!options.folder || options.services < 1 || options.services > TIME_SERVICES || options.begin_ns < options.start_ns) {
+        fprintf(stderr, "dodo-time: expected --folder=F --services=1..64 --start=NS --begin=NS [--seed=N] "
+                        "[--clock-uid=UID] [--nested [--by-environment]]\n");
+        exit(2);
+    }
+}
+
+int main(int count, char **words)
+{
+    read_options(count, words);
+    signal(SIGCHLD, SIG_IGN); /* as process 1 of a container it would have to wait for orphans */
+    set_up();
+    processes_init(&(struct selection){options.nested, options.by_environment ? options.folder : NULL});
+    start();
+    serve();
+    return 0;
+}

@@ -1,0 +1,274 @@
+"""An application whose own time is the test's, by an agent of the tests over real FIFOs."""
+
+import json
+import os
+import struct
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+from services.base.lockstep_clock import EPOCH
+from services.clock import virtual
+from services.clock.answers import filters
+from services.clock.exchange import ApplicationFloods, ApplicationSilent, Patience, ServiceLink, ServiceSilent
+from services.clock.virtual import Busy, Destroyed, Reached, SentMessages, TimeAgent, VirtualApplication, report_of
+from tests.services.clock.toys import STEER, STEP, Toys
+
+Answer = Callable[[int], list[object]]
+"""What an agent replies when the application is to go on to a time (us); bytes as they are."""
+
+
+def reached(until: int, **more: object) -> dict[str, object]:
+    return {"now": until * 1000, "grants": 1, "services": [0, 1], "notes": [], "repeatable": True, **more}
+
+
+@contextmanager
+def agent(folder: Path, answer: Answer = lambda until: [reached(until)]) -> Iterator[TimeAgent]:
+    for name in ("command", "reply"):
+        os.mkfifo(folder / name, 0o600)
+    command = os.open(folder / "command", os.O_RDWR)
+    reply = os.open(folder / "reply", os.O_RDWR)
+
+    def serve() -> None:
+        with os.fdopen(command, "rb", buffering=0) as lines:
+            for line in iter(lines.readline, b"end\n"):
+                for each in answer(int(line.split()[1]) // 1000):
+                    os.write(reply, each if isinstance(each, bytes) else json.dumps(each).encode() + b"\n")
+        os.close(reply)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    made = TimeAgent(folder)
+    try:
+        yield made
+    finally:
+        if thread.is_alive():
+            (folder / "command").write_text("end\n")
+        thread.join()
+        made.close()
+
+
+class Link:
+    """Nobody else is on the bus."""
+
+    def __init__(self, on_drain: Callable[[], None] = lambda: None) -> None:
+        self.drain = on_drain
+        self.sent: list[Any] = []
+
+    def send(self, commands: Any) -> None:
+        self.sent += commands
+
+    def result(self, service: str) -> Any:
+        return service
+
+    def __getattr__(self, _name: str) -> Callable[..., None]:
+        return lambda *_, **__: None
+
+
+IDS = {name: MessageSet.standard().id(name) for name in (STEER, "opendlv.proxy.PedalPositionRequest")}
+
+
+def steering(sent: int, sampled: int = 5, stamp: int = 0) -> Envelope:
+    return Envelope(IDS[STEER], b"", sent, 1, sampled, stamp)
+
+
+def application(agent: TimeAgent, sent: SentMessages | None = None, link: object = None) -> VirtualApplication:
+    heard = sent or SentMessages(filters([STEER], IDS))
+    patience = Patience(0.4, 0.2)
+    notes: list[str] = []
+    made = VirtualApplication(
+        heard, agent, patience, cast(ServiceLink, link or Link()), lambda: False, ("driver", "eye"), notes.append
+    )
+    made.notes = notes  # type: ignore[attr-defined]
+    return made
+
+
+def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path) -> None:
+    sent = SentMessages(filters([f"{STEER}/0"], IDS))
+    waiting = [steering(EPOCH - 9)]
+
+    def drain() -> None:
+        while waiting:
+            sent.take(waiting.pop(0))
+
+    def answer(until: int) -> list[object]:
+        if until > EPOCH:
+            waiting.extend(steering(EPOCH + at, stamp=stamp) for at, stamp in ((-5, 0), (7, 0), (7, 3), (10**9, 0)))
+            waiting.append(steering(EPOCH)._replace(data_type=IDS["opendlv.proxy.PedalPositionRequest"]))
+        return [reached(until)]
+
+    with agent(tmp_path, answer) as time:
+        driven = application(time, sent, Link(drain))
+        driven.begin(EPOCH)
+        assert not waiting
+        driven.show((), EPOCH)
+        driven.await_answer(EPOCH + STEP)
+        taken = [(e.received - EPOCH, e.sample_time, e.sender_stamp) for e in driven.collect()]
+    assert taken == [(1, 5, 0), (8, 5, 0), (8, 5, 3), (STEP, 5, 0)], "what was sent before the test is left out"
+    assert driven.collect() == []
+
+
+@pytest.mark.parametrize(
+    ("frame", "report", "sentence"),
+    [
+        (1, {"processor_s": 0.5, "wall_s": 0.5}, "thread 'loop' of service 'eye' computed for 0.4 s without waiting; "),
+        (1, {"processor_s": 0.3, "wall_s": 0.5}, ""),
+        (2, {"processor_s": 0.3, "wall_s": 0.3}, "thread 'loop' of service 'eye' computed for 0.2 s without waiting; "),
+        (2, {"processor_s": 0.0, "wall_s": 2.5}, "did not wait within 2 s of wall time (state D); with clock: virtual"),
+        (2, {"processor_s": 0.0, "wall_s": 1.5}, ""),
+        (2, {"processor_s": "x", "wall_s": -1}, ""),
+    ],
+)
+def test_who_does_not_wait_is_named(tmp_path: Path, frame: int, report: dict[str, Any], sentence: str) -> None:
+    busy = {"service": 1, "pid": 12, "tid": 13, "name": "loop", "state": "D", **report}
+    steps = iter(range(9))
+
+    def answer(until: int) -> list[object]:
+        return [*([{"busy": busy}] if next(steps) == (frame - 1) * 2 + 1 else []), reached(until)]
+
+    with agent(tmp_path, answer) as time:
+        driven = application(time)
+
+        def drive() -> None:
+            driven.begin(EPOCH)
+            for step in range(frame):
+                driven.show((), EPOCH + step * STEP)
+                driven.await_answer(EPOCH + (step + 1) * STEP)
+
+        if not sentence:
+            drive()
+            return
+        with pytest.raises(ApplicationSilent) as refused:
+            drive()
+    assert sentence in str(refused.value)
+
+
+def test_it_goes_on_only_when_the_time_is_reached(tmp_path: Path) -> None:
+    """Whatever else the agent, or a stranger, says meanwhile."""
+    noise = [b"{}\n[]\n\xff\nnull\n" + b"[" * 5000 + b"\n", {"now": "1"}, {"busy": 3}, reached(EPOCH - 1), b"{"]
+    with agent(tmp_path, lambda until: [*noise, b"\n", reached(until), reached(until)]) as time:
+        driven = application(time)
+        driven.begin(EPOCH)
+        for step in range(3):
+            driven.show((), EPOCH + step * STEP)
+            driven.await_answer(EPOCH + (step + 1) * STEP)
+    assert driven.frames == 3
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        (b'{"destroyed": true}', Destroyed()),
+        (b'{"busy": {"service": true, "name": "a\\u001bb", "state": 7, "wall_s": 1}}', Busy(-1, "a?b", "", 1.0, 0.0)),
+        (b'{"now": 5, "services": [0, "x"], "notes": [3, {"kind": "spin"}], "repeatable": false}',
+         Reached(5, frozenset({0, -1}), (("spin", -1, ""),), False)),
+        (b'{"now": true}', None),
+        (b'{"now": 5, "services": 7}', Reached(5, frozenset(), (), True)),
+    ],
+)  # fmt: skip
+def test_reports_are_taken_as_far_as_they_can_be(line: bytes, expected: object) -> None:
+    assert report_of(line) == expected
+
+
+def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(tmp_path: Path) -> None:
+    with agent(tmp_path, lambda _: [{"destroyed": True}]) as time:
+        with pytest.raises(ApplicationSilent, match="the application destroyed the page"):
+            application(time).begin(EPOCH)
+        (tmp_path / "command").write_text("end\n")
+        with pytest.raises(ServiceSilent, match="has ended"):
+            while True:
+                time.report(0.1)
+
+
+def test_a_flood_ends_the_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(virtual, "MOST_SENT", 3)
+    sent = SentMessages(filters([f"{STEER}/0"], IDS))
+    sent.begin()
+    for step in range(4):
+        for n in range(3):
+            sent.take(steering(EPOCH + n))
+        sent.collect(EPOCH, EPOCH + step)
+    for n in range(3):
+        sent.take(steering(EPOCH + n))
+    with pytest.raises(ApplicationFloods, match="sent more than 3 GroundSteeringRequests within a step: it floods"):
+        sent.take(steering(EPOCH))
+
+
+def test_copied_sample_times_are_counted_and_nothing_is_measured() -> None:
+    sent = SentMessages(filters([STEER], IDS))
+    assert sent.facts() == {}
+    sent.begin()
+    sent.expect([7, 9])
+    for sampled in ((7,), (7, 9), (7, 8), ()):
+        for each in sampled:
+            sent.take(steering(EPOCH, each))
+        sent.collect(EPOCH, EPOCH + STEP)
+    facts = sent.facts()
+    assert (facts["answers"], facts["uncopied"], facts["slow"], facts["worst_s"]) == (3, 1, 0, 0.0)
+
+
+def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(tmp_path: Path) -> None:
+    notes = [{"kind": "static", "service": 0, "name": "busybox"}, {"kind": "odd", "service": 0, "name": "x"}]
+    begun = iter([[0, 1], [0, 1], [0]])
+    with agent(tmp_path, lambda until: [reached(until, notes=notes, services=next(begun), repeatable=False)]) as time:
+        driven = application(time)
+        driven.begin(EPOCH)
+        driven.await_answer(EPOCH + STEP)
+        with pytest.raises(ServiceSilent, match="service 'eye' never loaded DoDo's clock"):
+            driven.show((), EPOCH + STEP)
+    first, second = driven.notes  # type: ignore[attr-defined]
+    assert first.startswith("not all services began at once")
+    assert second == "service 'driver' started 'busybox', a statically linked program, which keeps the machine's time"
+
+
+def test_without_an_agent_the_test_cannot_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(virtual, "AGENT_PATIENCE_S", 0.0)
+    with pytest.raises(ServiceSilent, match="lets the application's time go on"):
+        application(TimeAgent(tmp_path)).begin(EPOCH)
+
+
+def expected(steps: int, every: int) -> list[tuple[int, float]]:
+    """The way of a mover that is steered each ``every`` us by the picture that is shown then."""
+    place, speed, way, seen = 0.01, 1.0, [(0, 0.01)], 0.01
+    for now in range(STEP // 10, (steps - 1) * STEP + 1, STEP // 10):
+        if (now - STEP // 10) % every == 0:
+            speed = 1.5 - seen
+        place += speed * 0.01
+        way.append((now, place))
+        if now % STEP == 0:
+            seen = place
+    return way
+
+
+def test_the_way_of_one_who_acts_by_a_timer_is_as_computed_by_hand(tmp_path: Path, cid: int) -> None:
+    """Also what it sends at the time of a frame, which counts from then on."""
+    every = 3 * STEP // 10
+    toys = Toys(cid, readers=0, seconds=1.0)
+    went = [EPOCH]
+    with Session(cid) as session:
+        request = session.messages.type(STEER)
+
+        def answer(until: int) -> list[object]:
+            if until > went[-1]:
+                with SharedMemory.attach(toys.memory_name()) as memory, memory.lock():
+                    (place,) = struct.unpack("<d", memory.buffer[:8])
+                for now in range(went[-1], until):
+                    if (now - EPOCH) % every == 0:
+                        payload = session.messages.encode(request(groundSteering=1.5 - place))
+                        session.send_envelope(Envelope(IDS[STEER], payload, now, 0, 0, 0))
+                went.append(until)
+            return [reached(until, services=[0])]
+
+        with agent(tmp_path, answer) as time:
+            toys.agent = time
+            way, stepper = toys.run()
+    assert [(at, round(place, 4)) for at, place in way] == [(at, round(x, 4)) for at, x in expected(11, every)]
+    assert stepper.application.frames == 11
