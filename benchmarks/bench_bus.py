@@ -122,7 +122,7 @@ def send(peer: Ours | Theirs) -> None:
 
 
 def member(role: str, name: str) -> int:
-    """In a process of its own: seconds from the first message to the last answer, and processor time."""
+    """In its own process: seconds from the first message to the last answer, and processor time."""
     peer = PEERS[name]()
     print("ready", flush=True)
     sys.stdin.readline()

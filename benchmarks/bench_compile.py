@@ -66,7 +66,7 @@ def dodo(folder: Path, *words: str) -> tuple[float, float]:
 
 
 def peer(folder: Path) -> float:
-    """Seconds that compose takes to check one compiled test; 0 where there is no compose."""
+    """Seconds that compose takes to check one compiled test; 0 if there is no compose."""
     if PLUGIN is None:
         return 0.0
     tests = sorted(p.parent for p in (folder / "generated").glob("*/test.json"))[:PEER_CALLS]

@@ -1,7 +1,7 @@
 """How soon ``dodo lsp`` answers an editor, in a repository with 100 tests, beside yaml-language-server.
 
 The tests are copies of the shipped ones, with their matrices and with what they extend. A client of the protocol opens
-one, makes a mistake and mends it again, text by text: a key is answered when the problems are shown, or shown to be
+one, makes a mistake and fixes it again, text by text: a key is answered when the problems are shown, or shown to be
 gone. The peer is what editors otherwise check a test with: it knows the schema alone, and one file at a time, where
 ``dodo lsp`` checks wiring, maps and all other tests, too. Both wait a moment for the next key, 0.05 and 0.2 s, which is
 part of the figures, as an editor's user waits for it, too. The keys "after a pause" come when all tests are being
@@ -135,7 +135,7 @@ def late(values: Sequence[float]) -> list[float]:
 
 
 def rows(ours: Times, theirs: Times) -> list[Row]:
-    """A row for each kind of wait; every value of ours has one of the peer's, where it has an answer at all."""
+    """A row for each kind of wait; every value of ours has one of the peer's, if it has an answer at all."""
     made = []
     for name in (KEY, LATE, AFTER_PAUSE, *PLACES):
         pair = [late(times.get(KEY, ())) if name == LATE else times.get(name, []) for times in (ours, theirs)]

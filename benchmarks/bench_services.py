@@ -5,7 +5,7 @@
 Processor time (user and system, of all threads) a second of each service at its default rate, in percent of a core.
 All that a simulated test can have runs at once and drives the example application around the Kiwi track; camera,
 beacon, gantry and rec-replay run after it. In the drive the time is taken from a picture of 640 x 480 being in shared
-memory, when its readers are told, to GroundSteeringRequest for this picture being received; and from the instant at
+memory, when its readers are notified, to GroundSteeringRequest for this picture being received; and from the instant at
 which the picture was due, which includes drawing it.
 """
 
@@ -64,7 +64,7 @@ def in_the_drive(memory: str, folder: Path) -> dict[str, list[str]]:
 
 
 def alone(memory: str, rig: FakeRig) -> dict[str, list[str]]:
-    """Services that play a part of their own."""
+    """Services that play their own part."""
     return {
         "beacon": ["--start=at-once", "--points=0 0,1000 0", "--speed=1"],
         "camera": [
@@ -108,7 +108,7 @@ def used(processes: Processes) -> dict[str, float]:
 
 
 class Watcher:
-    """Notes when each picture of a memory was told of, by sample time, in microseconds of the wall clock."""
+    """Notes when readers were notified of each picture of a memory, by sample time, in us of the wall clock."""
 
     def __init__(self, name: str) -> None:
         self.shown: dict[int, int] = {}

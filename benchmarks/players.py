@@ -62,7 +62,7 @@ def cost_of(command: Sequence[str | Path], folder: Path) -> Cost:
 
 
 def engine_problem(images: Sequence[str] = ()) -> str:
-    """Why tests cannot run in containers here; empty where they can. ``images`` are names of DoDo's."""
+    """Why tests cannot run in containers here; empty if they can. ``images`` are names of DoDo's."""
     if shutil.which("docker") is None:
         return "the docker command is missing"
     for words, text in ((["info"], "no Docker engine answers"), (["compose", "version"], "Compose v2 is missing")):

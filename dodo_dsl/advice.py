@@ -1,4 +1,4 @@
-"""Commands that messages tell users to type. Each works where it is shown: for this user and Python, in any folder."""
+"""Commands that messages propose. Each works where it is shown: for this user and Python, in any folder."""
 
 import grp
 import importlib
@@ -54,7 +54,7 @@ _APT_S = 10.0
 
 
 def missing(extra: str) -> str:
-    """The first module that this Python lacks for an extra; empty where it has all."""
+    """The first module that this Python lacks for an extra; empty if it has all."""
     for module in _LOADED[extra]:
         try:
             importlib.import_module(module)
@@ -126,7 +126,7 @@ def _name(look_up: Callable[[int], Any], number: int) -> str:
 
 
 def _script(name: str) -> str:
-    """A script of the checkout that installs what is missing, where it can: for root, where there is apt."""
+    """A script of the checkout that installs what is missing, if it can: for root, if there is apt."""
     checkout = package_data.checkout()
     can = checkout and os.geteuid() == 0 and shutil.which("apt-get")
     return shlex.quote(str(checkout / "scripts" / name)) if checkout and can else ""
@@ -145,7 +145,7 @@ def firmware(variable: str) -> str:
 
 
 def _source(extra: str) -> list[str]:
-    """The checkout that DoDo was installed from, with an extra; nothing where there is none, or not any more."""
+    """The checkout that DoDo was installed from, with an extra; nothing if there is none, or not any more."""
     folder, is_editable = _installed_from()
     return [*(["--editable"] if is_editable else []), f"{folder}[{extra}]"] if folder else []
 
@@ -180,7 +180,7 @@ def _for_owner(*commands: str) -> str:
 
 
 def _by_apt(packages: tuple[str, ...], least: int = 0) -> str:
-    """Installs the first package that apt has in this major version or a later one; empty where there is none."""
+    """Installs the first package that apt has in this major version or a later one; empty if there is none."""
     apt = shutil.which("apt-cache")
     for name in packages if apt else ():
         words = [str(apt), "policy", name]

@@ -55,7 +55,7 @@ def refuse_others(path: Path) -> None:
 def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
     """The name of a file for the block to make, which takes the place of ``path`` when it ends well.
 
-    The folder is made where there is none. Raises OSError that names ``path``, also for what fails in the block with
+    The folder is made if there is none. Raises OSError that names ``path``, also for what fails in the block with
     the temporary file.
     """
     refuse_others(path)
@@ -88,7 +88,7 @@ def write_text(path: Path, text: str, durable: bool = False) -> None:
 
 
 def appended(path: Path) -> io.FileIO:
-    """The file, opened to append without a buffer, new where there is none; its folder is made.
+    """The file, opened to append without a buffer, new if there is none; its folder is made.
 
     Raises OSError, also where the name is a symlink, a device or a FIFO: others may write into folders of reports.
     """
@@ -106,7 +106,7 @@ def appended(path: Path) -> io.FileIO:
 def new_folder(path: Path) -> Iterator[Path]:
     """An empty folder to fill, which becomes ``path`` when the block ends well.
 
-    Raises FileExistsError where ``path`` is there by then and not an empty folder of this user, and OSError.
+    Raises FileExistsError if ``path`` is there by then and not an empty folder of this user, and OSError.
     """
     with _stage(path) as stage:
         yield stage

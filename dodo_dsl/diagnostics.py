@@ -44,13 +44,13 @@ class Fix:
     new: str
 
     def mended(self, text: str) -> str:
-        """The text at the span with the fix; as it is where it has changed meanwhile."""
+        """The text at the span with the fix; as it is if it has changed meanwhile."""
         return text.replace(self.old, self.new) if text.count(self.old) == 1 else text
 
 
 @dataclass(frozen=True, order=True)
 class Diagnostic:
-    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` where there is exactly one.
+    """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` if there is exactly one.
 
     ``tests`` are those that it depends on, where its place does not say so. ``about`` names what it says is missing, or
     where something belongs, for problems that only follow from others.

@@ -41,7 +41,7 @@ class LogTimes:
 
 
 def read(log: Path) -> tuple[list[int], list[int]]:
-    """Offsets and times of a log, both ascending; empty where there are none that can be read."""
+    """Offsets and times of a log, both ascending; empty if there are none that can be read."""
     offsets, times = list[int](), list[int]()
     try:
         for line in regular_file.text(log.with_suffix(SUFFIX), _MOST_BYTES).splitlines():

@@ -48,7 +48,7 @@ class MachineLoad:
     lateness_s: float = 0.0
     """How late an update of DoDo's services ended, at worst."""
     paused_s: float = 0.0
-    """For how long the emulated rig stood still, as it could not keep real time."""
+    """For how long the emulated rig stood still, because it could not keep real time."""
     undecided: bool = False
     """Whether a test that failed is in error, as the machine was too busy."""
 
@@ -75,7 +75,7 @@ class Response:
     """How long the application took for an answer in lockstep, without the first; times in s.
 
     The time is the wall time less what the application waited for a processor. ``processor_*`` is the processor time,
-    None where the application's processes cannot be seen from the test's services. ``slow`` counts answers that took
+    None if the application's processes cannot be seen from the test's services. ``slow`` counts answers that took
     longer than the period of the frames, ``over`` those beyond the limit of the test, None without one, ``uncopied``
     those that did not carry the sample time of their frame.
     """
@@ -94,7 +94,7 @@ class Response:
     """The processor by its name, with its clock."""
     uncopied: int = 0
     worst_frame: int = 0
-    """The number of the frame whose answer took the longest, from 1 on; 0 where that is not known."""
+    """The number of the frame whose answer took the longest, from 1 on; 0 if that is not known."""
 
     def in_words(self) -> str:
         """The times in a sentence, with the processor that they were measured on."""
@@ -109,11 +109,11 @@ def _ms(seconds: float) -> str:
 
 @dataclass(frozen=True)
 class ServiceUse:
-    """What a service of the application used from the begin of the test to its end, with all its processes.
+    """What a service of the application used from the start of the test to its end, with all its processes.
 
     ``processor_share`` is its processor time by the test's own time, 1 for one processor all the time.
-    ``memory_growth_bytes_per_s`` is that of the second half of the test, by the test's own time, 0 where it does not
-    grow steadily, None where the test was too short to tell. ``memory_limit_bytes`` is None where there is none.
+    ``memory_growth_bytes_per_s`` is that of the second half of the test, by the test's own time, 0 if it does not
+    grow steadily, None if the test was too short to measure. ``memory_limit_bytes`` is None if there is none.
     """
 
     service: str
@@ -129,7 +129,7 @@ class ServiceUse:
         used = f"{self.processor_s:.2f} s of processor time{share}, up to {megabytes(self.peak_memory_bytes)} of memory"
         growth = self.memory_growth_bytes_per_s
         if growth is None:
-            return f"{used}, and the test was too short to tell whether memory grows"
+            return f"{used}, and the test was too short to measure its growth"
         return f"{used}, growing by {megabytes(growth * 60)}/min" if growth else used
 
 
@@ -141,7 +141,7 @@ def megabytes(size: float) -> str:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a test; times in seconds, None where the test did not get so far."""
+    """What became of a test; times in seconds, None if the test did not get so far."""
 
     name: str
     slug: str
@@ -167,7 +167,7 @@ class Outcome:
     machine: MachineLoad | None = None
     response: Response | None = None
     resources: tuple[ServiceUse, ...] = ()
-    """Of the application's services; empty where nothing was measured."""
+    """Of the application's services; empty if nothing was measured."""
     goals: tuple[Goal, ...] = ()
 
 
@@ -183,11 +183,11 @@ class NotRun:
 
 
 def with_margin(check: Mapping[str, Any]) -> dict[str, Any]:
-    """A check with its ``margin`` and ``margin_share``, None where it has no value or no limit.
+    """A check with its ``margin`` and ``margin_share``, None if it has no value or no limit.
 
     ``margin`` is the distance of the value to its nearest limit in the check's unit, negative beyond the limit.
     ``margin_share`` is margin / (abs(margin) + size), which lies between -1 and 1 and is 0 at the limit. The size is
-    half the range between both limits, that of the limit where there is one, and one unit where that is 0. It agrees
+    half the range between both limits, that of the limit if there is one, and one unit where that is 0. It agrees
     with ``ok``: a check that holds has no negative share, and one that fails at its limit or within has -1, as a wall
     that is touched.
     """
@@ -199,7 +199,7 @@ def worst_margin(outcome: Outcome) -> float | None:
 
     None for an error, -1 for a failed test without a failing check that has a value. A check that holds with nothing
     to spare does not count, as three gates of three or no broken sample: it cannot be better. Nor does what differs
-    from run to run, as the time of answers. 0 where no check is left of a passed test. A check that fails at its
+    from run to run, as the time of answers. 0 if no check is left of a passed test. A check that fails at its
     limit, as a wall that is touched, does not say by how much, and counts only where no other check that failed does.
     """
     if outcome.outcome == "error":

@@ -41,7 +41,7 @@ _LONGEST = 1000
 class Slip:
     """A mistake in a text: its place, counted from 0, and words about it; ``is_tab`` for indentation with a tab.
 
-    ``fix`` is for the ``length`` characters at the place, where there is exactly one fix.
+    ``fix`` is for the ``length`` characters at the place, if there is exactly one fix.
     """
 
     line: int
@@ -74,7 +74,7 @@ class Failure:
 
     @functools.cached_property
     def lines(self) -> list[str]:
-        """The lines of the text, empty within a block text, below ``|`` or ``>``, where anything may stand."""
+        """The lines of the text, empty within a block text, below ``|`` or ``>``, if anything may stand."""
         found = self.text.splitlines()
         for token in self.tokens:
             if isinstance(token, yaml.ScalarToken) and token.style in ("|", ">"):
@@ -222,7 +222,7 @@ def _open_quote(failure: Failure) -> Slip | None:
 
 
 def _not_indented(failure: Failure) -> Slip | None:
-    """A value in a line of its own, which begins where its key does."""
+    """A value in its own line, which begins where its key does."""
     number = failure.suspect
     above = failure.above(number)
     found = _OPEN.fullmatch(failure.line(above)) if above >= 0 else None

@@ -30,7 +30,7 @@ _DASHES = re.compile(r"-[^-\s]\S*(\s+- ?[^-\s]\S*)+")
 """Items of a list that would be one text."""
 _NAME = re.compile(r"(matrix|vary)\.[a-z][a-z0-9-]*")
 """What a placeholder names."""
-_SECOND = "remove the line, or write what stands below into a file of its own"
+_SECOND = "remove the line, or write what stands below into its own file"
 _CONTROL = {0: "NUL", 8: "backspace", 0xB: "vertical tab", 0xC: "form feed", 0x1B: "escape", 0x7F: "delete"}
 _SPECIAL: dict[str, Plain] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -318,7 +318,7 @@ def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:
     except (yaml.YAMLError, ValueError) as error:
         return None, [*builder.diagnostics, _syntax(file, text, error)]
     for name, span in builder.named_texts.items():
-        message = f"'&{name}' is no part of the text but an anchor's name, and nothing refers to it"
+        message = f"'&{name}' is not part of the text but an anchor's name, and nothing refers to it"
         hint = "write the whole text in quotes"
         builder.diagnostics.append(Diagnostic(span, "yaml-syntax", message, hint, "warning"))
     return builder.root, builder.diagnostics

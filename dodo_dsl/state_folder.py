@@ -14,7 +14,7 @@ from pathlib import Path
 
 
 class NoStateFolder(Exception):
-    """This user has no home folder that could hold the state; the text says what to set."""
+    """This user has no home folder that could hold the state; the text shows what to set."""
 
 
 def state_path(variable: str, name: str) -> Path:
@@ -36,16 +36,16 @@ def account_path(name: str) -> Path:
 
 
 class UnsafeFolder(OSError):
-    """Others could write into a folder of DoDo's state; the text says what to do."""
+    """Others could write into a folder of DoDo's state; the text shows what to do."""
 
 
 def secured(folder: Path) -> Path:
-    """The folder, which only its owner can write: this user or root; it is made, with mode 0700, where there is none.
+    """The folder, which only its owner can write: this user or root; it is made, with mode 0700, if there is none.
 
     Of a folder of root the group may write, too, as several users share the state then. Raises UnsafeFolder, also for
     a symlink, and OSError.
     """
-    with contextlib.suppress(FileExistsError):  # of a file in its place the next call tells
+    with contextlib.suppress(FileExistsError):  # the next call reports a file in its place
         folder.parent.mkdir(parents=True, exist_ok=True)
     try:
         folder.mkdir(mode=0o700)

@@ -47,6 +47,18 @@ def columns(stream: TextIO | None = None) -> int:
     return max(_NARROWEST, min(known or (_USUAL if is_terminal else WIDE), _MOST_COLUMNS))
 
 
+def width_of(stream: TextIO) -> int | None:
+    """How many columns a line may have on the stream's terminal; None where it is a file or a pipe."""
+    return columns(stream) if stream.isatty() else None
+
+
+def clipped(text: str, width: int | None) -> str:
+    """The start of printable text that fits into so many columns, with ``…`` where some is left out."""
+    if width is None or cells(text) <= width:
+        return text
+    return text[: _fitting(text, width - 1)].rstrip() + "…"
+
+
 def _descriptors(stream: TextIO | None) -> tuple[int, ...]:
     """Those that may be the terminal on which the stream is read in the end; none for text in memory."""
     try:

@@ -24,7 +24,7 @@ class Machine:
 class Bench:
     """A run of one benchmark: its rows, seconds, and the load average before and after it.
 
-    ``trouble`` says what was wrong. One that was ended because its time was over has not failed.
+    ``trouble`` shows what was wrong. One that was ended because its time was over has not failed.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Ledger:
 
 
 def read(path: Path) -> Ledger:
-    """Raises OSError, and ValueError for what is no ledger."""
+    """Raises OSError, and ValueError for what is not a ledger."""
     try:
         return _ledger(json.loads(path.read_bytes()))
     except (ValueError, TypeError, KeyError, AttributeError) as error:

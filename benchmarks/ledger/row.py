@@ -31,8 +31,8 @@ class Goal:
 class Row:
     """``ours`` and ``theirs`` in ``unit``, and ``ratios``: how many times as good as the peer, in each round.
 
-    ``less`` says that less of the unit is better, as of seconds. A row without ``ours`` was not measured, and one
-    without ``theirs`` has no peer; ``note`` says why.
+    ``less`` means that less of the unit is better, as of seconds. A row without ``ours`` was not measured, and one
+    without ``theirs`` has no peer; ``note`` gives the reason.
     """
 
     what: str
@@ -50,7 +50,7 @@ class Row:
 
     @classmethod
     def from_json(cls, found: dict[str, Any]) -> "Row":
-        """Raises TypeError and ValueError for what is no row."""
+        """Raises TypeError and ValueError for what is not a row."""
         goal = found.get("goal")
         numbers = {key: tuple(map(float, found.get(key, ()))) for key in ("ours", "theirs", "ratios")}
         return cls(**{**found, **numbers, "goal": Goal(**goal) if goal else None})
@@ -94,7 +94,7 @@ def plan(*rows: Row, note: str = NOT_REACHED) -> None:
 
 @contextmanager
 def attempt(*planned: Row) -> Iterator[None]:
-    """A part of a benchmark. Where it fails, its rows that have no values say why, and what comes after it goes on."""
+    """A part of a benchmark. If it fails, its rows that have no values say why, and what comes after it goes on."""
     try:
         yield
     except Exception as error:  # noqa: BLE001 - whatever it is, it is the reason

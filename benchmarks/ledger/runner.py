@@ -126,7 +126,7 @@ def _interruptible() -> None:
 def _started(
     command: list[str], folder: Path, environment: dict[str, str], errors: Path
 ) -> Iterator["subprocess.Popen[bytes]"]:
-    """A process with a group of its own, all of which is gone after the block; first they may clean up."""
+    """A process with its own group, all of which is gone after the block; first they may clean up."""
     with errors.open("wb") as stream:
         process = subprocess.Popen(
             command, cwd=folder, env=environment, start_new_session=True, stderr=stream,

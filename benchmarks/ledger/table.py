@@ -24,7 +24,7 @@ def measured(row: Row) -> Spread | None:
 
 
 def is_met(row: Row) -> bool | None:
-    """None where there is no goal, or nothing was measured that it is about."""
+    """None if there is no goal, or nothing was measured that it is about."""
     goal = row.goal
     values = () if goal is None else row.ratios if goal.of == "ratio" else row.ours
     if goal is None or not values:

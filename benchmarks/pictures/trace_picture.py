@@ -55,7 +55,7 @@ def draw(traces: dict[str, dict[str, Any]]) -> str:
 
 
 def bar(phase: dict[str, Any], y: int, scale: float, colour: str) -> str:
-    """One phase, with its name where there is room, and its time as a tooltip."""
+    """One phase, with its name if there is room, and its time as a tooltip."""
     x, width, seconds = LEFT + phase["ts"] / 1e6 * scale, phase["dur"] / 1e6 * scale, phase["dur"] / 1e6
     name = escape(phase["name"])
     text = f'<text x="{x + 4:.1f}" y="{y + 16}" fill="white">{name}</text>' if width > LETTER * len(name) + 8 else ""

@@ -2,7 +2,7 @@
 
 A corner is within limits in some of the ranges, whatever the other conditions are; limits are shares of a range, 0 at
 its ``from``. With ``onset`` the program already steers a little wrong in the corner's neighbourhood, as mistakes do
-that grow; without it, nothing tells of them before.
+that grow; without it, nothing announces them.
 """
 
 import math

@@ -4,7 +4,7 @@
 
 A drive is stood in for by a function: an application that fails in a corner of two to four of its ranges, whatever the
 others are, and whose margin elsewhere falls off in some of the ranges, or in none of those of the bug. No program runs,
-so this compares ways to search and says nothing of the time of a drive. VerifAI's cross-entropy sampler takes part
+so this compares ways to search and shows nothing about the time of a drive. VerifAI's cross-entropy sampler takes part
 where its package is installed; it gets the same margins and learns from those below LEARNS_BELOW, as with its default
 of 0 it would be random until the first failure.
 """
@@ -113,7 +113,7 @@ def by_cross_entropy(bug: Bug, seed: int) -> Iterator[float]:
 
 
 def until_failure(margins: Iterator[float], most: int) -> int:
-    """The number of drives up to the first failure; one more than ``most`` where none of these fails."""
+    """The number of drives up to the first failure; one more than ``most`` if none of these fails."""
     return next((number for number, margin in enumerate(margins, 1) if margin < 0 or number > most), most + 1)
 
 

@@ -1,11 +1,11 @@
-"""How many real drives dodo search needs until it finds a planted bug, and whether it shrinks it to its causes.
+"""How many real drives dodo search needs until it finds a planted bug, and whether it reduces it to its causes.
 
     python benchmarks/planted/programs.py [BUG...] [--seed 0] [--most 400] [--first] [--work build/planted]
 
 Each bug of bugs.py gets a folder with the example application, whose steering has it, and a test with seven ranges.
-`dodo search --until-failure` drives there until it finds a failure, and shrinks it; the test that it writes is then
+`dodo search --until-failure` drives there until it finds a failure, and reduces it; the test that it writes is then
 driven ten times. Random drives would need 0.693 / volume of them as the median, as a drive outside the corner passes.
-With --first, a search is interrupted at its failure, before it is shrunk, so that many seeds take less time.
+With --first, a search is interrupted at its failure, before it is reduced, so that many seeds take less time.
 """
 
 import argparse
@@ -139,7 +139,7 @@ def main() -> None:
     parser.add_argument("bugs", nargs="*", metavar="BUG", help="of bugs.py, or none (default: all of bugs.py)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--most", type=int, default=400)
-    parser.add_argument("--first", action="store_true", help="shrink nothing")
+    parser.add_argument("--first", action="store_true", help="reduce nothing")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "planted")
     flags = parser.parse_args()
     one = first_of if flags.first else measure

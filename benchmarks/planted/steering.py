@@ -1,4 +1,4 @@
-"""The example's steering with the mistake BUG of bugs.py, where the conditions told by the test are in its corner."""
+"""The example's steering with the mistake BUG of bugs.py, where the conditions that the test sets are in its corner."""
 
 import os
 import sys

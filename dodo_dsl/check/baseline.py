@@ -42,7 +42,7 @@ class _WrongBaseline(Exception):
 
 
 def resolved_baseline(spec: Spec) -> ResolvedBaseline:
-    """The baseline of an instance; empty where it has none."""
+    """The baseline of an instance; empty if it has none."""
     written = spec.baseline.value if spec.baseline else None
     place = written.get("results") if isinstance(written, Mapping) else written
     if not isinstance(place, Scalar) or not isinstance(place.value, str):
@@ -63,7 +63,7 @@ def _tolerance(node: Node | None) -> float:
     try:
         share = float(quantity.convert(node.text, quantity.SHARE))
     except quantity.QuantityError:
-        return TOLERANCE  # told by the schema
+        return TOLERANCE  # reported by the schema
     if share < 0:
         raise _WrongBaseline(node.span, "out-of-range", f"'tolerance' is {node.text}, expected at least 0 %")
     return share

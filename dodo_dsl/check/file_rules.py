@@ -5,7 +5,7 @@ format is JSON of the shape that the manifest names.
 ``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
 ``short-timeout``: the test's timeout leaves room for the longest time that an evaluator waits.
 ``no-limit``: an evaluator has something to judge by; ``empty-file``: so has the file that it judges by. A test that can
-only pass says nothing about the application.
+only pass shows nothing about the application.
 """
 
 import functools
@@ -95,7 +95,7 @@ def _among(context: RuleContext, service: ResolvedService, argument: Argument, e
         return
     names = _names(file, keys)
     if has_errors(file_problems(context, service, service.arguments[source])):
-        return  # told with the file
+        return  # reported with the file
     if isinstance(names, str):
         yield Diagnostic(
             entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(keys[0], "")
@@ -196,7 +196,7 @@ def _files(service: ResolvedService) -> Iterator[Diagnostic]:
         for key in argument.parameter.not_empty if entry and file else ():
             found = entries(file, key) if file else ""
             if isinstance(found, str) and argument.parameter.format:
-                continue  # told with the file
+                continue  # reported with the file
             if entry and file and isinstance(found, str):
                 yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {found}")
             elif entry and file and not found:

@@ -69,7 +69,7 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal:
 
 
 def _unit(test: ResolvedTest, name: str, entry: Entry) -> str | None:
-    """The unit of a check, None where no manifest has it but one does not tell; raises _WrongGoal."""
+    """The unit of a check, None if no manifest has it; raises _WrongGoal."""
     known = dict(_OF_THE_TEST)
     judges = [service.manifest for service in test.services if _judges(service)]
     for manifest in judges:
@@ -107,10 +107,12 @@ def _value(goal: Mapping, key: str, unit: str | None) -> float:
 
 
 def _bare(key: str, written: Scalar) -> float:
-    """A number of an evaluator that does not tell its units."""
+    """A number of an evaluator that does not declare its units."""
     value = written.value
     if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
         return float(value)
-    message = f"'{key}': '{written.text}' is not a number, and its evaluator's manifest does not tell the check's unit"
+    message = (
+        f"'{key}': '{written.text}' is not a number, and its evaluator's manifest does not declare the check's unit"
+    )
     hint = "write a bare number, or add 'checks' to the manifest"
     raise _WrongGoal(Diagnostic(written.span, "wrong-unit", message, hint))

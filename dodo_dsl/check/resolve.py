@@ -74,7 +74,7 @@ def _of_application(wiring: Wiring) -> Iterator[Port]:
 
 
 def may_send(service: ResolvedService, port: Port, ids: frozenset[tuple[str, int]]) -> bool:
-    """Whether a service of which the manifest only says that it may send anything can send what a port consumes.
+    """Whether a service of which the manifest only shows that it may send anything can send what a port consumes.
 
     ``ids`` are names and numbers of messages. A recording that is too large or damaged may hold any.
     """
@@ -90,14 +90,14 @@ def may_send(service: ResolvedService, port: Port, ids: frozenset[tuple[str, int
 
 
 def without_pictures(service: ResolvedService) -> Path | None:
-    """The recording that a service plays, if that has no pictures; None where it may have some."""
+    """The recording that a service plays, if that has no pictures; None if it may have some."""
     path = _recording(service)
     image = known_ids(())[IMAGE]
     return None if path is None or holds(path, image, _NO_STAMP) else path
 
 
 def picture_size(service: ResolvedService) -> tuple[int, int]:
-    """Width and height of the pictures that a service makes: as written, or of its recording; 0 where unknown."""
+    """Width and height of the pictures that a service makes: as written, or of its recording; 0 if unknown."""
     path = _recording(service)
     if path is not None:
         sender = service.texts.get("video-sender", "")
@@ -111,7 +111,7 @@ def _recorded_size(path: Path, sender: int) -> tuple[int, int]:
     try:
         return recording_contents.picture_size(path, known_ids(())[IMAGE], sender)
     except OSError:
-        return 0, 0  # told with the file
+        return 0, 0  # reported with the file
 
 
 def _recording(service: ResolvedService) -> Path | None:
@@ -134,7 +134,7 @@ def holds(path: Path, number: int, stamp: int) -> bool:
     try:
         found = recording_contents.look(path, number, stamp)
     except OSError:
-        return True  # told with the file
+        return True  # reported with the file
     return bool(found.senders if stamp == _NO_STAMP else stamp in found.senders) or not found.is_whole
 
 
@@ -160,7 +160,7 @@ def known_messages(own: tuple[Path, ...]) -> Mapping[str, odvd.Definition]:
 class ResolvedTest:
     """One instance with its rig, the services whose manifests are known, and its wiring with the application.
 
-    ``left_out`` are messages that services which play recordings leave out, as they are the application's.
+    ``left_out`` are messages that services which play recordings leave out, because they are the application's.
     """
 
     spec: Spec
@@ -176,7 +176,7 @@ class ResolvedTest:
 
 
 def isolation(spec: Spec, rig: Rig | None) -> str:
-    """The isolation that the spec sets, else its rig's, else a network of its own."""
+    """The isolation that the spec sets, else its rig's, else its own network."""
     return spec.isolation or (rig.isolation if rig else "network")
 
 

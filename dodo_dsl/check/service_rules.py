@@ -1,7 +1,7 @@
 """Rules on the services of a test: their names and layers, parameters, messages and cameras.
 
 ``unknown-service``: ``uses`` names a service with a manifest; ``service-taken``: names in a test are unique.
-``service-reserved``: DoDo adds services of its own to every test.
+``service-reserved``: DoDo adds its own services to every test.
 ``wrong-layer``: a service is in a layer that its manifest lists.
 Parameters fit the manifest: known, complete, of the right type and unit, within bounds, files in place:
 ``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
@@ -47,7 +47,7 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _is_broken(context: RuleContext, name: str) -> bool:
-    """Whether there is a service of the user's own in a folder of this name, whose manifest is reported itself."""
+    """Whether there is the user's own service in a folder of this name, whose manifest is reported itself."""
     read = {manifest.folder for manifest in context.manifests.values()}
     parts = (name, name.replace("-", "_"))
     named = context.deployment.services
@@ -181,7 +181,7 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _lines(context: RuleContext, lines: Collection[PrintedLine]) -> Iterator[Diagnostic]:
-    """What is wrong with lines that become messages; what reads patterns is loaded where there are any."""
+    """What is wrong with lines that become messages; what reads patterns is loaded if there are any."""
     if lines:
         from dodo_dsl.application.printed_lines import line_problems
 

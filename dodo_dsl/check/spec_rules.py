@@ -7,7 +7,7 @@
 ``clock-rate``: in lockstep a test steps from frame to frame, so all rates have to fit the camera's.
 ``clock-answers``: in lockstep a message has to complete the application's answer to a frame.
 ``clock-virtual``: where the application's time is the test's, no answer is slow, and no printed line has a time.
-``rig-pool``: any rig of a pool can run the test: there are some, of one kind, and they can be told apart.
+``rig-pool``: any rig of a pool can run the test: there are some, of one kind, and they can be distinguished.
 ``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
 ``rig-isolation``: hardware is on the host's network.
 ``rig-device``: a test moves the rig that it names and no other, and only the service that moves it opens its port.
@@ -40,7 +40,7 @@ def check_names(context: RuleContext) -> Iterator[Diagnostic]:
     if spec.name in KEYWORDS:
         message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
         yield Diagnostic(spec.span("name"), "name-reserved", message, as_file(spec.location.stem, SUFFIX))
-    elif spec.name != spec.location.stem and is_name(spec.name):  # the schema says what is wrong with any other
+    elif spec.name != spec.location.stem and is_name(spec.name):  # the schema shows what is wrong with any other
         message, stem = f"the name '{spec.name}' differs from the file's name", spec.location.stem
         written = f"write 'name: {stem}', or " if is_free(stem) else ""
         hint = f"{written}rename the file to {spec.name}{SUFFIX}"
@@ -145,7 +145,7 @@ def _kind(word: Scalar, rigs: dict[str, Rig]) -> Iterator[Diagnostic]:
         yield Diagnostic(word.span, "rig-pool", f"'{word.text}' is a rig, expected a kind", hint)
     elif word.text not in KIND_TAGS:
         hint = did_you_mean(word.text.removeprefix("hil-"), KIND_TAGS)
-        yield Diagnostic(word.span, "rig-pool", f"'{word.text}' is no kind of rig", hint)
+        yield Diagnostic(word.span, "rig-pool", f"'{word.text}' is not a kind of rig", hint)
     elif all(rig.kind != word.text for rig in rigs.values()):
         said = ", ".join(f"'{rig.name}' ({rig.kind})" for rig in rigs.values())
         message = f"dodo.yml has no rig of kind '{word.text}'"
@@ -153,7 +153,7 @@ def _kind(word: Scalar, rigs: dict[str, Rig]) -> Iterator[Diagnostic]:
 
 
 def _same_device(one: Rig, other: Rig) -> str:
-    """What tells rigs apart, where both have the same: the port, or the camera of rigs without one."""
+    """What distinguishes rigs, where both have the same: the port, or the camera of rigs without one."""
     own = one.text(PORT) or one.text(CAMERA_SOURCE)
     return own if own == (other.text(PORT) or other.text(CAMERA_SOURCE)) else ""
 
@@ -174,7 +174,7 @@ def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:
         hint = did_you_mean(spec.rig, [*EMULATED_RIGS, *context.deployment.rigs])
         yield Diagnostic(spec.span("rig"), "unknown-rig", f"unknown rig '{spec.rig}'", hint)
     elif not rig.is_emulated and spec.isolation == "network":
-        message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have a network of its own"
+        message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have its own network"
         hint = "remove 'isolation'" if "isolation" in spec.spans else "run it without --isolation"
         yield Diagnostic(spec.span("isolation"), "rig-isolation", message, hint)
 
@@ -192,7 +192,7 @@ def check_built_in_cid(context: RuleContext) -> Iterator[Diagnostic]:
         message = (
             f"the application has the CID {cid} built in, which real cars use, and the test is on the host's network"
         )
-        hint = "give the test a network of its own, or let the program take the CID from a flag: --cid=111"
+        hint = "give the test its own network, or let the program take the CID from a flag: --cid=111"
         yield Diagnostic(declared.span, "application-cid", message, hint)
 
 

@@ -64,7 +64,7 @@ def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
     name = context.spec.name or context.spec.location.stem
     for end in told(context.wiring):
         message = f"the application's '{end.service}' takes {end.port}, which only a simulation has: '{name}' hides it"
-        hint = "take it out of x-dodo.in, or write 'pose: declared' in a test of your own"
+        hint = "take it out of x-dodo.in, or write 'pose: declared' in your own test"
         yield Diagnostic(end.span, "true-pose", message, hint)
 
 
@@ -266,7 +266,7 @@ def readers(application: ApplicationSource, names: Collection[str]) -> list[str]
 
 
 def _offer(context: RuleContext, name: str) -> str:
-    """The line of the test with which one of its services makes a memory of this name; empty where none can."""
+    """The line of the test with which one of its services makes a memory of this name; empty if none can."""
     key = f"name.{name.rpartition('.')[2]}"
     able = [each.use.name for each in context.services if f"{{{key}}}" in each.manifest.memory.outputs]
     return f"write '{key}: {name}' under 'with' of '{able[0]}'" if able else ""

@@ -171,7 +171,7 @@ EXAMPLES = """examples:
   dodo compile tests/my-test -o out        one folder of tests
   dodo compile --check                     problems of all tests; writes nothing
   dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
-  dodo compile --check --format gitlab     the same as a code quality report; sarif and junit are others
+  dodo compile --check --format gitlab     the same as a code quality report; others: sarif, junit
   dodo compile --forecast 4 --times dodo-report    how long the pipeline takes with four runners
   dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
   dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
@@ -199,17 +199,19 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="output folder (default: generated)")  # fmt: skip
     parser.add_argument("--check", action="store_true", help="write nothing; show problems and what is stale in DIR")
     parser.add_argument("--diff", action="store_true", help="with --check: show every difference")
-    display.add_verbosity(parser, "print only problems, and what is stale", "print the name of each test, too")
+    display.add_verbosity(parser, "print only problems, and what is stale", "also print the name of each test")
     parser.add_argument("--fix", action="store_true",
-                        help="with --check: correct names, units and spaces where there is one way to")  # fmt: skip
+                        help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
     parser.add_argument("--format", choices=FORMATS, default="text",
                         help="format of the diagnostics (default: text); with gitlab, sarif and junit the text goes to "
                         "standard error")  # fmt: skip
-    parser.add_argument("--forecast", type=positive, metavar="R", help="say how long the pipeline takes with R runners")
+    parser.add_argument(
+        "--forecast", type=positive, metavar="R", help="show the duration of the pipeline with R runners"
+    )
     parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
                         help="results or report with times; repeatable (default: the history here)")  # fmt: skip
     parser.add_argument("--overhead", type=patience, default=_OVERHEAD_S, metavar="S",
-                        help="seconds that a runner needs to begin a job (default: %(default)g)")  # fmt: skip
+                        help="seconds that a runner needs to start a job (default: %(default)g)")  # fmt: skip
     parser.add_argument("--search", action="append", default=[], metavar="TEST",
                         help="add jobs that together search TEST; repeatable")  # fmt: skip
     parser.add_argument("--workers", type=positive, metavar="N",

@@ -1,4 +1,4 @@
-"""dodo completion: print what lets a shell complete commands, options, tests, services and rigs.
+"""dodo completion: print a script that lets a shell complete commands, options, tests, services and rigs.
 
 A shell asks how a command line may go on as argcomplete's scripts ask: with ``_ARGCOMPLETE``.
 """
@@ -23,7 +23,7 @@ EXAMPLES = """examples:
   dodo completion zsh >> ~/.zshrc
   dodo completion fish > ~/.config/fish/completions/dodo.fish
 
-A new shell completes 'dodo' then, by the program of this name on its PATH. In the shell that is open, bash for example:
+A new shell then completes 'dodo', with the program of this name on its PATH. In an open shell, for example bash:
 eval "$(dodo completion bash)".
 """
 
@@ -31,7 +31,7 @@ SHELLS = ("bash", "zsh", "fish")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("shell", choices=SHELLS, help="the shell that is to complete")
+    parser.add_argument("shell", choices=SHELLS, help="the shell")
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:

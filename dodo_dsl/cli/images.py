@@ -1,4 +1,4 @@
-"""dodo images: build, push and pull images, and say what they are made of.
+"""dodo images: build, push and pull images, and list what they are made of.
 
 A deployment's own services have images, too.
 """
@@ -77,7 +77,7 @@ def say_built(images: Sequence[Image], stdout: TextIO) -> None:
 EXAMPLES = """examples:
   dodo images build                                   all images, named as in dodo.yml
   dodo images build collision virtual-camera          two images
-  dodo images build smoothness                        that of an own service, from the Dockerfile beside its manifest
+  dodo images build smoothness                        that of your own service, from the Dockerfile next to its manifest
   dodo images build dodo                              DoDo itself with all that it runs, for jobs of a pipeline
   dodo images build --offline-wheels                  if a build cannot reach the package index
   dodo images build --platform linux/arm64            for a Raspberry Pi, on another machine with QEMU

@@ -3,21 +3,24 @@
 import argparse
 import os
 import shlex
+from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import package_data
-from dodo_dsl.cli import selection
+from dodo_dsl.cli import display, selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
 from dodo_dsl.spec.manifest import Manifest, Parameter, in_words
-from dodo_dsl.spec.model import LEVEL_WORDS
-from dodo_dsl.terminal import json_text, printable
+from dodo_dsl.spec.model import LEVEL_WORDS, Spec
+from dodo_dsl.terminal import clipped, json_text, printable, width_of
 
 EXAMPLES = """examples:
   dodo list                 the tests of the deployment
   dodo list 'sil-*' 'sil-perception[light=1]'    some of them
+  dodo list -v              each instance of a matrix, and whole descriptions
   dodo list --services      the services that a test may use
   dodo list --services integrator    one service: parameters, messages
   dodo list --json          the same as JSON
@@ -32,6 +35,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--services", nargs="?", const="", metavar="NAME", help="list services instead of tests, or describe one"
     )
     parser.add_argument("--json", action="store_true", help="output as JSON")
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="list each instance of a matrix, and whole descriptions"
+    )
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -41,15 +47,14 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.services:
         return _explain(everything, options.services, stdout)
     of_services = options.services is not None
-    rows = _services(everything) if of_services else _tests(everything)
+    width = None if options.verbose else width_of(stdout)
     if options.json:
-        stdout.write(json_text(rows))
+        stdout.write(json_text(_services(everything) if of_services else _tests(everything)))
+    elif of_services:
+        services = [(row["name"], row["layers"], row["description"]) for row in _services(everything)]
+        _table(services, _widths(services), stdout, width)
     else:
-        columns = ("name", "layers", "description") if of_services else ("name", "level", "kind", "description")
-        _table(rows, columns, stdout)
-        if not of_services and not options.test:
-            levels = {spec.level for spec in everything.specs}
-            stderr.writelines(f"{level}: {words}\n" for level, words in LEVEL_WORDS.items() if level in levels)
+        _write_levels(everything.specs, options.verbose, stdout, width)
     checked = everything if options.test else without_unsatisfied(everything)
     stderr.write(selection.left_out(checked))
     if checked.ok:
@@ -137,9 +142,43 @@ def _bounds(parameter: Parameter) -> str:
     return f"at least {low:.10g}" if low is not None else f"at most {high:.10g}" if high is not None else ""
 
 
-def _table(rows: list[dict[str, str]], columns: tuple[str, ...], stdout: TextIO) -> None:
-    """Columns padded to their widest cell, except the last, so that it can be piped on."""
-    widths = [max((len(row[c]) for row in rows), default=0) for c in columns[:-1]]
+def _write_levels(specs: Sequence[Spec], unfolded: bool, stdout: TextIO, width: int | None) -> None:
+    """A table for each level, with the same columns; a matrix is one row unless ``unfolded``."""
+    of_levels: dict[str, list[Spec]] = defaultdict(list)
+    for spec in specs:
+        of_levels[spec.level if spec.level in LEVEL_WORDS else ""].append(spec)
+    tables = {level: _rows(of_levels[level], unfolded) for level in (*LEVEL_WORDS, "") if level in of_levels}
+    widths = _widths([row for rows in tables.values() for row in rows])
+    for number, (level, rows) in enumerate(tables.items()):
+        heading = f"{level}: {LEVEL_WORDS[level]}" if level else "no valid level"
+        display.write_coloured(stdout, [("\n" * bool(number), ""), (heading, "place"), ("\n", "")])
+        _table(rows, widths, stdout, width, "  ")
+
+
+def _rows(specs: Sequence[Spec], unfolded: bool) -> list[tuple[str, ...]]:
+    tests: dict[Path, list[Spec]] = defaultdict(list)
+    for spec in specs:
+        tests[spec.path].append(spec)
+    rows = []
+    for spec, *others in tests.values():
+        if others and not unfolded:
+            dimensions = ", ".join(name for name, _ in (*spec.choice.values, *spec.choice.shown))
+            about = f"{1 + len(others)} instances ({dimensions}): {spec.description or ''}"
+            rows.append((spec.title.removesuffix(spec.choice.label), spec.kind or "?", about))
+        else:
+            rows += [(one.title, one.kind or "?", one.description or "") for one in (spec, *others)]
+    return rows
+
+
+def _widths(rows: Sequence[tuple[str, ...]]) -> list[int]:
+    """Those of the widest cells of each column but the last."""
+    return [max(map(len, column)) for column in list(zip(*rows, strict=True))[:-1]]
+
+
+def _table(
+    rows: Sequence[tuple[str, ...]], widths: Sequence[int], stdout: TextIO, width: int | None, indent: str = ""
+) -> None:
+    """A line for each row, cut to ``width`` columns."""
     for row in rows:
-        cells = [row[c].ljust(w) for c, w in zip(columns, widths, strict=False)]
-        stdout.write(printable("  ".join([*cells, row[columns[-1]]])) + "\n")
+        cells = [cell.ljust(size) for cell, size in zip(row, widths, strict=False)]
+        stdout.write(clipped(printable(indent + "  ".join([*cells, row[-1]])).rstrip(), width) + "\n")

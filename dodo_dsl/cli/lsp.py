@@ -9,7 +9,7 @@ from typing import TextIO
 from dodo_dsl.cli.errors import Exit, UsageError, require_extra
 
 EXAMPLES = """examples:
-  dodo lsp                  what an editor starts; it speaks the language server protocol on standard input and output
+  dodo lsp                  started by an editor; it speaks the language server protocol on standard input and output
 
 docs/how-to/editors.md has the settings for VS Code, Neovim and PyCharm.
 """
@@ -17,7 +17,9 @@ docs/how-to/editors.md has the settings for VS Code, Neovim and PyCharm.
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--stdio", action="store_true", help="what some editors add; it is how the server always speaks"
+        "--stdio",
+        action="store_true",
+        help="accepted for editors that add it; the server always does this",
     )
 
 

@@ -28,7 +28,7 @@ COMMANDS = {
     "compile": Subcommand("compile", "check tests and write their compose files and child pipeline"),
     "run": Subcommand("run", "run tests and judge the application"),
     "search": Subcommand("search", "look for the conditions under which the application fails a test"),
-    "tune": Subcommand("tune", "find values of the application's parameters with which it passes by more"),
+    "tune": Subcommand("tune", "find values of the application's parameters that increase the test margin"),
     "list": Subcommand("list", "list the tests and services"),
     "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
     "new": Subcommand("new", "write a new test, or what a repository with tests needs"),
@@ -39,10 +39,10 @@ COMMANDS = {
     "rec": Subcommand("rec", "inspect, cut and export recordings"),
     "lsp": Subcommand("lsp", "check and complete tests in an editor while they are written"),
     "completion": Subcommand(
-        "completion", "print what lets a shell complete commands, options, tests, services and rigs"
+        "completion", "print a script that lets a shell complete commands, options, tests, services and rigs"
     ),
-    "images": Subcommand("images", "build, push and pull images, and say what they are made of"),
-    "rig": Subcommand("rig", "operate a rig manually: its status, motion, calibration, quarantine and camera"),
+    "images": Subcommand("images", "build, push and pull images, and list what they are made of"),
+    "rig": Subcommand("rig", "operate a rig manually: status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }
 

@@ -223,11 +223,11 @@ def _lack(file: New) -> str:
 
 
 EXAMPLES = """examples:
-  dodo new                                             asks, or lists what a test may begin with
+  dodo new                                             asks, or lists what a test can start from
   dodo new sil-my-curve                                a closed-loop simulation that compiles
   dodo new hil-my-curve --level hil                    the same on a rig, at first the emulated one
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
-  dodo new dil-mine --level dil --rec drive.rec        a recording of one's own, and its signal as the target
+  dodo new dil-mine --level dil --rec drive.rec        your own recording, and its signal as the target
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --application --language cpp                the same in C++, on libcluon
@@ -260,9 +260,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--level", choices=LEVELS, help="level of the new test: software, data or hardware in the loop (default: sil)"
     )
     parser.add_argument("--kind", choices=KINDS, help="kind of the new test (default: closed-loop)")
-    parser.add_argument("--extends", metavar="TEST", help="test that the new one changes; a shipped one is copied")
+    parser.add_argument("--extends", metavar="TEST", help="test that the new one extends; a shipped one is copied")
     parser.add_argument(
-        "--rec", metavar="FILE.rec", type=Path, help="recording that a new dil test plays, and takes its target from"
+        "--rec",
+        metavar="FILE.rec",
+        type=Path,
+        help="recording that a new dil test plays, with its target",
     )
 
 

@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--before-script", default="", metavar="COMMANDS",
                         help="first commands of all jobs but those on rigs (default: none)")  # fmt: skip
     parser.add_argument("--artifacts-access", choices=_ACCESS, default="all",
-                        help="who may download what jobs keep (default: all)")  # fmt: skip
+                        help="who may download the artifacts of jobs (default: all)")  # fmt: skip
     parser.add_argument("--run-options", default="", metavar="OPTIONS",
                         help="dodo run options of every test; the variable DODO_RUN_OPTIONS replaces them")  # fmt: skip
     parser.add_argument("--jobs", type=positive, metavar="N",
@@ -45,7 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="lines DODO_IMAGE_<SERVICE>=IMAGE of the application's images that were built: tests run "
                         "in containers of them")  # fmt: skip
     parser.add_argument("--files", choices=(ARTIFACT, REPOSITORY), default=ARTIFACT,
-                        help="where jobs have files of 1 MB and more from: the artifact of this command's output, or "
+                        help="source of files of 1 MB and more in jobs: the artifact of this command's output, or "
                         "the repository, Git LFS included, which they check out (default: artifact)")  # fmt: skip
     parser.add_argument("--artifact-limit", type=positive, default=ARTIFACT_MB, metavar="MB",
                         help="warn when the files of all tests are larger (default: %(default)d, as GitLab's "

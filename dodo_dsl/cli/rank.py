@@ -257,7 +257,7 @@ EXAMPLES = """examples:
   dodo rank */results.json --format markdown
   dodo rank */results.json --format html > ranking.html
 
-Goals stand under 'goals' in a test and never change a verdict; results.json has them. A passed run scores the weighted
+Goals are under 'goals' in a test and never change a verdict; results.json has them. A passed run scores the weighted
 mean of its goals from 0 to 1 (1 without goals), a failed one 0. A team's score is the mean over all tests that any team
 ran, of each the mean over its runs. Teams are ordered by the share of runs that failed, then by score. A test
 without an answer, because it is missing or ended in error each time, counts as failed. Intervals are by Student's t

@@ -34,9 +34,9 @@ _EXPORT = """examples:
 """
 _FORMATS = {
     "csv": "write one table per message and sender stamp",
-    "coco": "write pictures with the boxes of the detections",
-    "steering": "write pictures with the steering and the pedal that answered them, for programs that learn to drive",
-    "frames": "write the camera's frames as pictures, named by sender stamp and sample time",
+    "coco": "write frames with the boxes of the detections",
+    "steering": "write frames with the steering and the pedal that answered them, for programs that learn to drive",
+    "frames": "write the camera's frames as images, named by sender stamp and sample time",
     "video": "write the camera's packets into an MP4, h264 as recorded and other formats encoded again",
     "mcap": "write an MCAP file for Foxglove, Lichtblick or rerun (needs DoDo's extra 'mcap')",
 }

@@ -1,4 +1,4 @@
-"""dodo rig: operate a rig manually: its status, motion, calibration, quarantine and camera."""
+"""dodo rig: operate a rig manually: status, motion, calibration, quarantine and camera."""
 
 import argparse
 import math

@@ -7,7 +7,7 @@ from dodo_dsl import atomic
 from dodo_dsl.atomic import refuse_existing
 from dodo_dsl.cli.errors import UsageError
 
-SUMMARY = "write the board by which a camera is measured, to be printed"
+SUMMARY = "write the board for measuring a camera, to be printed"
 EXAMPLES = """examples:
   dodo rig board -o board.svg           A4, in true size; print it without scaling
 """

@@ -114,18 +114,18 @@ def asker(stderr: TextIO) -> Callable[[str], str]:
 
 SUMMARY = "measure the constants of its axes, or its camera, and write them into dodo.yml"
 EXAMPLES = """examples:
-  dodo rig measure kiwi-dynamic         it moves to 5 places of each axis, and asks where it truly is
+  dodo rig measure kiwi-dynamic         it moves to 5 positions of each axis, and asks for the true ones
   dodo rig measure kiwi-dynamic --axes yaw --places 9
   dodo rig measure kiwi-dynamic --readings desk.yml --dry-run
                                         compute from readings of a file; nothing moves
   dodo rig measure kiwi-dynamic --reading x:614.1:-715mm --reading x:1842.5:-345mm \\
       --reading x:3071:25mm --reading x:4299.3:395mm
   dodo rig measure kiwi-dynamic --camera
-                                        its camera's optics, by the board of `dodo rig board`
+                                        its camera's optics, with the board of `dodo rig board`
   dodo rig measure kiwi-dynamic --pictures snapshots
-                                        the same from pictures that were taken before
+                                        the same from existing images
 
-A file of readings has the counters' steps, as `dodo rig goto --json` says them, and the place that was read:
+A file of readings has the counters' steps, as `dodo rig goto --json` prints them, and the position that was read:
   x: [{steps: 614.1 steps, reads: -715 mm}, {steps: 1842.5 steps, reads: -345 mm}, ...]
 
 A residual may be 1 mm, or 0.5 degrees of the yaw; otherwise nothing is written, and the exit code is 1.
@@ -140,12 +140,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--axes", metavar="A,B", default="", help="axes to measure (default: x,y,yaw, or those of the readings)"
     )
-    parser.add_argument("--places", type=positive, default=5, metavar="N", help="places of each axis (default: 5)")
+    parser.add_argument("--places", type=positive, default=5, metavar="N", help="positions of each axis (default: 5)")
     parser.add_argument("--reading", action="append", default=[], metavar="AXIS:STEPS:PLACE",
                         help="a reading instead of motion, such as x:614.1:-715mm; repeatable")  # fmt: skip
     parser.add_argument("--readings", type=Path, metavar="FILE", help="file of readings instead of motion")
-    parser.add_argument("--camera", action="store_true", help="measure its camera instead, by pictures of the board")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="pictures of the board instead of its camera's")
+    parser.add_argument("--camera", action="store_true", help="measure its camera instead, with images of the board")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="images of the board instead of its camera's")
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
     wait = "maximum wait for a busy rig, in s (default: 60)"
     parser.add_argument("--wait", type=patience, default=60.0, metavar="S", help=wait)

@@ -106,7 +106,7 @@ EXAMPLES = """examples:
   dodo run --application ../app/docker-compose.yml --level sil
   dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
   dodo run sil-closed-straight --samples 16    at 16 values of its ranges, the same ones for each --seed
-  dodo run sil-closed-straight --watch         again whenever spec, map or application are saved
+  dodo run sil-closed-straight --watch         again whenever spec, map or application is saved
   dodo run -q                                  only what did not pass, and the counts
   dodo run --compiled generated/sil-closed-straight --report dodo-report
 
@@ -132,13 +132,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
     )
-    parser.add_argument("--clock", choices=("realtime", "lockstep", "virtual"), help="replaces the specs' clock")
+    parser.add_argument("--clock", choices=("realtime", "lockstep", "virtual"), help="override the specs' clock")
     parser.add_argument("--wall-timeout", type=seconds, metavar="S", help="maximum wall time of a test in lockstep")
-    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the specs' isolation")
+    parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
     parser.add_argument(
         "--report", type=Path, default=REPORT, metavar="DIR", help="folder of the report (default: dodo-report)"
     )
-    parser.add_argument("--seed", type=seed, metavar="N", help="replaces the specs' seed")
+    parser.add_argument("--seed", type=seed, metavar="N", help="override the specs' seed")
     parser.add_argument("--repeat", type=positive, default=1, metavar="N", help="run every test N times")
     parser.add_argument("--samples", type=positive, metavar="N",
                         help="run each test with 'vary' at N values of its ranges")  # fmt: skip
@@ -147,9 +147,9 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="rerun a test that ended in error, up to N times (default without N: 1)")  # fmt: skip
     parser.add_argument("--compiled", type=Path, action="append", default=[], metavar="DIR/SLUG",
                         help="folder of a compiled test; repeatable")  # fmt: skip
-    parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to look inside")
+    parser.add_argument("--keep", action="store_true", help="leave everything running, and show how to inspect it")
     parser.add_argument("--watch", action="store_true",
-                        help="run again, in lockstep, what a saved file affects, and show the change")  # fmt: skip
+                        help="repeat, in lockstep, what a saved file affects, and show what changed")  # fmt: skip
     display.add_verbosity(
         parser,
         "print only what did not pass, and a last line with the counts",

@@ -33,7 +33,7 @@ EXAMPLES = """examples:
   dodo search sil-my-drive --sweep         only measure how often it fails
   dodo search sil-my-drive --storage postgresql://dodo@server/dodo    together with other machines
 
-The same command again goes on where an earlier one was interrupted, or with more drives.
+The same command continues where an earlier one was interrupted, or adds drives.
 
 exit codes: 0 no drive failed, 1 some failed, 2 wrong usage or spec, 3 none could be judged, 130 interrupted
 """
@@ -51,24 +51,24 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--runs", type=positive, metavar="N", help=f"drives (default: {_RUNS}, unless --minutes is given)"
     )
     parser.add_argument(
-        "--sweep", action="store_true", help="no drives near the worst ones: all tell how often it fails"
+        "--sweep", action="store_true", help="no drives near the worst ones: all measure how often it fails"
     )
     parser.add_argument(
         "--minutes",
         type=minutes,
         metavar="M",
-        help="look for failures no longer than that; to shrink them takes further drives",
+        help="stop looking for failures after that time; reducing them takes further drives",
     )
-    parser.add_argument("--until-failure", action="store_true", help="end soon after the first failure, and shrink it")
-    parser.add_argument("--save", action="store_true", help="put a test of each failure beside TEST, to be kept")
+    parser.add_argument("--until-failure", action="store_true", help="end soon after the first failure, and reduce it")
+    parser.add_argument("--save", action="store_true", help="save a test of each failure next to TEST")
     parser.add_argument("--seed", type=seed, default=0, metavar="S", help="seed of the search (default: 0)")
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
     )
-    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the spec's isolation")
+    parser.add_argument("--isolation", choices=("network", "host"), help="override the spec's isolation")
     parser.add_argument(
         "--report", type=Path, default=REPORT, metavar="DIR",
-        help="the search is kept in DIR/search/TEST (default: dodo-report)"
+        help="store the search in DIR/search/TEST (default: dodo-report)"
     )  # fmt: skip
     parser.add_argument(
         "--storage", metavar="URL",
@@ -76,7 +76,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--study", metavar="NAME", help=f"with --storage: which search of TEST (default: {MAIN})")
     parser.add_argument(
-        "--finish", action="store_true", help="look for nothing more: shrink the failures found, and write the result"
+        "--finish", action="store_true", help="do not search further: reduce the failures found, and write the result"
     )
     selection.add_application(parser)
 

@@ -152,10 +152,10 @@ class SearchProgress:
         self.count(drive)
 
     def begin_shrinking(self, failures: int, most: int) -> None:
-        """From now on, ``most`` drives at most shrink failures."""
+        """From now on, ``most`` drives at most reduce failures."""
         self._done, self._total, self._deadline, self._shrinks = 0, most, None, True
         time = f", {about(self._left())}" if self._driven else ""
-        self.note(f"shrinking {count(failures, 'failure')}: up to {most} drives{time}; --sweep leaves it out")
+        self.note(f"reducing {count(failures, 'failure')}: up to {most} drives{time}; --sweep leaves it out")
 
     def expect(self, most: int) -> None:
         """``most`` further drives at most are left."""
@@ -165,7 +165,7 @@ class SearchProgress:
         of = "" if not self._total else f" of up to {self._total}" if self._shrinks else f" of {self._total}"
         left = f", {about(self._left())} to go" if self._total or self._deadline else ""
         if self._shrinks:
-            line = f"{self._done}{of} drives of shrinking{left.replace('about', 'up to')}"
+            line = f"{self._done}{of} drives of the reduction{left.replace('about', 'up to')}"
         else:
             worst = "" if self._worst is None else f", worst margin {self._worst:.3f}"
             line = f"{self._done}{of} drives, {count(self._failed, 'failure')}{worst}{left}"

@@ -103,8 +103,8 @@ EXAMPLES = """examples:
   dodo stats reuse --json   the same as JSON
 
 Services are those that tests name under 'uses', each counted once; instances of a matrix are one test. M = a T^b is
-fitted by least squares to ln M over ln T, with 95 % intervals by Student's t. The order of tests decides the curve, so
-it is fitted as they are listed, and to its mean over all orders. Points of one growing set depend on each other: the
+fitted by least squares to ln M over ln T, with 95 % intervals by Student's t. The curve depends on the order of tests,
+so it is fitted as they are listed, and to its mean over all orders. Points of one growing set depend on each other: the
 true intervals are wider.
 """
 

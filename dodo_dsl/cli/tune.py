@@ -1,4 +1,4 @@
-"""dodo tune: find values of the application's parameters with which it passes by more."""
+"""dodo tune: find values of the application's parameters that increase the test margin."""
 
 import argparse
 import math
@@ -25,7 +25,7 @@ EXAMPLES = """examples:
   dodo tune sil-my-drive --samples 8            also at 8 samples of the test's ranges, 'vary'
   dodo tune hil-my-drive --minutes 20 --metres 50    on its rig, which drives 50 m at most
 
-The same command again goes on where an earlier one was interrupted, or with more runs.
+The same command continues where an earlier one was interrupted, or adds runs.
 
 exit codes: 0 the best values pass, 1 they fail, 2 wrong usage or spec, 3 not even the defaults were driven, or a rig
 failed, 130 interrupted
@@ -49,9 +49,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--metres", type=positive, metavar="M",
-        help=f"a rig drives no longer way than that, with 2.4 m for each way to its start (default: {_RIG_METRES:g})",
+        help=f"longest distance that a rig drives, counting 2.4 m to each start (default: {_RIG_METRES:g})",
     )  # fmt: skip
-    parser.add_argument("--mean", action="store_true", help="the mean margin counts, not the worst one")
+    parser.add_argument("--mean", action="store_true", help="optimise the mean margin, not the worst one")
     parser.add_argument(
         "--samples", type=positive, default=0, metavar="N",
         help="drive each test at N samples of its ranges, too; N others decide among the best, N more judge the result",
@@ -60,10 +60,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent drives (default: as many as the cores allow)"
     )
-    parser.add_argument("--isolation", choices=("network", "host"), help="replaces the specs' isolation")
+    parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
     parser.add_argument(
         "--report", type=Path, default=REPORT, metavar="DIR",
-        help="the result is kept in DIR/tune (default: dodo-report)",
+        help="store the result in DIR/tune (default: dodo-report)",
     )  # fmt: skip
     selection.add_application(parser)
 

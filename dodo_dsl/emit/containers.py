@@ -25,9 +25,44 @@ FILES_MOUNT: Mapping[str, Any] = {
 _TRIES_A_SECOND = 2
 
 
+READY_TRIES = math.ceil(_TRIES_A_SECOND * READY_S)
+
+Defaults = Mapping[str, Mapping[str, str]]
+"""The values that flags of a service have without being given: by the service's manifest, then by the flag."""
+
+_NOTES = {
+    "DODO_CLOCK": "Time is the test's own, in steps of dodo-clock, and not the machine's.",
+    "DODO_READERS": "So many programs of the application have to wait for a frame before it comes.",
+    "DODO_SENDERS": "Who alone may send a message, as message=services.",
+    "DODO_WORLD": "The services that get what the application must not hear.",
+    "DODO_TOLD": "What the application gets of that, as it declares in x-dodo.",
+    "DODO_TRUTH": "What only evaluators get.",
+    RUNNER_VARIABLE: "dodo run sets it, and begins the test. When it is empty, the test begins by itself.",
+}
+"""What a reader of a compose file would ask about a variable."""
+_LONG = 100
+
+
+@dataclass(frozen=True)
+class Variable:
+    """An environment variable of a container; a long list of words has a line for each in ``lines``."""
+
+    name: str
+    value: str
+
+    @property
+    def note(self) -> str:
+        return _NOTES.get(self.name, "")
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        words = self.value.split()
+        return tuple(words) if len(self.value) > _LONG and " ".join(words) == self.value else ()
+
+
 @dataclass(frozen=True)
 class Container:
-    """What the layer template needs of a service; ``after`` holds names with compose's condition.
+    """What the layer template needs of a service beyond what its layer has in common.
 
     ``ready_tries`` is how often its ready file is checked, twice a second. ``groups`` are those that may open devices.
     """
@@ -38,33 +73,55 @@ class Container:
     volumes: tuple[str | Mapping[str, Any], ...]
     ready_file: str
     ready_tries: int
-    after: tuple[tuple[str, str], ...]
-    environment: tuple[tuple[str, str], ...]
+    environment: tuple[Variable, ...]
     devices: tuple[str, ...]
     groups: tuple[str, ...]
 
 
-def containers(plan: Plan, layer: str) -> list[Container]:
-    """The containers of a layer, each waiting for the layers before it."""
+@dataclass(frozen=True)
+class Layer:
+    """The containers of a layer, and their common variables, volumes and ``after``: names with compose's condition."""
+
+    services: tuple[Container, ...]
+    environment: tuple[Variable, ...]
+    volumes: tuple[str, ...]
+    after: tuple[tuple[str, str], ...]
+
+
+NO_DEFAULTS: Defaults = {}
+
+
+def containers(plan: Plan, layer: str, defaults: Defaults = NO_DEFAULTS) -> Layer:
+    """A layer, whose containers wait for the layers before it; flags at their ``defaults`` are left out."""
     earlier = LAYERS[: LAYERS.index(layer)]
     after = [(s.name, "service_healthy") for name in earlier for s in plan.layer(name)]
     if plan.isolation == "network":
         after.insert(0, ("sandbox", "service_started"))
-    return [
+    messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
+    shared = {**plan.variables, "DODO_ODVD": messages}
+    found = tuple(
         Container(
             service.name,
             service.image,
-            tuple(_word(flag) for flag in service.flags),
+            tuple(_word(flag) for flag in _written(plan, service, defaults)),
             _volumes(plan, service),
             f"/tmp/dodo-ready-{service.name}",
             math.ceil(_TRIES_A_SECOND * (READY_S + service.setup_s)),
-            tuple(after),
-            _environment(plan, service),
+            _environment(service),
             service.devices,
             ("dialout",) if service.port else ("video",) if service.devices else (),
         )
         for service in plan.layer(layer)
-    ]
+    )
+    return Layer(found, tuple(Variable(*each) for each in shared.items() if each[1]), (_tmp(plan),), tuple(after))
+
+
+def _written(plan: Plan, service: PlannedService, defaults: Defaults) -> list[Flag]:
+    """The flags that the spec or the compiler sets, without those that the service has by itself."""
+    own, place = defaults.get(service.uses, {}), f"{service.layer}.{service.name}"
+    if place not in plan.source_map:
+        return list(service.flags)  # the compiler adds the service
+    return [f for f in service.flags if own.get(f.name) != f.value or f"{place}.{f.name}" in plan.source_map]
 
 
 _COUNT = """\
@@ -115,12 +172,11 @@ def _word(flag: Flag) -> str:
     return f"--{flag.name}={folder}{flag.value}".replace("$", "$$")
 
 
-def _environment(plan: Plan, service: PlannedService) -> tuple[tuple[str, str], ...]:
-    messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
-    own = {"DODO_SERVICE": service.name, "DODO_ODVD": messages, **plan.variables}
+def _environment(service: PlannedService) -> tuple[Variable, ...]:
+    own = {"DODO_SERVICE": service.name}
     if service.name == CLOCK:
-        own[RUNNER_VARIABLE] = f"${{{RUNNER_VARIABLE}:-}}"  # the runner sets it: without one the clock begins by itself
-    return tuple((name, value) for name, value in own.items() if value)
+        own[RUNNER_VARIABLE] = f"${{{RUNNER_VARIABLE}:-}}"
+    return tuple(Variable(*each) for each in own.items())
 
 
 def _shared(plan: Plan, service: PlannedService) -> list[str]:
@@ -135,9 +191,13 @@ def _shared_mount(name: str) -> Mapping[str, Any]:
     return {**FILES_MOUNT, "source": f"../{SHARED}/{name}", "target": f"/{SHARED}/{name}"}
 
 
+def _tmp(plan: Plan) -> str:
+    return "tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"
+
+
 def _volumes(plan: Plan, service: PlannedService) -> tuple[str | Mapping[str, Any], ...]:
     kinds = {flag.kind for flag in service.flags}
-    volumes: list[str | Mapping[str, Any]] = ["tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"]
+    volumes: list[str | Mapping[str, Any]] = [_tmp(plan)]
     if "path" in kinds or plan.messages:
         volumes += [FILES_MOUNT, *(_shared_mount(name) for name in _shared(plan, service))]
     if "report" in kinds:

@@ -36,7 +36,7 @@ def write(compiled: Compiled, pipeline: File, out: Path) -> None:
     _update(out, [pipeline])
     _write_shared(out / SHARED, _shared(compiled))
     for plan in compiled.suite.plans:
-        folder, files, copies = out / plan.slug, render_plan(plan), compiled.copies[plan.slug]
+        folder, files, copies = out / plan.slug, render_plan(plan, compiled.defaults), compiled.copies[plan.slug]
         if folder.exists():
             _update(out, files)
             _write_copies(folder / FILES, copies)
@@ -53,7 +53,7 @@ def _shared(compiled: Compiled) -> dict[str, FileCopy]:
 
 
 def _write_shared(folder: Path, wanted: Mapping[str, FileCopy]) -> None:
-    """Copies of files, or links to those of the repository; the name tells the content."""
+    """Copies of files, or links to those of the repository; the name depends on the content."""
     for name, copy in wanted.items():
         if _is_shared_as(folder / name, copy):
             continue
@@ -210,7 +210,7 @@ def differences(compiled: Compiled, pipeline: File, out: Path) -> dict[str, str]
     """What writing would change below ``out``, a unified diff by test, the pipeline's first; empty when up to date."""
     found = {pipeline.path: _text_difference(pipeline, out)}
     for plan in compiled.suite.plans:
-        texts = (_text_difference(file, out) for file in render_plan(plan))
+        texts = (_text_difference(file, out) for file in render_plan(plan, compiled.defaults))
         copies = _copy_differences(out / plan.slug / FILES, compiled.copies[plan.slug], out)
         found[plan.slug] = "".join([*texts, *copies])
     found[SHARED] = "".join(_shared_differences(out / SHARED, _shared(compiled)))

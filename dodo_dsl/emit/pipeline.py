@@ -111,7 +111,7 @@ def _needs_images(plan: Plan) -> bool:
 
 
 def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) -> PipelineJob:
-    """The job of a test, of whose Plans there are several where any rig of a pool will do."""
+    """The job of a test, of whose Plans there are several if any rig of a pool will do."""
     plan, rig = plans[0], plans[0].rig
     shared = [tag for tag in plan.more_tags if all(tag in other.more_tags for other in plans)]
     real = plan.level == "hil" and rig not in EMULATED_RIGS

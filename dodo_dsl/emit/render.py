@@ -1,8 +1,9 @@
 """Plans through the Jinja templates."""
 
 import functools
+import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -12,7 +13,7 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.application.model import FILES
-from dodo_dsl.emit.containers import containers, copy_command
+from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, containers, copy_command
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, JobOptions
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
@@ -24,6 +25,9 @@ _SERVICE_DEPTH = 2
 _MOST_BLOCKS = 10_000
 _OLD_BREAKS = "\x85\u2028\u2029"
 _BLOCKS: dict[str, str] = {}
+_PLAIN = re.compile(r"(?:[A-Za-z/]|--|\.{1,2}/)(?:[A-Za-z0-9_./=,@+$-]|:(?=[^ ])| (?=[^ ]))*(?<![: ])")
+_WORDS = ("true", "false", "yes", "no", "on", "off", "y", "n", "null")
+"""What YAML 1.1 takes for something else than a string."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,35 @@ def _text(dumper: _Dumper, value: str) -> yaml.ScalarNode:
 _Dumper.add_representer(str, _text)
 
 
+_SHARED = (
+    "ipc", "network_mode", "pids_limit", "mem_limit", "ulimits", "cap_drop", "security_opt", "logging", "depends_on"
+)  # fmt: skip
+"""Keys of services that mostly have one value, as the test sets it."""
+
+
+def _application(compose: dict[str, Any]) -> str:
+    """The application's copy in block style; what several services share stands once."""
+    services: dict[str, dict[str, Any]] = compose.get("services") or {}
+    first, *others = services.values() or [{}]
+    shared = {
+        key: first[key]
+        for key in _SHARED
+        if others and key in first and all(repr(other.get(key)) == repr(first[key]) for other in others)
+    }
+    if not shared:
+        return _yaml_block(compose)
+    parts = [
+        "# What all services share; 'sandbox' in dodo.yml sets the limits.",
+        f"x-shared: &shared\n{textwrap.indent(_yaml_block(shared, _SERVICE_DEPTH), '  ')}\n\nservices:",
+    ]
+    for name, service in services.items():
+        own = _yaml_block({key: value for key, value in service.items() if key not in shared}, _SERVICE_DEPTH)
+        head = _dumped({name: None}).removesuffix(" null")
+        parts.append(textwrap.indent(f"{head}\n  <<: *shared\n{textwrap.indent(own, '  ')}", "  "))
+    rest = {key: value for key, value in compose.items() if key != "services"}
+    return "\n".join([*parts, *([_yaml_block(rest)] if rest else [])])
+
+
 def _yaml_block(value: dict[str, Any], depth: int = 0) -> str:
     """A compose file in block style. Tests of one application share most of it, so deep blocks are cached."""
     parts = []
@@ -80,6 +113,19 @@ def _yaml(value: Any) -> str:
     return json_text(value)
 
 
+def _plain(value: Any) -> str:
+    """A string or a mapping of them on one line, without quotes where every reader of YAML takes it for the same."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {_within(each)}' for key, each in value.items())}}}"
+    is_safe = isinstance(value, str) and _PLAIN.fullmatch(value) and value.lower() not in _WORDS
+    return str(value) if is_safe else json_text(value)
+
+
+def _within(value: Any) -> str:
+    """A value between braces, where commas and colons say something."""
+    return _yaml(value) if isinstance(value, str) and set(value) & set(",:") else _plain(value)
+
+
 @functools.cache
 def _templates() -> jinja2.Environment:
     environment = jinja2.Environment(
@@ -89,7 +135,7 @@ def _templates() -> jinja2.Environment:
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
         keep_trailing_newline=True,
     )
-    environment.filters.update(yaml=_yaml, yaml_block=_yaml_block, dotenv=dotenv_line)
+    environment.filters.update(yaml=_yaml, plain=_plain, application=_application, dotenv=dotenv_line)
     return environment
 
 
@@ -97,8 +143,11 @@ def _render(template: str, **values: object) -> str:
     return _templates().get_template(template).render(**values)
 
 
-def render_plan(plan: Plan) -> list[File]:
-    """The compose layers, ``compose.yaml`` (which ends compose's search), ``.env`` and ``test.json`` of one test."""
+def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
+    """The compose layers, ``compose.yaml`` and ``.env`` that name them, and ``test.json`` of one test.
+
+    Flags at their ``defaults`` are left out of the layers.
+    """
     names = {layer: f"{layer}.compose.yml" for layer in LAYERS}
     own_network = plan.isolation == "network"
     files = [
@@ -108,7 +157,8 @@ def render_plan(plan: Plan) -> list[File]:
                 "layer.compose.yml.j2",
                 plan=plan,
                 layer=layer,
-                services=containers(plan, layer),
+                common=containers(plan, layer, defaults),
+                ready_tries=READY_TRIES,
                 own_network=own_network,
                 sandbox=own_network and layer == LAYERS[0],
                 copies=plan.application.copies if layer == LAYERS[0] else {},
@@ -120,8 +170,10 @@ def render_plan(plan: Plan) -> list[File]:
         if layer != "application"
     ]
     files.append(File(f"{plan.slug}/{names['application']}", _render("application.compose.yml.j2", plan=plan)))
-    files.append(File(f"{plan.slug}/compose.yaml", _render("compose.yaml.j2")))
-    files.append(File(f"{plan.slug}/.env", _render("env.j2", plan=plan, files=list(names.values()))))
+    judges = [service.name for service in plan.services if service.judge]
+    for path, template in (("compose.yaml", "compose.yaml.j2"), (".env", "env.j2")):
+        text = _render(template, plan=plan, files=list(names.values()), judges=judges)
+        files.append(File(f"{plan.slug}/{path}", text))
     files.append(File(f"{plan.slug}/test.json", to_json(plan)))
     return files
 

@@ -68,7 +68,7 @@ class _Open:
 
 
 def cursor(text: str, offset: int) -> Cursor | None:
-    """The cursor at an index of the text; None where nothing can be said of it."""
+    """The cursor at an index of the text; None if nothing can be said of it."""
     head = text[: min(offset, _MAX_TEXT)]
     match = _WORD.search(head)
     word = match[0] if match else ""
@@ -116,7 +116,7 @@ def _read(text: str, word: str, start: int) -> Cursor | None:
 
 
 def _events(text: str) -> Iterator[Any]:
-    """The events of a text up to where it is no YAML."""
+    """The events of a text up to where it is not YAML."""
     try:
         yield from yaml.parse(text, Loader=_LOADER)
     except (yaml.YAMLError, ValueError):

@@ -158,7 +158,7 @@ def find(node: Node, line: int, column: int, steps: Steps = ()) -> DocumentPlace
 
 
 def below(node: Node | None, *steps: str) -> Node | None:
-    """What is below the keys; None where one of them is missing."""
+    """What is below the keys; None if one of them is missing."""
     for step in steps:
         node = node.get(step) if isinstance(node, Mapping) else None
     return node

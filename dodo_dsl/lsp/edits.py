@@ -58,7 +58,7 @@ _LONGEST = 40
 
 
 def prepare(scene: DocumentContext, position: types.Position) -> types.Range | None:
-    """The range of the name at a position; None where nothing can be renamed."""
+    """The range of the name at a position; None if nothing can be renamed."""
     name = _name(scene, position)
     return _within(scene, name.span, name.steps[1]) if name else None
 
@@ -70,7 +70,7 @@ def rename(scene: DocumentContext, position: types.Position, new: str) -> types.
         raise JsonRpcInvalidParams("only services of this file, and names of its matrix and ranges, can be renamed")
     if not _NAME.fullmatch(new) or len(new) > _LONGEST:
         raise JsonRpcInvalidParams(
-            f"'{new}' is no name, expected lower-case letters and digits in words joined by single hyphens"
+            f"'{new}' is not a name, expected lower-case letters and digits in words joined by single hyphens"
         )
     kind, old = str(name.steps[0]), str(name.steps[1])
     beside = below(scene.root, kind)
@@ -103,7 +103,7 @@ def _placeholders(scene: DocumentContext, kind: str, old: str) -> Iterator[types
 
 
 def _within(scene: DocumentContext, span: Span, name: object) -> types.Range | None:
-    """The range of a name in its span, without quotes; None where it is written otherwise."""
+    """The range of a name in its span, without quotes; None if it is written otherwise."""
     start = scene.lines.offset(span.line, span.column)
     found = scene.lines.text.find(str(name), start, start + span.length)
     if found < 0:

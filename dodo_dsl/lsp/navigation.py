@@ -52,7 +52,7 @@ def _spans(scene: DocumentContext, place: DocumentPlace) -> Iterator[Span]:
 
 
 def _begin(path: Path | None) -> Iterator[Span]:
-    """The begin of a file, or of the map in a folder."""
+    """The start of a file, or of the map in a folder."""
     target = path / MAP if path and path.is_dir() else path
     if target and target.is_file():
         yield Span(str(target), length=0)

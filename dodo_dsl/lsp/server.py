@@ -1,4 +1,4 @@
-"""The language server: it listens to the editor, answers it, and says what is wrong a moment after a change."""
+"""The language server: it listens to the editor, answers it, and shows what is wrong a moment after a change."""
 
 import asyncio
 import contextlib
@@ -217,7 +217,7 @@ def _requests(server: DodoServer) -> None:
 
 
 def _answer(server: DodoServer, params: Any, work: Callable[[DocumentContext], _Answer]) -> _Answer | None:
-    """The answer to a request about a document; None where it fails, which the log then says."""
+    """The answer to a request about a document; None if it fails, which the log then says."""
     try:
         scene = server.scene(params.text_document.uri)
         return work(scene) if scene else None
@@ -230,7 +230,7 @@ def _answer(server: DodoServer, params: Any, work: Callable[[DocumentContext], _
 
 
 def _watch(server: DodoServer) -> None:
-    """Asks the editor to say when files change on disk, where it can."""
+    """Asks the editor to say when files change on disk, if it can."""
     workspace = server.client_capabilities.workspace
     watching = workspace.did_change_watched_files if workspace else None
     if not watching or not watching.dynamic_registration:

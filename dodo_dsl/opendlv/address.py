@@ -13,10 +13,10 @@ RECEIVE_BUFFER = 26_214_400
 OF_THE_WORLD = ("opendlv.sim.", "dodo.", "cluon.data.")
 """So begin the names of messages that only a simulation has, and those who control it: no bus of a car carries them."""
 POSE = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
-"""Those that tell where the vehicle truly is, or how it moves."""
+"""Those that carry where the vehicle truly is, or how it moves."""
 
 LINES = "dodo-lines"
-"""The sender, among a test's services, of what its application prints: the runner, from an address of its own."""
+"""The sender, among a test's services, of what its application prints: the runner, from its own address."""
 
 
 def group(cid: int) -> Address:
@@ -34,7 +34,7 @@ HEADER_BYTES = 5
 
 
 class FrameError(ValueError):
-    """Bytes that are no frame, or an envelope that fits in none."""
+    """Bytes that are not a frame, or an envelope that fits in none."""
 
 
 def body_length(header: bytes) -> int:

@@ -19,7 +19,7 @@ _ADDED = len(_TAG) + _PROOF_BYTES
 
 
 def with_proof(key: bytes, id_: int, payload: bytes) -> bytes:
-    """The payload of a message, its last field filled with its proof; unchanged where there is no key."""
+    """The payload of a message, its last field filled with its proof; unchanged if there is no key."""
     signed = payload.removesuffix(_EMPTY)
     return signed + _TAG + _code(key, id_, signed) if key else payload
 

@@ -32,8 +32,8 @@ MICROSECONDS = 1_000_000
 class Envelope(NamedTuple):
     """A message on its way: ``data_type`` is its id, ``payload`` its encoding.
 
-    ``sent``, ``received`` and ``sample_time`` are microseconds since the epoch; ``sender_stamp`` tells senders of the
-    same message apart.
+    ``sent``, ``received`` and ``sample_time`` are microseconds since the epoch; ``sender_stamp`` distinguishes senders
+    of the same message apart.
     """
 
     data_type: int
@@ -62,7 +62,7 @@ _TYPE: Any = _LAYOUT.type
 
 
 def encode_frame(envelope: Envelope) -> bytes:
-    """The frame of an envelope; raises FrameError where a number or the payload is too large."""
+    """The frame of an envelope; raises FrameError if a number or the payload is too large."""
     body = encode_body(envelope)
     if len(body) > MAX_BODY_BYTES:
         raise FrameError(f"an envelope of {len(body)} bytes is larger than a frame, {MAX_BODY_BYTES} bytes")
@@ -70,7 +70,7 @@ def encode_frame(envelope: Envelope) -> bytes:
 
 
 def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
-    """The envelope of a frame, ``received`` at a time of its own or the one given. Raises FrameError.
+    """The envelope of a frame, ``received`` at its own time or the one given. Raises FrameError.
 
     Bytes after the frame are ignored, as libcluon does.
     """

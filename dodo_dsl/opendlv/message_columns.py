@@ -39,7 +39,7 @@ def fixed_words(data: bytes) -> Words:
 
 
 def read_varints(source: Words, at: Numbers) -> tuple[Numbers, Numbers]:
-    """The numbers at some positions, and their lengths in bytes; 0 where one has no end within 8 bytes."""
+    """The numbers at some positions, and their lengths in bytes; 0 if one has no end within 8 bytes."""
     word = source[at]
     stops = ~word & _STOP_BITS
     last = stops & (~stops + _ONE)
@@ -109,7 +109,7 @@ def usual_rows(layout: Layout, data: bytes, starts: Numbers, ends: Numbers) -> M
 
 
 class _Reader:
-    """Moves over all payloads field by field; ``usual`` tells which of them still look as libcluon writes them."""
+    """Moves over all payloads field by field; ``usual`` shows which of them still look as libcluon writes them."""
 
     def __init__(self, data: bytes, ends: Numbers) -> None:
         self.columns: list[tuple[str, str, Any]] = []

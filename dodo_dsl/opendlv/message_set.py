@@ -147,7 +147,7 @@ class MessageSet:
     def encode(self, message: Message) -> bytes:
         """The payload as libcluon writes it: every field in order, zeros and defaults too.
 
-        Raises MessageError where a number does not fit its type, UnknownMessage for a message of another set.
+        Raises MessageError if a number does not fit its type, UnknownMessage for a message of another set.
         """
         return encode(self.layout(message.DESCRIPTOR.full_name), message)
 

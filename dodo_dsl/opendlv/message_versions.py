@@ -26,7 +26,7 @@ def load(version: str, *own: Path) -> MessageSet:
 
 
 def version_of(recording: Recording) -> str:
-    """The set that more of the telling messages fit in their fields; 1.0 where none tells.
+    """The set that more of the telling messages fit in their fields; 1.0 if none does.
 
     ImageReading does not count: real applications of set 1.0 leave its last field out.
     """

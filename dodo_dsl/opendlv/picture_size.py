@@ -25,7 +25,7 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 
 def problem_of(data: bytes) -> str:
-    """Why a picture file cannot be decoded here, without its name; empty when it can, as far as its header tells."""
+    """Why a picture file cannot be decoded here, without its name; empty when it can, as far as its header shows."""
     size = picture_size(data)
     if size is None:
         return "not a readable picture, expected PNG or JPEG"

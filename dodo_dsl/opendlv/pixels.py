@@ -39,7 +39,7 @@ def format_of(name: str, memory_size: int, width: int, height: int) -> str:
 
 
 def view(data: Any, format_: str, width: int, height: int) -> Picture:
-    """The bytes of a memory as an array, without a copy; raises PixelError where there are too few.
+    """The bytes of a memory as an array, without a copy; raises PixelError if there are too few.
 
     Its shape is (height, width, 4) for argb, (height, width, 3) for bgr and rgb, and (height * 3 / 2, width) for i420;
     bytes behind the picture are left out.
@@ -64,7 +64,7 @@ def to_bgr(picture: Picture, format_: str) -> Picture:
 
 
 def to_i420(picture: Picture, format_: str) -> Picture:
-    """A picture as i420, shaped as ``view`` has it; raises PixelError where width or height are odd."""
+    """A picture as i420, shaped as ``view`` has it; raises PixelError if width or height are odd."""
     if format_ == "i420":
         return picture.copy()
     size("i420", picture.shape[1], picture.shape[0])

@@ -41,7 +41,7 @@ class _Time(ctypes.Structure):
 
 
 class Header:
-    """The first bytes of a shared memory: its size, the mutex, the condition; raises OSError where a call fails."""
+    """The first bytes of a shared memory: its size, the mutex, the condition; raises OSError if a call fails."""
 
     def __init__(self, memory: object) -> None:
         self._bytes = (ctypes.c_ubyte * HEADER_BYTES).from_buffer(memory)  # type: ignore[arg-type]
@@ -83,7 +83,7 @@ class Header:
         return self._taken(_libc.pthread_cond_timedwait(self._condition, self._mutex, until))
 
     def notify_all(self) -> None:
-        """Wake all that wait; raises TimeoutError where that would block as a waiter was killed.
+        """Wake all that wait; raises TimeoutError if that would block as a waiter was killed.
 
         Before 2.41, glibc counts those that were woken before and waits for them to leave; a killed one never does.
         """
@@ -161,7 +161,7 @@ class PosixSegment:
             raise SharedMemoryError(f"shared memory '{path.name}' cannot be made: {path}: {error.strerror}") from None
         try:
             os.fchmod(token, MODE)
-            fcntl.flock(token, fcntl.LOCK_SH | fcntl.LOCK_NB)  # tells other creators that we live
+            fcntl.flock(token, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shows other creators that we live
             os.posix_fallocate(token, 0, HEADER_BYTES + size)  # a full memory is an error now, not a SIGBUS later
             memory = mmap.mmap(token, HEADER_BYTES + size)
             header = Header(memory)
@@ -193,7 +193,7 @@ class PosixSegment:
         return memoryview(self._memory)[HEADER_BYTES : HEADER_BYTES + self.size]
 
     def lock(self, timeout: float) -> Result:
-        """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError where it is broken."""
+        """Take the mutex; TIMEOUT when another holds it for ``timeout`` seconds. Raises OSError if it is broken."""
         return Result.DONE if self._header.lock(timeout) else Result.TIMEOUT
 
     def unlock(self) -> None:
@@ -220,7 +220,7 @@ class PosixSegment:
             self._header.unlock()
 
     def wake(self) -> None:
-        """Wake all that wait; raises TimeoutError where one of them was killed."""
+        """Wake all that wait; raises TimeoutError if one of them was killed."""
         self._header.notify_all()
 
     def readers_waiting(self) -> int:

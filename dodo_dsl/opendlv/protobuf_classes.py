@@ -38,7 +38,7 @@ class Layout:
 
     ``filled`` is the encoding of a message with nothing set, every field written; ``fixed_size`` its length where
     that never varies. ``narrow`` are the integers of less than 32 bits, ``texts`` the strings, ``inner`` the fields
-    that are messages. ``reorder`` says that the fields are not declared in the order of their numbers.
+    that are messages. ``reorder`` means that the fields are not declared in the order of their numbers.
     """
 
     type: type[Message]

@@ -25,7 +25,7 @@ MAX_PLACES = 1000
 
 @dataclass
 class DamagePlace:
-    """Bytes of a file that are no frame: ``size`` of them from byte ``offset``."""
+    """Bytes of a file that are not a frame: ``size`` of them from byte ``offset``."""
 
     offset: int
     size: int

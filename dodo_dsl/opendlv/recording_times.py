@@ -30,14 +30,14 @@ def together(times: Numbers) -> Marks:
 
 
 def within(recording: Recording, rows: Numbers) -> Numbers:
-    """The times of rows in us; those of tools lie at the begin or end of the others where they are outside."""
+    """The times of rows in us; those of tools lie at the start or end of the others where they are outside."""
     times: Numbers = recording.index["time"][rows]
     others = times[~np.isin(recording.index["data_type"][rows], list(TOOLS))]
     return np.clip(times, others.min(), others.max()) if len(others) else times
 
 
 def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:
-    """What is wrong with the times of rows, in a sentence with the first of them; empty where they may be right.
+    """What is wrong with the times of rows, in a sentence with the first of them; empty if they may be right.
 
     ``time`` counts: the sample time, or where that is zero when the message was received, or else sent. With
     ``in_order`` those of a message and sender must not go back, nor a message repeat.
@@ -54,7 +54,7 @@ def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:
 
 
 def repeated(recording: Recording, rows: Numbers) -> str:
-    """Which message is in the file twice, byte for byte, with the same times; empty where none is."""
+    """Which message is in the file twice, byte for byte, with the same times; empty if none is."""
     index = recording.index[rows]
     keys = np.stack([index[name].astype(np.int64) for name in ("data_type", "sender_stamp", "time", "size")])
     order = np.lexsort(keys[::-1])

@@ -14,7 +14,7 @@ class RecordingWriter:
     """A new ``.rec`` file; a context manager. Nothing is held back in the process.
 
     Each call appends whole frames with one write of the kernel; what a full disk cut off is taken back. Raises
-    FileExistsError for a file that is there, OSError where none can be made.
+    FileExistsError for a file that is there, OSError if none can be made.
     """
 
     def __init__(self, path: Path) -> None:
@@ -24,7 +24,7 @@ class RecordingWriter:
         self._file = path.open("xb", buffering=0)
 
     def write(self, envelope: Envelope) -> None:
-        """Appends an envelope unchanged; raises FrameError where it fits in none, OSError when the disk is full."""
+        """Appends an envelope unchanged; raises FrameError if it fits in none, OSError when the disk is full."""
         self.write_frames((encode_frame(envelope),))
 
     def write_frames(self, frames: Iterable[bytes]) -> None:

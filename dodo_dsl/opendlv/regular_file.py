@@ -33,12 +33,12 @@ def opened(path: Path) -> io.FileIO:
 
 
 def kind_of(mode: int) -> str:
-    """What a mode that is no regular file's and no folder's stands for, such as ``a FIFO``."""
+    """What a mode that is not a regular file's and no folder's stands for, such as ``a FIFO``."""
     return next((text for is_kind, text in _KINDS.items() if is_kind(mode)), "no file")
 
 
 def content(path: Path, most: int = MOST_BYTES) -> bytes:
-    """The bytes of a regular file; raises OSError as ``opened`` does, and where there are more than ``most``."""
+    """The bytes of a regular file; raises OSError as ``opened`` does, and if there are more than ``most``."""
     with opened(path) as file:
         data = file.read(most + 1)
         while 0 < len(data) <= most and (more := file.read(most + 1 - len(data))):

@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.address import HEADER_BYTES, Address, FrameError, body_len
 
 
 class Relay:
-    """A sender on the bus; ``address`` is where its datagrams come from. Raises OSError where there is no route."""
+    """A sender on the bus; ``address`` is where its datagrams come from. Raises OSError if there is no route."""
 
     def __init__(self, cid: int) -> None:
         self._bus = group(cid)
@@ -38,7 +38,7 @@ class Relay:
 
 
 def serve(relay: Relay, frames: BinaryIO, stdout: TextIO) -> int:
-    """Sends what comes until its end; 1 for what is no frame, as nothing behind it can be told apart."""
+    """Sends what comes until its end; 1 for what is not a frame, because nothing behind it can be recognised."""
     host, port = relay.address
     print(f"{host} {port}", file=stdout, flush=True)
     while header := frames.read(HEADER_BYTES):

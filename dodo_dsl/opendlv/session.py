@@ -41,7 +41,7 @@ Instruction = tuple[int, int, int, int]
 def attach_filter(
     receiver: socket.socket, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = ()
 ) -> bool:
-    """Passes only messages with these ids, and datagrams that do not begin with an id; False where the kernel cannot.
+    """Passes only messages with these ids, and datagrams that do not begin with an id; False if the kernel cannot.
 
     Messages with ids ``of_others`` pass unless they come from addresses in ``than``. Dropped datagrams count as lost in
     the kernel's counter of the socket.
@@ -105,9 +105,9 @@ class SessionError(OSError):
 class Session:
     """One member of the group 225.0.0.<cid>; a context manager.
 
-    Datagrams of the session itself are dropped, as libcluon does. Bytes of others that are no frame are
+    Datagrams of the session itself are dropped, as libcluon does. Bytes of others that are not a frame are
     counted in ``garbage``, and in ``lost`` the datagrams for which the receive buffer had no room. Raises SessionError
-    for a cid outside 1 to 254 and where there is no route for multicast.
+    for a cid outside 1 to 254 and if there is no route for multicast.
     """
 
     def __init__(self, cid: int, messages: MessageSet | None = None) -> None:

@@ -55,8 +55,8 @@ class SharedMemory:
     def attach(cls, name: str) -> Self:
         """Use the memory that another process made, in the mode in which it made it.
 
-        A token file in /tmp means SysV; where there is none, an object of this name means POSIX. Raises
-        SharedMemoryError where there is neither.
+        A token file in /tmp means SysV; if there is none, an object of this name means POSIX. Raises
+        SharedMemoryError if there is neither.
         """
         token = sysv_memory.path_of(name)
         if not token.exists() and (_wants_posix() or _is_posix(name)):

@@ -251,7 +251,7 @@ class Segment:
     def remove(self) -> None:
         """Wake all that wait and take everything away, the token file where it is still the same one.
 
-        The mutex goes first: who wakes cannot take it, and so does not read the last content once more.
+        The mutex goes first: a woken reader cannot take it, and so does not read the last content once more.
         """
         with suppress(sysv_ipc.Error):
             self.mutex.remove()
@@ -282,7 +282,7 @@ def _made(status: os.stat_result, size: int) -> tuple[sysv_ipc.SharedMemory, sys
 
 
 def _clear(path: Path, status: os.stat_result, existed: bool) -> bool:
-    """Remove what a dead creator left; False where the keys belong to a memory of another name or another user."""
+    """Remove what a dead creator left; False if the keys belong to a memory of another name or another user."""
     try:
         return _remove_leftover(path, status, existed)
     except sysv_ipc.PermissionsError:

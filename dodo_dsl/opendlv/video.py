@@ -50,7 +50,7 @@ class VideoDecoder:
     """Decodes the packets of one camera in their order; raises VideoError for an unknown format.
 
     Decoding begins at the first key frame; packets before it, and such that are damaged, give no frame. Nor do those
-    of pictures with more than MAX_PIXELS, whatever a message says of their size: they are not decoded at all.
+    of pictures with more than MAX_PIXELS, whatever size a message declares: they are not decoded at all.
     """
 
     def __init__(self, format_: str) -> None:
@@ -96,7 +96,7 @@ def has_key_frame(packet: bytes) -> bool:
 
 
 def pyav(purpose: str) -> Any:
-    """PyAV; raises VideoError where it cannot be loaded."""
+    """PyAV; raises VideoError if it cannot be loaded."""
     try:
         import av
     except ImportError as error:

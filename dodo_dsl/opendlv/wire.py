@@ -64,12 +64,12 @@ def read_varint(data: bytes | bytearray | memoryview, position: int) -> tuple[in
 
 
 def first_number(data: bytes, number: int) -> int:
-    """The first number in a field of a message without fixed sizes; 0 where there is none before damage."""
+    """The first number in a field of a message without fixed sizes; 0 if there is none before damage."""
     return _first(data, number << 3 | VARINT)[0]
 
 
 def first_message(data: bytes, number: int) -> bytes:
-    """The first message in a field, likewise; empty where there is none."""
+    """The first message in a field, likewise; empty if there is none."""
     length, start = _first(data, number << 3 | DELIMITED)
     return data[start : start + length]
 

@@ -4,7 +4,7 @@ import functools
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import package_data, source
@@ -31,15 +31,20 @@ from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.values import Value
+from dodo_dsl.spec.values import Value, default_value
 
 
 @dataclass(frozen=True)
 class Compiled:
-    """A suite with the files that each test needs, by slug."""
+    """A suite with the files that each test needs, by slug.
+
+    ``defaults`` are the flags' values that services of DoDo have without being given them, by service and flag: what a
+    manifest of the deployment says need not be what its program does.
+    """
 
     suite: Suite
     copies: Mapping[str, tuple[FileCopy, ...]]
+    defaults: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def build(
@@ -91,7 +96,16 @@ def build(
         *itertools.islice(of_volumes, 1),
         *itertools.chain.from_iterable(b.problems for b in builders),
     ]
-    return Compiled(Suite(tuple(plans), deployment.gates), files), problems
+    return Compiled(Suite(tuple(plans), deployment.gates), files, _defaults(plans, manifests)), problems
+
+
+def _defaults(plans: Sequence[Plan], manifests: Mapping[str, Manifest]) -> dict[str, dict[str, str]]:
+    used = {service.uses for plan in plans for service in plan.services}
+    shipped = [m for name in sorted(used) if (m := manifests[name]).folder.parent == package_data.services()]
+    return {
+        manifest.name: {p.name: value.text for p in manifest.parameters.values() if (value := default_value(p))}
+        for manifest in shipped
+    }
 
 
 def _in_repository(deployment: Deployment, out: Path) -> Callable[[Path], bool]:

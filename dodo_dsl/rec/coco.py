@@ -1,7 +1,7 @@
 """Frames with detections as a labelled data set in the COCO format (pictures, and one ``annotations.json``).
 
 A detection is a DetectionBoundingBox; its class is the DetectionProperty (without ``color:``) or else the DetectionType
-of the same sender, sample time and detection. It belongs to the frame of the same sample time. Where nothing moves, the
+of the same sender, sample time and detection. It belongs to the frame of the same sample time. If nothing moves, the
 labels of all frames may be those of a truth file.
 Reference: cocodataset.org, "Data format", object detection.
 """
@@ -123,7 +123,7 @@ class CocoExport:
     result: DataSet = field(default_factory=DataSet)
 
     def add(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]], name: str = "") -> None:
-        """Writes the pictures of a recording, which has a ``name`` where there are several; raises OSError."""
+        """Writes the pictures of a recording, which has a ``name`` if there are several; raises OSError."""
         (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
         for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
             wanted = labels.get(packet.sample_time, ())
@@ -143,7 +143,7 @@ class CocoExport:
         (self.folder / ANNOTATIONS).write_text(self.result.text(), encoding="utf-8")
 
     def write(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]]) -> DataSet:
-        """Writes pictures and annotations.json; raises LabelError where not one frame is wanted, and OSError."""
+        """Writes pictures and annotations.json; raises LabelError if not one frame is wanted, and OSError."""
         self.add(recording, images, labels)
         if not self.result.images:
             raise LabelError(f"no frame of {recording.path} could be decoded at the sample time of a detection")
@@ -172,7 +172,7 @@ def _add(result: DataSet, packet: Packet, frame: DecodedFrame, name: str, wanted
 
 
 def of_truth(recording: Recording, images: Numbers, path: Path) -> Mapping[int, list[Detection]]:
-    """The boxes of a truth file for each image message, as of a rig where nothing moves; raises TruthError."""
+    """The boxes of a truth file for each image message, as of a rig if nothing moves; raises TruthError."""
     (width, height), marks = truth.load(path)
     truth.check(marks, width, height, ())
     if not marks:

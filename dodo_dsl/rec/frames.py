@@ -63,7 +63,7 @@ def decoded(
 ) -> Iterator[tuple[Packet, DecodedFrame | None]]:
     """Each packet with its frame, or None if it gave none; ``problem`` gets a sentence per reason for that.
 
-    At most 16 pairs of a camera and a format are decoded, as each takes the memory of some frames.
+    At most 16 pairs of a camera and a format are decoded, because each takes the memory of some frames.
     """
     decoders: dict[tuple[int, str], VideoDecoder] = {}
     reasons: set[str] = set()

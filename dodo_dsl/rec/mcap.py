@@ -42,7 +42,7 @@ _LEVELS = (Log.FATAL, Log.FATAL, Log.FATAL, Log.ERROR, Log.WARNING, Log.INFO, Lo
 
 
 def converter(layout: Layout) -> Convert | None:
-    """What makes a message of Foxglove of those of a layout; None where there is none."""
+    """What makes a message of Foxglove of those of a layout; None if there is none."""
     for version, converters in _CONVERTERS.items():
         convert = converters.get(layout.definition.name)
         if convert and message_versions.load(version).layout(layout.definition.name).definition.same_layout(

@@ -181,7 +181,7 @@ class TruthFiles:
         return [*([self.truth, self.marked] if has_boxes else []), *([self.picture] if is_new else [])]
 
     def write(self, picture: "Picture", marks: Sequence[Mark], is_new: bool) -> None:
-        """Writes the pictures first, so that whoever finds the truth finds them, too."""
+        """Writes the pictures first, so that a reader that finds the truth finds them, too."""
         height, width = picture.shape[:2]
         if is_new:
             _write_picture(self.picture, picture)

@@ -93,7 +93,7 @@ def write_video(
     """Write the image messages of one camera, from the first key frame on, with their sample times.
 
     ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all. Raises
-    FramesError where nothing can be written, or frames do not fit into one file, and OSError.
+    FramesError if nothing can be written, or frames do not fit into one file, and OSError.
     """
     format_ = next((packet.format for packet in packets(recording, images) if packet.format), "")
     is_h264 = CODECS.get(format_) == FORMAT
@@ -200,7 +200,7 @@ def write_frames(
     """Write each frame that can be decoded into ``folder``, as ``png`` or ``jpg``; returns how many they are.
 
     ``progress`` gets the number of packets done, ``problem`` a sentence about what cannot be decoded at all. Raises
-    FramesError where that is all of them, and OSError.
+    FramesError if that is all of them, and OSError.
     """
     written = 0
     pairs = zip(frame_names(recording, images, picture_type), decoded(recording, images, problem), strict=True)

@@ -49,7 +49,7 @@ class Interrupted(Exception):
 
 
 class RigFailure(Exception):
-    """A test on a rig ended in error, which says nothing of the values; one sentence."""
+    """A test on a rig ended in error, which shows nothing about the values; one sentence."""
 
 
 class DriveProgress(Progress, Protocol):
@@ -65,7 +65,7 @@ class DriveProgress(Progress, Protocol):
         """Another worker made one meanwhile."""
 
     def begin_shrinking(self, failures: int, most: int) -> None:
-        """From now on, ``most`` drives at most shrink failures."""
+        """From now on, ``most`` drives at most reduce failures."""
 
     def expect(self, most: int) -> None:
         """``most`` further drives at most are left."""

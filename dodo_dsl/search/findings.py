@@ -40,7 +40,7 @@ class Shrunk:
     """A failure at values as near to the nominal ones as it was found at; ``changed`` are those that differ.
 
     ``failed`` is how many of its ``repeats`` drives failed for its reason. ``spec`` is the name of the test that has
-    these values, empty where it does not fail each time.
+    these values, empty if it does not fail each time.
     """
 
     kind: str

@@ -24,14 +24,14 @@ SCHEMES = ("postgresql://", "postgres://")
 _PASSWORD = re.compile(r"(postgres(?:ql)?:/+[^/@:\s]*):.*@", re.DOTALL)
 _PARAMETER = re.compile(r"([?&](?:ssl)?password=)[^&\s'\"]*")
 MAIN = "main"
-"""The name of a study where none is given."""
+"""The name of a study if none is given."""
 SECRETS = ("PGPASSWORD", "DODO_SEARCH_STORAGE")
 _EXPECTED = "expected postgresql://USER@HOST/DATABASE"
 _MALFORMED = (
     f"the address after --storage cannot be read, {_EXPECTED}; in a name or password, @ / : % are %40 %2F %3A %25"
 )
 _SETUP = 0x646F646F
-"""Lock of who makes the tables."""
+"""Lock for making the tables."""
 _PAUSE_S = 0.2
 _ALIVE = {"keepalives_idle": 30, "keepalives_interval": 10, "keepalives_count": 3}
 """A machine that vanished is noticed within a minute, by the worker and by the server."""
@@ -192,7 +192,7 @@ def _parts(address: str) -> dict[str, Any]:
 
 
 def _connected(parts: Mapping[str, Any]) -> "psycopg.Connection[tuple[Any, ...]]":
-    """A connection whose statements are transactions of their own."""
+    """A connection whose statements are transactions by themselves."""
     import psycopg
 
     options = {"connect_timeout": 10, **_ALIVE, "application_name": "dodo search", **parts}

@@ -24,20 +24,20 @@ FIRST, SWEPT, PROPOSED = 8, 4, 4
 PATIENCE = 12
 """Generations whose proposals may all pass; from then on, all but one drive of each are of the sweep.
 
-The margin says nothing of a failure then, and what lies within the ranges is found soonest by an even cover.
+The margin shows nothing about a failure then, and what lies within the ranges is found soonest by an even cover.
 """
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Values to be driven; ``swept`` is whether they belong to the sweep, which tells how often the test fails."""
+    """Values to be driven; ``swept`` is whether they belong to the sweep, which shows how often the test fails."""
 
     values: Values
     swept: bool
 
 
 Judge = Callable[[Sequence[Candidate], Margins], Awaitable[bool]]
-"""Drives candidates and adds their margins; says whether to go on."""
+"""Drives candidates and adds their margins; shows whether to go on."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from dodo_dsl.spec.vary import Range, Values
 
 _REPEATS = 3
 MOST_KINDS, MOST_TRIED = 5, 3
-"""Kinds of failures that are shrunk, and drives of a kind that are repeated to find one that fails again."""
+"""Kinds of failures that are reduced, and drives of a kind that are repeated to find one that fails again."""
 FOLDER, TESTS = "shrinking", "failures"
 _PARTS = 4
 _ROUNDS = 6
@@ -41,7 +41,7 @@ Shrinking = Generator[list[Values], Sequence[bool], Values]
 
 @dataclass
 class Shrinker:
-    """Numbers its drives from ``number`` on. ``report`` takes the tests, as does ``registry`` where there is one."""
+    """Numbers its drives from ``number`` on. ``report`` takes the tests, as does ``registry`` if there is one."""
 
     study: Study
     drives: Drives
@@ -60,13 +60,13 @@ class Shrinker:
         if kinds:
             self.drives.progress.begin_shrinking(len(kinds), sum(map(self._most, kinds)))
         for number, (failure, of_kind) in enumerate(zip(failures, kinds, strict=False), 1):
-            self.drives.progress.note(f"shrinking: {failure.worst.reason}")
+            self.drives.progress.note(f"reducing: {failure.worst.reason}")
             await self._shrink(of_kind)
             self.drives.progress.expect(sum(map(self._most, kinds[number:])))
         shutil.rmtree(self.report / FOLDER, ignore_errors=True)
 
     def _most(self, failed: dict[int, tuple[Values, Drive]]) -> int:
-        """Drives that it takes at most to shrink failures of a kind."""
+        """Drives that it takes at most to reduce failures of a kind."""
         shrinking = max(most_drives(self.study.space, values) for values, _ in failed.values())
         return min(MOST_TRIED, len(failed)) + shrinking + _REPEATS - 1
 
@@ -79,7 +79,7 @@ class Shrinker:
             self.found.append(await self._confirmed(values))
 
     async def _first(self, failed: dict[int, tuple[Values, Drive]]) -> Drive | None:
-        """The drive nearest to the nominal values that fails again; None where none of the MOST_TRIED nearest does."""
+        """The drive nearest to the nominal values that fails again; None if none of the MOST_TRIED nearest does."""
         left = {number: drive for number, (_, drive) in failed.items()}
         for _ in range(min(MOST_TRIED, len(left))):
             drive = nearest(self.study.space, list(left.values()))
@@ -128,7 +128,7 @@ class Shrinker:
         for folder in filter(None, (self.report / TESTS, self.registry)):
             path = folder / name / f"{name}{SUFFIX}"
             if folder == self.registry and path.exists() and path.read_text() != text:
-                self.drives.progress.note(f"'{path}' is kept, as it holds another test")
+                self.drives.progress.note(f"'{path}' is kept, because it holds another test")
             else:
                 atomic.write_text(path, text)
         return name

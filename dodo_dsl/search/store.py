@@ -45,7 +45,7 @@ class Drive:
 class Store(Protocol):
     """The drives of one study: the same test, ranges and seed.
 
-    Where it ``is_shared``, several workers drive, and each claims values before it drives there.
+    If it ``is_shared``, several workers drive, and each claims values before it drives there.
     """
 
     is_shared: bool

@@ -160,7 +160,7 @@ class Tuning:
         await self.drives.drive([one.point(values) for values, one in itertools.product(candidates, scenarios)])
 
     def margin(self, values: Values, scenarios: Sequence[Scenario]) -> float | None:
-        """The objective; None where a scenario was not driven."""
+        """The objective; None if a scenario was not driven."""
         drives = self.drives.store.known([one.point(values).name for one in scenarios])
         known = [_ERROR if drive.margin is None else drive.margin for drive in drives if drive]
         if not known or len(known) < len(drives):

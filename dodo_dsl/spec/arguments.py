@@ -52,7 +52,7 @@ class ResolvedService:
         return {name: a.value.text for name, a in self.arguments.items() if a.value is not None}
 
     def filling(self, placeholder: str) -> str | None:
-        """What stands for a placeholder of the manifest's ports; None where its parameter has no fitting value.
+        """What stands for a placeholder of the manifest's ports; None if its parameter has no fitting value.
 
         Of the frames at which a map has models, that of ``frame-id`` is the service's own vehicle.
         """

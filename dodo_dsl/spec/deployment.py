@@ -139,7 +139,7 @@ class Deployment:
     """Where tests and application are; ``root`` is the folder of ``dodo.yml``, or the working folder without one.
 
     ``environment`` names variables of DoDo's own environment that the application gets, ``paths`` are files and folders
-    of the host that it may mount, and ``outside`` tells whether it may reach other networks than its test's. ``absent``
+    of the host that it may mount, and ``outside`` means that it may reach other networks than its test's. ``absent``
     are folders of the registry that do not exist.
     """
 
@@ -168,14 +168,14 @@ class Deployment:
 
 
 def build_command(prefix: str, tag: str, *names: str) -> str:
-    """What builds images of DoDo's with this prefix and tag, also where ``dodo.yml`` says nothing of them."""
+    """What builds images of DoDo's with this prefix and tag, also where ``dodo.yml`` shows nothing about them."""
     flags = [*(["--prefix", prefix] if prefix != Deployment.image_prefix else [])]
     flags += ["--tag", tag] if tag != Deployment.image_tag else []
     return shlex.join(["dodo", "images", "build", *names, *flags])
 
 
 def find_deployment(start: Path, paths: Iterable[Path] = ()) -> Path | None:
-    """The nearest ``dodo.yml`` at or above a folder; where there is none, the one that is above all ``paths``."""
+    """The nearest ``dodo.yml`` at or above a folder; if there is none, the one that is above all ``paths``."""
     folder = start.resolve()
     for candidate in (folder, *folder.parents):
         if (candidate / FILE_NAME).is_file():
@@ -347,7 +347,7 @@ def _tags(found: Rig) -> Iterator[Diagnostic]:
     for item in node.items if isinstance(node, Sequence) else ():
         if isinstance(item, Scalar) and item.text in found.more_tags and item.text in rig.RESERVED_TAGS:
             message = f"'{item.text}' is the tag of other runners, those of rig '{found.name}' have '{found.tag}'"
-            yield Diagnostic(item.span, "rig-tag", message, "remove it, or choose a tag of the rig's own")
+            yield Diagnostic(item.span, "rig-tag", message, "remove it, or choose the rig's own tag")
 
 
 def _cids(entry: Entry | None, problems: list[Diagnostic]) -> tuple[int, ...]:

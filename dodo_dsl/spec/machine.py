@@ -1,6 +1,6 @@
 """The operator's word on the rigs of a machine: ``/etc/dodo/rigs.yml``, which no test and no job can change.
 
-It says where leases and quarantines are kept, which devices are rigs, how far they may move at most, and the
+It shows where leases and quarantines are kept, which devices are rigs, how far they may move at most, and the
 repositories whose tests may move them. A repository's ``dodo.yml`` can only be stricter.
 """
 
@@ -47,7 +47,7 @@ class PermittedRig:
 
 @dataclass(frozen=True)
 class Machine:
-    """The operator's file; a place is None where it names none."""
+    """The operator's file; a place is None if it names none."""
 
     rigs: tuple[PermittedRig, ...] = ()
     leases: Path | None = None

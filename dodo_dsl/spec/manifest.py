@@ -183,7 +183,7 @@ class Parameter:
     a path parameter and lists of its JSON file (``map-path.obstacles``), whose entries' names are the allowed values,
     and so are ``words``; ``within_timeout`` marks a duration that must be shorter than the test's timeout; one with
     ``setup_times`` may pass that many times before the service is ready; ``not_empty`` names lists of a JSON file that
-    must not be empty; ``format`` says what is in the file that a path names, which is checked as the service reads it;
+    must not be empty; ``format`` shows what is in the file that a path names, which is checked as the service reads it;
     an amount with ``or_share`` may be ``25 %``. Items of a list are strings, or numbers where ``of`` says so; it has as
     many of them as the list that ``per`` names, or one. It has an effect only ``when`` others are so. The messages that
     drive the vehicle take the place of the default of one that is ``driving``.
@@ -238,8 +238,8 @@ class Manifest:
     """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None.
 
     A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
-    by patterns of their names, empty where it does not tell. ``messages`` are those that it has whatever its parameters
-    are, ``cases`` the others.
+    by patterns of their names, empty if it does not declare them. ``messages`` are those that it has whatever its
+    parameters are, ``cases`` the others.
     """
 
     folder: Path

@@ -90,7 +90,7 @@ def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
 
 
 def _otherwise(text: str) -> str:
-    """A hint how to write a value so that its name is another one: signs are no part of names, digits are."""
+    """A hint how to write a value so that its name is another one: signs are not part of names, digits are."""
     whole = re.match(r"[+-]?\d+(?![\d.])", text)
     if not whole:
         return "names have letters and digits only: write one of them otherwise"

@@ -48,7 +48,7 @@ def pool_of(node: Node | None) -> Pool | None:
 class ResourceLimits:
     """Millions of bytes of memory, its growth in such in a minute, seconds on processors, and these by the test's time.
 
-    None where there is no limit.
+    None if there is no limit.
     """
 
     max_memory_mb: float | None = None
@@ -130,15 +130,15 @@ STEPPED_CLOCKS = ("lockstep", VIRTUAL)
 class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
-    ``pool`` says which rigs will do where the spec names none, and the deployment says which ones these are.
-    ``isolation`` is None where the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
+    ``pool`` shows which rigs will do where the spec names none, and the deployment shows which ones these are.
+    ``isolation`` is None if the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
     to take what only a simulation knows. ``frames`` is one of FRAMES, ``frames_hz`` None for the cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
     ``max_response_s`` is the longest that an answer may take in lockstep, but for a share ``response_over`` of them.
     ``resources`` are the limits of what each of the application's services uses, None without any.
     ``variables`` are those that the application gets from the test, ``goals`` the soft ones by the names of checks.
     ``baseline`` names an earlier result, than which checks must not be worse.
-    ``is_whole`` is False where services could not be read, so that missing producers are not reported.
+    ``is_whole`` is False if services could not be read, so that missing producers are not reported.
     ``ranges`` are those of ``vary``, ``template`` is the instance before their values were filled in, and ``corners``
     are the same instance at the ends of the ranges, which are checked but never run.
     """

@@ -25,7 +25,7 @@ class InstancePattern:
 
 
 def parse(word: str) -> InstancePattern | None:
-    """None where a word is anything else."""
+    """None if a word is anything else."""
     match = PATTERN.fullmatch(word)
     if match is None:
         return None
@@ -70,7 +70,7 @@ def _without(test: str, name: str, specs: Sequence[Spec]) -> str:
         )
     known = list(dict.fromkeys(known for spec in specs for known, _ in spec.choice.values))
     if not known:
-        return f"'{test}' has no parameters, as it has no matrix"
+        return f"'{test}' has no parameters, because it has no matrix"
     return f"'{test}' has no parameter '{name}'" + _hint(name, known)
 
 

@@ -131,7 +131,7 @@ def _is_quantity(text: str, unit: str) -> bool:
 
 
 def with_point(text: str) -> str:
-    """A hint about a decimal comma; empty where there is none."""
+    """A hint about a decimal comma; empty if there is none."""
     point = text.replace(",", ".", 1)
     return f"write '{point}', with a point" if point != text and _QUANTITY.fullmatch(point) else ""
 

@@ -66,7 +66,7 @@ class Rig:
 
     @property
     def more_tags(self) -> tuple[str, ...]:
-        """Further tags of its runner, which tell it from other rigs of its kind."""
+        """Further tags of its runner, which distinguish it from other rigs of its kind."""
         node = self.node.get("tags")
         texts = [item.text for item in node.items if isinstance(item, Scalar)] if isinstance(node, Sequence) else []
         return tuple(dict.fromkeys(text for text in texts if text != self.tag))
@@ -84,7 +84,7 @@ class Rig:
 
     @property
     def arch(self) -> str:
-        """What its computer is, such as ``arm64``; empty where ``dodo.yml`` does not say."""
+        """What its computer is, such as ``arm64``; empty if ``dodo.yml`` does not say."""
         return self.text("arch")
 
     @property
@@ -94,7 +94,7 @@ class Rig:
         return int(quantity.convert(written, "B")) if written else None
 
     def text(self, key: str) -> str:
-        """The string at a dotted key; empty where there is none."""
+        """The string at a dotted key; empty if there is none."""
         entry = self.entry(key)
         return entry.value.text if entry and isinstance(entry.value, Scalar) else ""
 
@@ -115,7 +115,7 @@ class Rig:
 
     @functools.cached_property
     def _memory(self) -> Entry | None:
-        """All limits in one entry; one that is no quantity is left out, as the flag of its own has the problem."""
+        """All limits in one entry; one that is not a quantity is left out, because its own flag has the problem."""
         entry = self.node.entries.get("limits")
         if entry is None or not isinstance(entry.value, Mapping):
             return None

@@ -27,7 +27,7 @@ _CLOSING = {"{": "}", "[": "]"}
 
 
 def repaired(text: str, fits: Callable[[str], bool]) -> tuple[str, Fix | None]:
-    """A hint how to write a value so that it ``fits``, and the only fix; empty and None where nothing does."""
+    """A hint how to write a value so that it ``fits``, and the only fix; empty and None if nothing does."""
     before = text.partition("#")[0]
     if "#" in text and fits(before):
         return "a comment begins with ' #', after a space", Fix("#", " #")
@@ -93,7 +93,7 @@ class KeySlip:
 
 
 def slip_in_key(word: str, known: Collection[str], *, is_empty: bool) -> KeySlip | None:
-    """What is wrong with an unknown key, ``is_empty`` if it has no value; None when it is no slip of this kind."""
+    """What is wrong with an unknown key, ``is_empty`` if it has no value; None when it is not a slip of this kind."""
     found = re.fullmatch(r"(?P<key>[^:\s]+):(?P<value>.*\S.*)", word, re.DOTALL)
     if found and found["key"] in known:
         key, value = found["key"], found["value"].strip()

@@ -144,7 +144,7 @@ class _Place:
         self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
         self.name = name
         self.is_of_file = False
-        """Whether it is a key of the file's own."""
+        """Whether it is the file's own key."""
         self.about: dict[str, Any] = {}
         self.fits: Callable[[object], bool] = lambda _: True
         """Whether another value would comply with what is wrong here."""

@@ -39,7 +39,7 @@ class ValueProblem(Exception):
 
 
 def convert(parameter: Parameter, node: Node, root: Path) -> Value:
-    """The flag's value; raises ValueProblem where a value does not fit. Paths stay below ``root``."""
+    """The flag's value; raises ValueProblem if a value does not fit. Paths stay below ``root``."""
     return _CONVERTERS[parameter.type](parameter, node, root)
 
 

@@ -1,11 +1,11 @@
-"""Find the cones and other cars in the frames of the car's camera and tell the bus about them.
+"""Find the cones and other cars in the frames of the car's camera and send them on the bus.
 
     python perception.py --cid=111 --name=video0.argb --width=640 --height=480 --verbose
 
 Reads shared memory, 4 bytes a pixel (blue, green, red, alpha). Sends for each cone and car, with the frame's time
 stamp as sample time and the frame's number as sampleId: DetectionType (1 yellow, 2 blue, 3 car), DetectionProperty
 (`yellow`, `blue`, `car`) and DetectionBoundingBox (fractions of the image). When all of a frame have been sent,
-also when there are none, an ImageReadingShm with the same sampleId says that the frame is complete.
+also when there are none, an ImageReadingShm with the same sampleId shows that the frame is complete.
 """
 
 import argparse

@@ -81,7 +81,7 @@ def steering_towards(aim: Point) -> float:
 
 
 def free_way(cars: Sequence[Point]) -> float:
-    """How fast to drive behind other cars: 1 where none is near, 0 to stop."""
+    """How fast to drive behind other cars: 1 if none is near, 0 to stop."""
     ahead = min((car.ahead for car in cars if abs(car.left) < BESIDE), default=SLOW)
     return max(0.0, min(1.0, (ahead - STOP) / (SLOW - STOP)))
 

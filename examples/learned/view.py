@@ -6,7 +6,7 @@ from cv2.typing import MatLike
 from numpy.typing import NDArray
 
 COLUMNS, ROWS = 32, 12
-HORIZON = 0.5  # nothing above it tells where the track is
+HORIZON = 0.5  # nothing above it shows where the track is
 SEEN = 0.05  # share of a cell that a colour takes, beyond which more of it changes little
 
 

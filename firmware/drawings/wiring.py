@@ -34,7 +34,7 @@ def motors() -> list[str]:
 
 def drawing() -> str:
     sheet = Sheet(1000, 580, 1.0, (10, 570))
-    sheet.text((10, 546), "Wiring of a rig of the kind dynamic; crossing lines are connected where there is a dot")
+    sheet.text((10, 546), "Wiring of a rig of the kind dynamic; crossing lines are connected if there is a dot")
     lefts = {name: 260.0 + 180.0 * place for place, name in enumerate(motors())}
     _controller(sheet, lefts)
     for name, left in lefts.items():

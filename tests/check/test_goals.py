@@ -52,7 +52,7 @@ def test_an_evaluator_that_does_not_tell_takes_bare_numbers(tmp_path: Path) -> N
     )
     goals, problems = resolved(tmp_path, text + OWN)
     assert goals == (Goal("smooth", 0.0, 10.0),)
-    told = "'zero': '3 s' is not a number, and its evaluator's manifest does not tell the check's unit"
+    told = "'zero': '3 s' is not a number, and its evaluator's manifest does not declare the check's unit"
     assert problems == [("wrong-unit", told)]
 
 

@@ -34,7 +34,7 @@ class Search:
     driven: list[str] = field(default_factory=list)
     report: str = ""
     once: float | None = None
-    """Drives that begin further to the right fail, too, but only the first time, and not while a failure is shrunk."""
+    """Drives that begin further to the right fail, too, but only the first time, and not while a failure is reduced."""
     runs: int = 0
 
     def backend(self, plan: Plan, attempt: int) -> ScriptedBackend:
@@ -95,8 +95,8 @@ def test_a_failure_is_shrunk_to_a_test_of_its_own(search: Search) -> None:
     assert (shrunk["failed"], shrunk["repeats"]) == (3, 3)
     assert LIMIT < start < LIMIT + 0.001
     assert shrunk["spec"] == "example-fails-at-start"
-    announced = re.search(r"^shrinking 2 failures: up to (\d+) drives, about \d+ s; --sweep leaves it out$", out, re.M)
-    counted = re.findall(r"; (\d+) of up to (\d+) drives of shrinking, up to \d+ s to go$", out, re.M)
+    announced = re.search(r"^reducing 2 failures: up to (\d+) drives, about \d+ s; --sweep leaves it out$", out, re.M)
+    counted = re.findall(r"; (\d+) of up to (\d+) drives of the reduction, up to \d+ s to go$", out, re.M)
     assert announced and counted[0] == ("1", announced[1])
     assert [int(done) for done, _ in counted] == list(range(1, len(counted) + 1))
     assert all(int(done) <= int(most) <= int(announced[1]) for done, most in counted)
@@ -133,7 +133,7 @@ def test_it_ends_soon_after_the_first_failure(search: Search, sweep: list[str]) 
     [pytest.param([], id="all"), pytest.param(["--until-failure"], id="first", marks=pytest.mark.proof)],
 )
 def test_a_failure_that_does_not_repeat_is_none(search: Search, words: list[str]) -> None:
-    """It ends no search, is shrunk no further, and does not count in the rate."""
+    """It ends no search, is reduced no further, and does not count in the rate."""
     search.once, search.runs = 0.02, 24
     words = ["--runs", "24", *words]
     _, out = search("example", *words)

@@ -86,7 +86,7 @@ def test_parameters_select_the_instances_that_have_them(repository: Path, word: 
         ("sil-perception[lihgt=1]", "'sil-perception' has no parameter 'lihgt'; did you mean 'light'?"),
         ("sil-perception[light=2]", "no instance of 'sil-perception' has light=2; known: 0.45, 1, 1.8"),
         ("sil-perception[light=0.4]", "no instance of 'sil-perception' has light=0.4; did you mean '0.45'?"),
-        ("sil-closed-straight[a=1]", "'sil-closed-straight' has no parameters, as it has no matrix"),
+        ("sil-closed-straight[a=1]", "'sil-closed-straight' has no parameters, because it has no matrix"),
         ("sil-percept[light=1]", "there is no test 'sil-percept[light=1]'; did you mean 'sil-perception'"),
         ("sil-closed-left-curve[{}=1]", "'{}' of 'sil-closed-left-curve' is a range of 'vary' and no parameter"),
     ],

@@ -33,7 +33,7 @@ def test_check_says_when_output_is_stale(output: Path) -> None:
     layer.write_text(before.replace("init: true", "init: false"))
     code, out, _ = run("compile", "--check")
     assert code == 1
-    assert "-    init: false\n+    init: true\n" in out
+    assert "-  init: false\n+  init: true\n" in out
     assert layer.read_text() != before
     assert run("compile")[0] == 0
     assert layer.read_text() == before

@@ -1,6 +1,7 @@
 """GitLab, the compose specification and compose itself accept the compiled registry."""
 
 import json
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -44,6 +45,21 @@ def assert_one_project(folder: Path) -> None:
 
 def test_compose_sees_one_project_with_all_services(generated: Path) -> None:
     assert_one_project(generated / "sil-closed-straight")
+
+
+def test_compose_yaml_lists_what_env_lists(generated: Path, tmp_path: Path) -> None:
+    """For who reads it, and for programs that read it instead of ``.env``."""
+    folder = tmp_path / "sil-closed-straight"
+    shutil.copytree(generated / folder.name, folder)
+
+    def project() -> dict[str, object]:
+        words = [*compose(), "config", "--format", "json"]
+        found = json.loads(subprocess.run(words, cwd=folder, capture_output=True, check=True).stdout)
+        return {key: value for key, value in found.items() if not key.startswith("x-")}
+
+    before = project()
+    (folder / ".env").unlink()
+    assert project() == before and len(before["services"]) > 8  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["docker-compose.yml", "compose.yaml"])

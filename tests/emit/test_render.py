@@ -27,7 +27,9 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not made.problems
     first = {plan.spec: plan.slug for plan in reversed(made.compiled.suite.plans)}  # one instance of a matrix
     plans = [plan for plan in made.compiled.suite.plans if first[plan.spec] == plan.slug]
-    files = {file.path: file.text for plan in plans for file in render_plan(plan)} | {CHILD: made.pipeline.text}
+    files = {file.path: file.text for plan in plans for file in render_plan(plan, made.compiled.defaults)} | {
+        CHILD: made.pipeline.text
+    }
     searched = made.compiled.suite.plans[-1]
     search = SearchJobs(searched.name, searched.slug, 4, ("docker-compose.yml",))
     files[SEARCH] = render_pipeline(Suite((searched,)), "generated", [search]).text

@@ -81,7 +81,7 @@ def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
         assert f">{shown}</td>" in page
     assert (
         second.in_words()
-        == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to tell whether memory grows"
+        == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to measure its growth"
     )
 
 

@@ -1,4 +1,4 @@
-"""Failures shrunk, against areas in which drives fail, and the names of their tests."""
+"""Failures reduced, against areas in which drives fail, and the names of their tests."""
 
 import re
 from collections.abc import Callable

@@ -297,7 +297,7 @@ SLIPS = {
     "document-second": Wrong(
         {7: "clock: lockstep\n---"},
         "8:1 yaml-syntax: a second YAML document, expected one per file",
-        "remove the line, or write what stands below into a file of its own",
+        "remove the line, or write what stands below into its own file",
     ),
     "indent-below-value": Wrong(
         {19: "      with:"},

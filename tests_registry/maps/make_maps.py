@@ -2,12 +2,12 @@
 
 Yellow cones stand on the left of a track, blue ones on its right, and two large red ones beside the
 finish. Obstacles: ``left`` and ``right`` are walls through the cones, ``finish`` is the line across the
-lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it says so; its rows begin behind
+lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it names another start; its rows begin behind
 the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
 the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that backs up to the finish.
 An oval has ``far`` instead, the line half-way round.
 ``two-cars`` is the straight track with another car, at the frames of sender stamp 1; the car of the test
-has stamp 0. ``static-rig`` is no track but a board with eight cones, seen from x = 0, y = 0 along +x.
+has stamp 0. ``static-rig`` is not a track but a board with eight cones, seen from x = 0, y = 0 along +x.
 """
 
 import json

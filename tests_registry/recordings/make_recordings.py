@@ -2,7 +2,7 @@
 
 They are simulated drives with what a real camera adds: a lens that bends, a shutter that blurs what moves, and noise,
 before a background that is not empty. The pictures go through DoDo's own camera, vehicle, integrator and recorder,
-without a bus and by a time of their own, so that the same bytes come out again (with the same libx264; another one
+without a bus and by their own time, so that the same bytes come out again (with the same libx264; another one
 may choose other bits for the same pictures).
 
 ``kiwi-track.rec`` is a drive on the map ``kiwi-track``: from the start through the first corners, by a driver who
@@ -77,7 +77,7 @@ def program(name: str) -> Any:
 
 
 class Recorded:
-    """A recording under way; sent and received when it was sampled, so that nothing tells when it was made."""
+    """A recording under way; sent and received when it was sampled, so that nothing shows when it was made."""
 
     def __init__(self, recording: RecordingFile) -> None:
         self.messages = MessageSet.standard()

@@ -2,10 +2,11 @@
 
 A table has a row every 0.1 s: where the beacon is (``x``, ``y`` in m, ``yaw`` in rad) and the steering request in rad
 that is reasonable there (``groundSteering``). The beacon drives at SPEED, on ``left-curve`` along the centre line of
-the track, on ``straight`` askew from the left half of the lane into the right one. The steering is no application's:
-it leads from where the beacon is onto the centre line LOOK m ahead (the circle of pure pursuit), for Kiwi's wheelbase
-and the gain with which the car takes a request. LOOK is where a driver sees both rows: the camera sees cones 0.25 m
-beside it from 0.41 m on, and the nearest of a row, 0.25 m apart, is on the average half a gap farther.
+the track, on ``straight`` askew from the left half of the lane into the right one. The steering is not an
+application's: it leads from where the beacon is onto the centre line LOOK m ahead (the circle of pure pursuit), for
+Kiwi's wheelbase and the gain with which the car takes a request. LOOK is where a driver sees both rows: the camera
+sees cones 0.25 m beside it from 0.41 m on, and the nearest of a row, 0.25 m apart, is on the average half a gap
+farther.
 
 ``rig-straight`` is for the dynamic rig, which has to follow: it gains speed with GAIN up to RIG_SPEED, brakes as
 gently, and stands at last.

@@ -19,7 +19,7 @@ from dodo_dsl.opendlv.numbers import number
 from dodo_dsl.opendlv.picture_size import problem_of
 
 Settings = Mapping[str, str]
-"""What the test gives to other parameters of the service, as text; empty where there is no value."""
+"""What the test gives to other parameters of the service, as text; empty if there is no value."""
 Ids = Mapping[str, int]
 """The numbers of messages, by name."""
 Format = Callable[[Path, Settings, Ids], Iterator[InputError]]
@@ -106,7 +106,7 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     try:
         pictures = truth_file.read(path, frames)
     except truth_file.TruthFileError as error:
-        if error.where != _BOXES:  # told by the rule on empty files
+        if error.where != _BOXES:  # reported by the rule on empty files
             yield error
         return
     yield from truth_file.corners(path)
@@ -115,7 +115,7 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     missing = [name for name in settings["classes"].split(",") if name and name not in labels]
     known = truth_file.categories(path) if missing else ()
     for name in missing:
-        if name in known:  # others are told by the rule on names
+        if name in known:  # others are reported by the rule on names
             yield InputError(path, truth_file.no_box(name, labels), _BOXES)
 
 
@@ -134,7 +134,7 @@ def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
 
 
 def _table(path: Path) -> list[InputError]:
-    """What is wrong with any table: services that read the same one tell it alike."""
+    """What is wrong with any table: services that read the same one report it alike."""
     pass
 
     problem = problem_in_table(path)
@@ -195,12 +195,12 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
 HELP: Mapping[str, str] = {
     "map": "docs/reference/maps.md has an example",
     "obstacles": "docs/reference/maps.md has an example",
-    "truth": "services/object_detection/README.md says what a truth has",
-    "target": "services/continuous_signal/README.md says what a target has",
-    "way-points": "services/beacon/README.md says what a path has",
+    "truth": "services/object_detection/README.md shows what a truth has",
+    "target": "services/continuous_signal/README.md shows what a target has",
+    "way-points": "services/beacon/README.md shows what a path has",
     "car": "services/dynamic_model/README.md lists the parameters",
 }
-"""Where to read on, for problems without a hint of their own."""
+"""Where to read on, for problems without their own hint."""
 
 
 def _raised(path: Path, read: Callable[[], object]) -> Iterator[InputError]:
@@ -217,7 +217,7 @@ def _raised(path: Path, read: Callable[[], object]) -> Iterator[InputError]:
 
 
 def _column(path: Path, line: int, what: str) -> int:
-    """Where what a sentence quotes is in its line; the begin of the line where it quotes nothing."""
+    """Where what a sentence quotes is in its line; the start of the line where it quotes nothing."""
     quoted = _QUOTED.search(what)
     if not line or quoted is None:
         return 1
@@ -236,7 +236,7 @@ Row = tuple[int, str, list[str]]
 
 
 def problem_in_table(path: Path) -> InputError | None:
-    """The first problem of a CSV table; None where each reader has to say what is wrong, and for what is no text."""
+    """The first problem of a CSV table; None if each reader has to say what is wrong, and for what is not text."""
     try:
         rows = list(_rows(regular_file.text(path, encoding="utf-8-sig")))
     except (OSError, ValueError, csv.Error):

@@ -36,7 +36,7 @@ _SLIPS = (
     (r"\0[\x01-\x1f]", "a tab or another control character within a text", "write \\t, or a space"),
     (
         r"[{,]\s*\0(?P<at>[A-Za-z_][\w.-]*)",
-        "'{at}' is no key, which is a text in double quotes",
+        "'{at}' is not a key, which is a text in double quotes",
         'write "{at}": and its value',
     ),
     (r"\0(?P<at>None|True|False)\b", "'{at}' is Python, not JSON", "write null, true or false"),
@@ -180,7 +180,7 @@ def _shown(value: object) -> str:
 
 
 def near(word: str, known: Iterable[str]) -> str:
-    """A hint that names the known word that is spelt alike; empty where there is none."""
+    """A hint that names the known word that is spelt alike; empty if there is none."""
     close = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.7)
     return f"did you mean '{close[0]}'?" if close else ""
 

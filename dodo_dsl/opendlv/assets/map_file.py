@@ -208,7 +208,7 @@ def read_map(path: Path) -> MapFile:
 
 
 def bodies(models: Sequence[ModelEntry], own: int) -> dict[int, tuple[str, ModelEntry]]:
-    """Name and model at each frame but the vehicle's ``own``; the frame tells those of one name apart."""
+    """Name and model at each frame but the vehicle's ``own``; the frame distinguishes those of one name."""
     found = {stamp: model for model in models for stamp in model.frames if stamp != own}
     names = [model.name for model in found.values()]
     return {
@@ -230,7 +230,7 @@ def read_frames(path: Path) -> tuple[int, ...]:
 
 
 def problems(path: Path) -> tuple[MapFile | None, list[MapError]]:
-    """What can be drawn of a map, None for what is no map, and all that is wrong with it."""
+    """What can be drawn of a map, None for what is not a map, and all that is wrong with it."""
     file, found = find_map(path), list[MapError]()
     try:
         root = load(file)
@@ -273,7 +273,7 @@ def _stamps_twice(models: Sequence[Node]) -> Iterator[MapError]:
 
 
 def _listed(root: Node, key: str) -> Iterator[Node]:
-    """The entries of a list; none where it is no list, which is told elsewhere."""
+    """The entries of a list; none where it is not a list, which is reported elsewhere."""
     value = root.value.get(key) if isinstance(root.value, dict) else None
     yield from root.items(key) if isinstance(value, list) else ()
 

@@ -1,4 +1,4 @@
-"""What can be told of an OBJ file by its text alone: before a library loads it, and without one."""
+"""What the text alone of an OBJ file shows: before a library loads it, and without one."""
 
 import functools
 import itertools
@@ -27,7 +27,7 @@ class _Wrong(Exception):
 
 
 def check(path: Path, data: bytes) -> None:
-    """Raises MapError for a file that is no mesh, or unfolds to more than a mesh may have."""
+    """Raises MapError for a file that is not a mesh, or unfolds to more than a mesh may have."""
     problem = problem_of(data)
     if problem is not None:
         line, what, hint = problem
@@ -121,7 +121,7 @@ def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
             if commas
             else "for example 'v 0.1 0.2 0.3'"
         )
-        raise _Wrong(number, f"'{_text(words)}' is no vertex, expected v and three numbers in m", hint)
+        raise _Wrong(number, f"'{_text(words)}' is not a vertex, expected v and three numbers in m", hint)
     if not all(abs(part) <= FARTHEST for part in place):
         raise _Wrong(number, "the OBJ file has vertices that are not finite numbers below 100 km", "save it in m")
     return place
@@ -136,7 +136,7 @@ def _face(number: int, words: Sequence[bytes], count: int) -> list[int]:
         corners = []
     if len(corners) < _THREE:
         hint = "for example 'f 1 2 3', the numbers of its vertices from 1"
-        raise _Wrong(number, f"'{_text(words)}' is no face, expected f and three or more vertices", hint)
+        raise _Wrong(number, f"'{_text(words)}' is not a face, expected f and three or more vertices", hint)
     outside = next((corner for corner in corners if not 0 < corner <= count), None)
     if outside is not None:
         raise _Wrong(number, f"the face has vertex {outside}, expected 1 to {count}", "save the whole mesh again")

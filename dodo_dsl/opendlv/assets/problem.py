@@ -15,7 +15,7 @@ class InputError(ValueError):
 
     ``where`` is a path in a JSON document, such as ``$.model[0].color``; in other text there is a line, and perhaps a
     column, from 1. With ``is_slip`` the file can be used, but hardly means what is written. With ``is_of_key`` the key
-    at ``where`` is wrong. ``what`` is said after the file and a colon, or as a sentence of its own.
+    at ``where`` is wrong. ``what`` is said after the file and a colon, or as its own sentence.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class InputError(ValueError):
 def json_position(text: str, where: str, is_of_key: bool = False) -> tuple[int, int]:
     """Line and column of a path in a JSON document, or of its key.
 
-    Where the document ends before, that of what is around it.
+    If the document ends before, that of what is around it.
     """
     at, decoder = _skip(text, 0), JSONDecoder()
     key = at

@@ -32,7 +32,7 @@ _HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder wri
 class LookedThrough:
     """The senders of one message, up to the one that is looked for.
 
-    ``ends_at`` is the byte behind the last whole message that was looked at; ``is_whole`` says that no
+    ``ends_at`` is the byte behind the last whole message that was looked at; ``is_whole`` means that no
     other follows, as far as was looked.
     """
 
@@ -44,7 +44,7 @@ class LookedThrough:
 
 
 def look(path: Path, message: int, sender: int) -> LookedThrough:
-    """Looks for a message of a sender, from the begin to the first bytes that are no message; raises OSError."""
+    """Looks for a message of a sender, from the start to the first bytes that are not a message; raises OSError."""
     with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
         found = LookedThrough(os.fstat(stream.fileno()).st_size)
         for body in _bodies(stream, found):
@@ -57,7 +57,7 @@ def look(path: Path, message: int, sender: int) -> LookedThrough:
 
 
 def picture_size(path: Path, message: int, sender: int) -> tuple[int, int]:
-    """Width and height of the first picture of a sender, 0 where there is none; raises OSError."""
+    """Width and height of the first picture of a sender, 0 if there is none; raises OSError."""
     with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
         for body in _bodies(stream, LookedThrough(0)):
             if _type(body) == message and first_number(body, _STAMP_FIELD) == sender:
@@ -67,7 +67,7 @@ def picture_size(path: Path, message: int, sender: int) -> tuple[int, int]:
 
 
 def _end(data: bytes) -> int:
-    """Where the first bytes are that are no whole frame."""
+    """Where the first bytes are that are not a whole frame."""
     at = 0
     while data[at : at + 2] == MAGIC and at + HEADER_BYTES <= len(data):
         behind = at + HEADER_BYTES + body_length(data[at : at + HEADER_BYTES])
@@ -120,7 +120,7 @@ def _fault(path: Path, _changed_ns: int) -> str:
             types = recording.index["data_type"]
             return recording_times.fault(recording, ((types < _OWN) | (types >= _OWN + 100)).nonzero()[0])
     except (OSError, RecordingError):
-        return ""  # told where it is read
+        return ""  # reported where it is read
 
 
 def _is_doubtful(bodies: Iterator[bytes]) -> bool:
@@ -166,7 +166,7 @@ def _read_by_index(path: Path, message: int, found: LookedThrough) -> Iterator[I
 
 
 def _bodies(stream: BinaryIO, found: LookedThrough) -> Iterator[bytes]:
-    """The encoded envelopes from the begin to the first that is not whole."""
+    """The encoded envelopes from the start to the first that is not whole."""
     while found.ends_at < MOST_BYTES:
         header = stream.read(HEADER_BYTES)
         if not header:

@@ -35,7 +35,7 @@ def read(path: Path, field: str) -> list[tuple[int, float]]:
 
 
 def misspelt(path: Path, field: str) -> Iterator[InputError]:
-    """Columns of a table that nothing reads, as they are spelt almost like the one of `field`; the table is read."""
+    """Columns of a table that nothing reads: they are almost spelt like the one of `field`; the table is read."""
     header = next(csv.reader(io.StringIO(regular_file.text(path, encoding="utf-8-sig"), newline="")), [])
     names = [name.strip() for name in header]
     for close in difflib.get_close_matches(field, names, cutoff=0.75) if field not in names else ():

@@ -147,7 +147,7 @@ def _standing(knot: _Knot) -> TrajectoryPose:
 
 
 def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Trajectory:
-    """A straight trajectory from a place along ``yaw`` (rad), without end where it has no ``length`` (m)."""
+    """A straight trajectory from a place along ``yaw`` (rad), without end if it has no ``length`` (m)."""
     begin = PathPoint("the start", x, y, z, yaw)
     reach = length or 1.0
     end = replace(begin, x=x + reach * math.cos(yaw), y=y + reach * math.sin(yaw))
@@ -158,7 +158,7 @@ NEEDED, POSSIBLE = ("x", "y"), ("x", "y", "z", "yaw", "time")
 
 
 def read_table(path: Path, height: float) -> list[PathPoint]:
-    """The way points of a CSV file with a header; ``height`` (m) counts where there is no column z.
+    """The way points of a CSV file with a header; ``height`` (m) counts if there is no column z.
 
     Columns x, y and z in m, yaw in rad, time in s; other columns are ignored, as are blank lines and those that begin
     with #. Raises TrajectoryError with file and line.

@@ -50,7 +50,7 @@ def plain(label: str) -> str:
 
 
 def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
-    """The classes and boxes of each picture, by what tells pictures apart; raises TruthFileError."""
+    """The classes and boxes of each picture, by what distinguishes pictures; raises TruthFileError."""
     document = _document(path)
     images = {_whole(entry, "id", place): (entry, place) for entry, place in _entries(document, "images", path)}
     if len(images) != len(document["images"]):

@@ -42,7 +42,7 @@ int main(int argc, char **argv)
     memcpy(emulator.plant.longer, emulator.longer, sizeof emulator.longer);
     memcpy(emulator.plant.shift, emulator.shift, sizeof emulator.shift);
     if (!board_start(&emulator.plant, elf, emulator.boot)) {
-        fprintf(stderr, "rig-emulator: %s is no firmware that can be read: build it with make firmware\n", elf);
+        fprintf(stderr, "rig-emulator: %s is not a firmware that can be read: build it with make firmware\n", elf);
         return 2;
     }
     if (emulator.memory != NULL && !board_load_memory(emulator.memory)) {

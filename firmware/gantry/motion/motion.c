@@ -7,7 +7,7 @@
 #include "memory/limits.h"
 
 #define LAG_MS 4 /* the longest time from a measurement to the driver's reaction */
-#define RESEND_MS 50 /* after which a command is sent again, as it may be lost */
+#define RESEND_MS 50 /* after which a command is sent again, because it may be lost */
 
 static int8_t sign(int32_t value)
 {

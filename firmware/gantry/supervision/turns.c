@@ -10,7 +10,7 @@
 
 /* The index is closed in INDEX_WIDTH below heading 0, and nowhere else. It is not looked at close to its edges, so that
  * neither hysteresis nor bounces count. A motor that slipped, a coupling that did, and a switch that is stuck or cut off
- * are alike: the position is void, and CALIBRATE tells them apart. */
+ * are alike: the position is void, and CALIBRATE distinguishes them. */
 static void check_index(void)
 {
     int32_t heading = circle_heading(rig.position[MOTOR_ALPHA] + INDEX_WIDTH / 2 + TURN / 2);

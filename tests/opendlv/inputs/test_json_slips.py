@@ -28,7 +28,7 @@ SLIPS = [
     ('{"a": [1]', 1, "'{' is not closed", "write '}' where it ends"),
     ("[1]]", 4, "']' follows the end of the JSON", "remove it, or the bracket too many before it"),
     ('{"a" 1}', 4, "':' is missing behind this key", "write ':' and its value"),
-    ("{a: 1}", 2, "'a' is no key, which is a text in double quotes", 'write "a": and its value'),
+    ("{a: 1}", 2, "'a' is not a key, which is a text in double quotes", 'write "a": and its value'),
     ("[None]", 2, "'None' is Python, not JSON", "write null, true or false"),
     ("[90 deg]", 5, "'deg' behind a value", "remove it: JSON has numbers without units, and other text in quotes"),
     ("[x]", 2, "not JSON: 'x' is not expected here", _VALUE),

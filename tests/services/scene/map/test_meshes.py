@@ -108,7 +108,7 @@ BAD = [
     ("", "has no faces"),
     ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "has no faces"),
     ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", r"a\.obj:4: the face has vertex 9, expected 1 to 3"),
-    ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"a\.obj:1: 'v 0 0 x' is no vertex"),
+    ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"a\.obj:1: 'v 0 0 x' is not a vertex"),
     ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite numbers"),
     ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "no face of the OBJ file has an area"),
     ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n", "count vertices by negative numbers"),
