@@ -16,7 +16,7 @@
 #define TIME_NOTES 64
 #define TIME_NEVER INT64_MAX
 
-/* What a thread does. Only its own thread writes FREE, RUNNING, WAITING and READY, but for a waker in the same process
+/* What a thread does. Only its own thread writes FREE, RUNNING, WAITING and READY, but for a waker
  * that turns WAITING into READY; only the agent writes GRANTED. Changes from WAITING are made by compare-and-exchange. */
 enum time_state { TIME_FREE, TIME_RUNNING, TIME_WAITING, TIME_READY, TIME_GRANTED };
 
@@ -35,7 +35,8 @@ struct time_slot {
     _Atomic uint32_t thread; /* n-th thread of its process */
     _Atomic int32_t pid, tid; /* as the process itself sees them */
     char name[16];
-    char unused[72];
+    _Atomic uint32_t key; /* of what it waits for, if several processes share that; 0 once one of them wakes it */
+    char unused[68];
 };
 
 struct time_message {

@@ -1,0 +1,248 @@
+/* Threads and processes: each begins, forks and ends with a slot of its own. */
+#define _GNU_SOURCE
+#include "library.h"
+
+#include <string.h>
+#include <sys/msg.h>
+#include <sys/resource.h>
+#include <sys/sem.h>
+#include <sys/wait.h>
+#include <threads.h>
+
+enum { RETRY_NS = 1000000 };
+
+static pthread_key_t at_end;
+
+/* The last of the destructors that a thread has. */
+static void end_thread(void *value)
+{
+    if (++self.endings < PTHREAD_DESTRUCTOR_ITERATIONS)
+        pthread_setspecific(at_end, value);
+    else
+        release_slot();
+}
+
+void processes_start(void)
+{
+    pthread_key_create(&at_end, end_thread);
+    pthread_atfork(before_fork, NULL, in_forked_child);
+}
+
+/* -- threads -------------------------------------------------------------------------------------------------------- */
+
+struct beginning {
+    void *(*routine)(void *);
+    void *argument;
+    unsigned slot;
+};
+
+static void *begin(void *given)
+{
+    struct beginning beginning = *(struct beginning *)given;
+    free(given);
+    adopt_slot(beginning.slot);
+    pthread_setspecific(at_end, &at_end);
+    if (self.slot) {
+        self.slot->state = TIME_READY;
+        announce();
+        pass_gate();
+    }
+    return beginning.routine(beginning.argument);
+}
+
+PUBLIC int pthread_create(pthread_t *restrict thread, const pthread_attr_t *restrict attributes,
+                          void *(*routine)(void *), void *restrict argument)
+{
+    if (!is_managed())
+        return real.pthread_create(thread, attributes, routine, argument);
+    struct beginning *beginning = malloc(sizeof *beginning);
+    if (!beginning)
+        return EAGAIN;
+    unsigned slot = take_slot(own_process(), next_thread_number());
+    *beginning = (struct beginning){routine, argument, slot};
+    int error = real.pthread_create(thread, attributes, begin, beginning);
+    if (error) {
+        free(beginning);
+        if (slot != TIME_SLOTS)
+            page->slot[slot].state = TIME_FREE;
+    }
+    return error;
+}
+
+PUBLIC int pthread_join(pthread_t thread, void **result)
+{
+    is_managed();
+    if (!real.pthread_tryjoin_np(thread, result))
+        return 0;
+    enter_kernel();
+    int error = real.pthread_join(thread, result);
+    leave_kernel();
+    return error;
+}
+
+PUBLIC int pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until)
+{
+    if (!until || !is_managed())
+        return pthread_join(thread, result);
+    if (!is_valid(until))
+        return EINVAL;
+    int64_t deadline = deadline_on(clock, until);
+    int error;
+    while ((error = real.pthread_tryjoin_np(thread, result)) == EBUSY) {
+        if (now_ns() >= deadline)
+            return ETIMEDOUT;
+        int64_t again = later(now_ns(), RETRY_NS);
+        sleep_until(again < deadline ? again : deadline);
+    }
+    return error;
+}
+
+PUBLIC int pthread_timedjoin_np(pthread_t thread, void **result, const struct timespec *until)
+{
+    return pthread_clockjoin_np(thread, result, CLOCK_REALTIME, until);
+}
+
+struct c11_beginning {
+    thrd_start_t routine;
+    void *argument;
+};
+
+static void *begin_c11(void *given)
+{
+    struct c11_beginning beginning = *(struct c11_beginning *)given;
+    free(given);
+    return (void *)(intptr_t)beginning.routine(beginning.argument);
+}
+
+PUBLIC int thrd_create(thrd_t *thread, thrd_start_t routine, void *argument)
+{
+    struct c11_beginning *beginning = malloc(sizeof *beginning);
+    if (!beginning)
+        return thrd_nomem;
+    *beginning = (struct c11_beginning){routine, argument};
+    int error = pthread_create(thread, NULL, begin_c11, beginning);
+    if (error)
+        free(beginning);
+    return error == EAGAIN ? thrd_nomem : error ? thrd_error : thrd_success;
+}
+
+PUBLIC int thrd_join(thrd_t thread, int *result)
+{
+    void *value;
+    if (pthread_join(thread, &value))
+        return thrd_error;
+    if (result)
+        *result = (int)(intptr_t)value;
+    return thrd_success;
+}
+
+/* The parent of a vfork waits until the child executes a program; that of a fork need not. */
+PUBLIC pid_t vfork(void)
+{
+    return fork();
+}
+
+/* -- waits that the kernel ends ------------------------------------------------------------------------------------- */
+
+PUBLIC pid_t wait4(pid_t pid, int *status, int options, struct rusage *usage)
+{
+    long result = RAW_4(SYS_wait4, pid, status, options | WNOHANG, usage);
+    if (result == 0 && options & WNOHANG)
+        count_spin();
+    if (result != 0 || options & WNOHANG)
+        return (pid_t)answer(result);
+    enter_kernel();
+    result = RAW_4(SYS_wait4, pid, status, options, usage);
+    leave_kernel();
+    return (pid_t)answer(result);
+}
+
+PUBLIC pid_t waitpid(pid_t pid, int *status, int options)
+{
+    return wait4(pid, status, options, NULL);
+}
+
+PUBLIC pid_t wait3(int *status, int options, struct rusage *usage)
+{
+    return wait4(-1, status, options, usage);
+}
+
+PUBLIC pid_t wait(int *status)
+{
+    return wait4(-1, status, 0, NULL);
+}
+
+PUBLIC int waitid(idtype_t type, id_t id, siginfo_t *about, int options)
+{
+    if (!(options & WNOHANG))
+        enter_kernel();
+    long result = RAW_6(SYS_waitid, type, id, about, options, NULL, 0);
+    if (!(options & WNOHANG))
+        leave_kernel();
+    return (int)answer(result);
+}
+
+PUBLIC int semtimedop(int id, struct sembuf *operations, size_t count, const struct timespec *timeout)
+{
+    enum { MOST_OPERATIONS = 500 };
+    if (count == 0 || count > MOST_OPERATIONS)
+        return fail_with(count ? E2BIG : EINVAL);
+    struct sembuf at_once[count];
+    bool may_wait = true;
+    memcpy(at_once, operations, count * sizeof *operations);
+    for (size_t at = 0; at < count; at++) {
+        may_wait &= !(operations[at].sem_flg & IPC_NOWAIT);
+        at_once[at].sem_flg |= IPC_NOWAIT;
+    }
+    long result = RAW_4(SYS_semtimedop, id, at_once, count, NULL);
+    if (result != -EAGAIN || !may_wait) {
+        if (result == -EAGAIN)
+            count_spin();
+        return (int)answer(result);
+    }
+    if (!is_managed())
+        return (int)answer(RAW_4(SYS_semtimedop, id, operations, count, timeout));
+    int64_t deadline = timeout ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
+    if (now_ns() >= deadline)
+        return count_spin(), fail_with(EAGAIN);
+    int timer = interrupt_at(deadline);
+    enter_kernel();
+    result = RAW_4(SYS_semtimedop, id, operations, count, NULL);
+    leave_kernel();
+    interrupt_end(timer);
+    return (int)answer(result == -EINTR && now_ns() >= deadline ? -EAGAIN : result);
+}
+
+PUBLIC int semop(int id, struct sembuf *operations, size_t count)
+{
+    return semtimedop(id, operations, count, NULL);
+}
+
+PUBLIC ssize_t msgrcv(int id, void *message, size_t size, long type, int flags)
+{
+    long result = RAW_6(SYS_msgrcv, id, message, size, type, flags | IPC_NOWAIT, 0);
+    if (result != -ENOMSG || flags & IPC_NOWAIT)
+        return answer(result);
+    enter_kernel();
+    result = RAW_6(SYS_msgrcv, id, message, size, type, flags, 0);
+    leave_kernel();
+    return answer(result);
+}
+
+PUBLIC int system(const char *command)
+{
+    if (!command || !is_managed())
+        return is_starting() ? fail_with(EAGAIN) : real.system(command);
+    enter_kernel();
+    int result = real.system(command);
+    leave_kernel();
+    return result;
+}
+
+PUBLIC int pclose(FILE *stream)
+{
+    enter_kernel();
+    int result = real.pclose(stream);
+    leave_kernel();
+    return result;
+}
