@@ -16,10 +16,11 @@ from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, containers, copy_command
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions
-from dodo_dsl.plan.added_services import RECORDER
+from dodo_dsl.plan.added_services import RECORDER, TIME, TIME_MOUNT, agent_flags
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
 from dodo_dsl.plan.plan_json import json_text, to_json
 from dodo_dsl.source import resolve
+from dodo_dsl.spec.model import VIRTUAL
 from dodo_dsl.template_cache import compiled_templates
 
 _SERVICE_DEPTH = 2
@@ -144,6 +145,13 @@ def _render(template: str, **values: object) -> str:
     return _templates().get_template(template).render(**values)
 
 
+def _sandbox_command(plan: Plan) -> tuple[str, ...]:
+    """It sleeps, or gives the application the test's time."""
+    if plan.clock != VIRTUAL:
+        return ("sleep", "infinity")
+    return (f"{TIME_MOUNT}/{TIME}", *agent_flags(len(plan.application.services), plan.seed))
+
+
 def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
     """The compose layers, ``compose.yaml`` and ``.env`` that name them, and ``test.json`` of one test.
 
@@ -163,6 +171,8 @@ def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
                 recorder=RECORDER,
                 own_network=own_network,
                 sandbox=own_network and layer == LAYERS[0],
+                sandbox_command=_sandbox_command(plan),
+                time=TIME_MOUNT if plan.clock == VIRTUAL else "",
                 copies=plan.application.copies if layer == LAYERS[0] else {},
                 files_service=FILES,
                 copy_command=copy_command(plan.application),

@@ -40,7 +40,31 @@ def lockstep(
 
 TIME_FOLDER = "time-folder"
 """The clock's flag where the application's own time is the test's; on the host its value is another."""
-_OWN_TIME = f"/dev/shm/{TIME}"
+OWN_TIME = f"/dev/shm/{TIME}"
+"""Where library and agent meet in a test's own memory."""
+TIME_MOUNT = "/opt/dodo/time"
+"""Where containers have the library and the agent."""
+SPARE_S = 10
+"""Seconds of its own time that the application has before the test begins."""
+_EPOCH_S, _SECOND = 1_700_000_000, 1_000_000_000
+_POOLS = ("OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""Threads of the application run one at a time, so that pools of them only cost time."""
+
+
+def agent_flags(services: int, seed: int, folder: str = OWN_TIME) -> tuple[str, ...]:
+    """The flags of what gives an application of so many ``services`` the test's time."""
+    begin = _EPOCH_S * _SECOND
+    start = begin - SPARE_S * _SECOND
+    return (f"--folder={folder}", f"--services={services}", f"--start={start}", f"--begin={begin}", f"--seed={seed}")
+
+
+def time_variables(
+    given: Mapping[str, str], number: int, seed: int, library: str, folder: str = OWN_TIME
+) -> dict[str, str]:
+    """The ``given`` variables of the application's service ``number``, with those that give it the test's time."""
+    preloaded = ":".join(filter(None, (library, given.get("LD_PRELOAD", ""))))
+    own = {"LD_PRELOAD": preloaded, "DODO_TIME": folder, "DODO_TIME_SERVICE": str(number)}
+    return {**dict.fromkeys(_POOLS, "1"), "PYTHONHASHSEED": str(seed), **given, **own}
 
 
 def clock(
@@ -70,7 +94,7 @@ def clock(
 def _expected(spec: Spec, wiring: Wiring, application: Sequence[str]) -> dict[str, str]:
     """What the clock is to expect of the application: answers to frames, or messages whenever it sends them."""
     if spec.clock == VIRTUAL:
-        own = {TIME_FOLDER: _OWN_TIME, "application": ",".join(application)}
+        own = {TIME_FOLDER: OWN_TIME, "application": ",".join(application)}
         return {"hears": ",".join(all_inputs(wiring)), **own}
     return {"answers": ",".join(answers(wiring)), "hears": ",".join(other_inputs(wiring)), "done": wiring.done}
 

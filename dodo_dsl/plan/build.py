@@ -29,6 +29,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
+from dodo_dsl.spec.model import VIRTUAL
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.values import Value, default_value
@@ -240,6 +241,7 @@ class _Builder:
             privileged_allowed=rig is not None and rig.privileged,
             limits=self.shared.limits,
             given=self._variables(),
+            time_seed=spec.seed if spec.clock == VIRTUAL else None,
         )
         messages = self._messages()
         return Plan(

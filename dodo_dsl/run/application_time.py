@@ -17,20 +17,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.plan.added_services import TIME
+from dodo_dsl.plan.added_services import OWN_TIME, TIME, agent_flags, time_variables
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.state_folder import secured
 from dodo_dsl.template_cache import cache_home
 
 LIBRARY, AGENT = "libdodo-time.so", "dodo-time"
-SPARE_S = 10
-"""Seconds of its own time that the application has before the test begins."""
-_EPOCH_S = 1_700_000_000
-_SECOND = 1_000_000_000
+PAGE_DESTROYED = 3
+"""The exit code of the agent when the application destroyed the page that both share."""
 _BUILD_S = 120.0
-_POOLS = ("OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-"""Threads of the application run one at a time, so that pools of them only cost time."""
 _WAY_OUT = "run it with --clock lockstep or --clock realtime"
 
 
@@ -43,24 +39,19 @@ class ApplicationTime:
 
     def words(self, plan: Plan, folder: str, *, on_host: bool) -> tuple[str, ...]:
         """The agent's command, for a sandbox whose applications have process namespaces of their own."""
-        begin = _EPOCH_S * _SECOND
         others = ("--by-environment",) if on_host else ()
-        return (
-            str(self.agent), f"--folder={folder}", f"--services={len(plan.application.services)}",
-            f"--start={begin - SPARE_S * _SECOND}", f"--begin={begin}", f"--seed={plan.seed}", "--nested", *others,
-        )  # fmt: skip
+        flags = agent_flags(len(plan.application.services), plan.seed, folder)
+        return (str(self.agent), *flags, "--nested", *others)
 
     def variables(self, given: Mapping[str, str], plan: Plan, service: str, folder: str) -> dict[str, str]:
         """The ``given`` variables of a service of the application, with those that give it the test's time."""
         number = [each.name for each in plan.application.services].index(service)
-        preloaded = ":".join(filter(None, (str(self.library), given.get("LD_PRELOAD", ""))))
-        own = {"LD_PRELOAD": preloaded, "DODO_TIME": folder, "DODO_TIME_SERVICE": str(number)}
-        return {**dict.fromkeys(_POOLS, "1"), "PYTHONHASHSEED": str(plan.seed), **given, **own}
+        return time_variables(given, number, plan.seed, str(self.library), folder)
 
 
 def folder_of(slot: str) -> str:
     """Where library and agent meet; on the host, by the name of the test's slot."""
-    return f"/dev/shm/{slot}{TIME.partition('-')[2]}" if slot else f"/dev/shm/{TIME}"
+    return f"/dev/shm/{slot}{TIME.partition('-')[2]}" if slot else OWN_TIME
 
 
 @functools.cache

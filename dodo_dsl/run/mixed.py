@@ -17,7 +17,9 @@ from typing import Any
 
 from dodo_dsl.application import compose_paths
 from dodo_dsl.application.model import FILES, SANDBOX
+from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, agent_flags
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.run import application_time
 from dodo_dsl.run.backends import Job, Say
 from dodo_dsl.run.docker.backend import DockerBackend
 from dodo_dsl.run.docker.client import engine_error
@@ -34,17 +36,18 @@ from dodo_dsl.run.process.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Unmatched
 from dodo_dsl.run.rigs.session import attended
+from dodo_dsl.spec.model import VIRTUAL
 
 _PROGRAM = "sleep"
 _SEEN = ("/bin", "/lib", "/lib64", "/usr")
 """Folders of this machine that hold the program and its libraries."""
 
 
-def holder(slug: str) -> dict[str, Any]:
-    """The container in compose's words; it can do nothing but sleep."""
+def holder(slug: str, command: Sequence[str] = (), volumes: Sequence[str] = ()) -> dict[str, Any]:
+    """The container in compose's words; it can do nothing but sleep, or what the ``command`` does."""
     return {
         "image": IMAGE,
-        "entrypoint": [shutil.which(_PROGRAM, path=os.defpath) or f"/bin/{_PROGRAM}", "infinity"],
+        "entrypoint": [*command] or [shutil.which(_PROGRAM, path=os.defpath) or f"/bin/{_PROGRAM}", "infinity"],
         "user": "65534:65534",
         "init": True,
         "ipc": "shareable",
@@ -53,7 +56,7 @@ def holder(slug: str) -> dict[str, Any]:
         "cap_drop": ["ALL"],
         "security_opt": ["no-new-privileges:true"],
         "labels": {"dodo.test": slug, "dodo.layer": "sandbox"},
-        "volumes": ["tmp:/tmp", *_folders()],
+        "volumes": ["tmp:/tmp", *volumes, *_folders()],
     }
 
 
@@ -86,7 +89,7 @@ class ApplicationCompose(Compose):
         self._volumes = config.get("volumes") or {}
         own: dict[str, Any] = {}
         if self.plan.isolation == "network":
-            own["services"] = {SANDBOX: holder(self.plan.slug)}
+            own["services"] = {SANDBOX: self._holder()}
             network = config["networks"]["default"]
             planned = network["ipam"]["config"][0]["subnet"]
             subnet = {"config": [{"subnet": f"${{DODO_SUBNET:-{planned}}}"}]}
@@ -94,11 +97,21 @@ class ApplicationCompose(Compose):
             own["networks"] = {"default": {"driver_opts": options, "ipam": subnet}}
             options = compose_paths.escaped_values(self._volumes[_TMP].get("driver_opts") or {})
             own["volumes"] = {_TMP: {"driver_opts": options}}
+            if self.plan.clock == VIRTUAL:
+                place = str(application_time.built().library.parent)
+                own["volumes"][TIME] = {"driver_opts": {"type": "none", "o": "bind", "device": place}}
             self.services[SANDBOX] = own["services"][SANDBOX]
         if FILES in config["services"]:
             self.services[FILES] = copier(config["services"][FILES])
             own.setdefault("services", {})[FILES] = compose_paths.escaped_values(self.services[FILES])
         self._replacing = replacing(self.services, names, own)
+
+    def _holder(self) -> dict[str, Any]:
+        """It lets the application's time go on where that is the test's, with what this machine has built."""
+        if self.plan.clock != VIRTUAL:
+            return holder(self.plan.slug)
+        flags = agent_flags(len(self.plan.application.services), self.plan.seed)
+        return holder(self.plan.slug, (f"{TIME_MOUNT}/{application_time.AGENT}", *flags), (f"{TIME}:{TIME_MOUNT}",))
 
     def _masks(self) -> tuple[dict[str, Any], list[str]]:
         """With mounts over the folders in ``/tmp`` where DoDo's processes have theirs: so no container removes them."""

@@ -18,7 +18,7 @@ from dodo_dsl.diagnostics import did_you_mean
 
 Findings = Iterator[AccessFinding]
 Values = Mapping[str, Any]
-OWN_VOLUMES = ("tmp", "report")
+OWN_VOLUMES = ("tmp", "report", "dodo-time")
 """The names of DoDo's own volumes in a test; an application's volumes of these names get others."""
 RUNTIMES = ("nvidia", "runc", "runsc")
 NETWORKS = ("", "default", "none")

@@ -27,6 +27,7 @@ _STEPS: tuple[Callable[[ServiceCopy], None], ...] = (
     confinement.confine,
     service_namespaces.own_namespaces,
     volumes.own_mounts,
+    service_namespaces.own_time,
     service_namespaces.own_dependencies,
 )
 
@@ -83,7 +84,7 @@ def _project(application: ApplicationSource, setting: Setting, services: Iterabl
         paths, containers=application.containers, ports=access.ports, limits=setting.limits, passed=access.passed
     )
     copies = volumes.FileCopies(paths, application.known, services, named)
-    return ComposeProject(setting, frozenset(application.services), look, application.known, copies)
+    return ComposeProject(setting, tuple(application.services), look, application.known, copies)
 
 
 def _relative(path: Path, folder: Path) -> str:

@@ -3,7 +3,7 @@
 The CID is set by flag or by variable.
 """
 
-from collections.abc import Mapping, MutableSequence
+from collections.abc import Collection, Mapping, MutableSequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ class Setting:
 
     ``waits`` are the services of DoDo after which the application starts. Devices stay only with ``hil``, privileges
     only with ``privileged_allowed`` as well. ``limits`` is what a service gets that sets none, and ``given`` are
-    variables that the test sets.
+    variables that the test sets. With a ``time_seed``, the application's own time is the test's.
     """
 
     cid: int
@@ -38,6 +38,7 @@ class Setting:
     privileged_allowed: bool = False
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     given: tuple[tuple[str, str], ...] = ()
+    time_seed: int | None = None
 
     @property
     def own_network(self) -> bool:
@@ -50,13 +51,14 @@ class Setting:
 
 @dataclass(frozen=True)
 class ComposeProject:
-    """What the services of one copy share: the ``names`` of those that start, and the variables that are ``known``.
+    """What the services of one copy share: the ``names`` of those that start, in order.
 
-    ``look`` judges what they may have, and ``copies`` are the folders of the repository that the test copies.
+    ``known`` are the variables that are known, ``look`` judges what they may have, and ``copies`` are the folders of
+    the repository that the test copies.
     """
 
     setting: Setting
-    names: frozenset[str]
+    names: Collection[str]
     look: Look
     known: Mapping[str, str] = field(default_factory=dict)
     copies: "FileCopies | None" = None

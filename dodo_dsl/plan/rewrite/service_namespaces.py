@@ -4,7 +4,8 @@ from collections.abc import Collection
 from typing import Any
 
 from dodo_dsl.application import host_access
-from dodo_dsl.application.model import FILES, SANDBOX
+from dodo_dsl.application.model import FILES, SANDBOX, environment
+from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
 from dodo_dsl.plan.rewrite.service_copy import ServiceCopy
 
 
@@ -74,6 +75,27 @@ def _without_network(sysctls: Any) -> Any:
     if isinstance(sysctls, dict):
         return {key: value for key, value in sysctls.items() if not str(key).startswith("net.")}
     return [item for item in sysctls if not str(item).startswith("net.")]
+
+
+def own_time(copy: ServiceCopy) -> None:
+    """Its time is the test's: a library in its programs, and the processes where the agent sees them."""
+    service, seed = copy.service, copy.setting.time_seed
+    if seed is None or not copy.setting.own_network:
+        return
+    given = {name: value or "" for name, value in environment(service.get("environment")).items()}
+    number = list(copy.project.names).index(copy.name)
+    variables = time_variables(given, number, seed, f"{TIME_MOUNT}/libdodo-time.so")
+    added = {name: value for name, value in variables.items() if given.get(name) != value}
+    raw = service.get("environment") or {}
+    if isinstance(raw, list):
+        kept = [item for item in raw if str(item).partition("=")[0] not in added]
+        service["environment"] = [*kept, *(f"{name}={value}" for name, value in added.items())]
+    else:
+        service["environment"] = {**raw, **added}
+    service["pid"] = f"service:{SANDBOX}"
+    mount = {"type": "volume", "source": TIME, "target": TIME_MOUNT, "read_only": True}
+    service["volumes"] = [*(service.get("volumes") or []), mount]
+    copy.note(f"environment: {', '.join(added)}, pid and a volume, as its time is the test's")
 
 
 def own_dependencies(copy: ServiceCopy) -> None:

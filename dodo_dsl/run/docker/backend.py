@@ -18,6 +18,7 @@ from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
 from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import hearers, that_hear
+from dodo_dsl.run.application_time import PAGE_DESTROYED
 from dodo_dsl.run.docker import shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
 from dodo_dsl.run.docker.client import engine_error
@@ -103,10 +104,10 @@ class DockerBackend:
         return self.plan.isolation == "host"
 
     async def open(self) -> None:
-        if self.plan.clock == VIRTUAL:
+        if self.plan.clock == VIRTUAL and self.is_on_host:
             raise BackendError(
-                "clock: virtual runs on processes only: give each service of the application 'x-dodo-process', "
-                "and run with --backend process"
+                "clock: virtual needs a network of the test's own where the application runs in containers: "
+                "remove 'isolation: host', or run with --backend process"
             )
         await self._compose.read()
         await self._require_files()
@@ -174,6 +175,8 @@ class DockerBackend:
         elif action == "die" and name in self._outputs:
             task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
             task.add_done_callback(lambda t: t.exception())
+        elif action == "die" and name == SANDBOX and attributes.get("exitCode") == str(PAGE_DESTROYED):
+            pass  # the clock says it
         elif action == "die":
             self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
 

@@ -36,8 +36,6 @@ from dodo_dsl.spec.model import VIRTUAL
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
-PAGE_DESTROYED = 3
-"""The exit code of what gives the application the test's time, where that destroyed its page."""
 MOST_NAMED = 5
 """Hidden files that a note names."""
 _OF_SANDBOX = ("bwrap:", "setpriv:")
@@ -135,7 +133,7 @@ class ProcessBackend:
         if exited == TIME:
             if self._time_ready:
                 self._time_ready.set()
-            if self._has_time and code not in (0, PAGE_DESTROYED):  # which the clock says
+            if self._has_time and code not in (0, application_time.PAGE_DESTROYED):  # which the clock says
                 self._events.put_nowait(Lost(f"what gives the application the test's time {how_it_ended(code)}"))
             return
         if failed:

@@ -498,7 +498,7 @@ static void read_options(int count, char **words)
         {"folder", required_argument, NULL, 'f'}, {"services", required_argument, NULL, 'n'},
         {"start", required_argument, NULL, 's'}, {"begin", required_argument, NULL, 'b'},
         {"seed", required_argument, NULL, 'r'}, {"clock-uid", required_argument, NULL, 'u'},
-        {"nested", no_argument, NULL, 'p'}, {"by-environment", no_argument, NULL, 'e'}, {0}};
+        {"nested", no_argument, NULL, 'p'}, {"version", no_argument, NULL, 'v'}, {"by-environment", no_argument, NULL, 'e'}, {0}};
     for (int option; (option = getopt_long(count, words, "", known, NULL)) != -1;)
         switch (option) {
         case 'f': options.folder = optarg; break;
@@ -509,6 +509,7 @@ static void read_options(int count, char **words)
         case 'u': options.clock_uid = strtol(optarg, NULL, 10); break;
         case 'p': options.nested = true; break;
         case 'e': options.by_environment = true; break;
+        case 'v': printf("%d\n", TIME_VERSION); exit(0);
         default: exit(2);
         }
     if (!options.folder || options.services < 1 || options.services > TIME_SERVICES || options.begin_ns < options.start_ns) {

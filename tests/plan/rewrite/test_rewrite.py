@@ -34,7 +34,7 @@ services:
 """
 
 
-def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> Application:
+def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network", seed: int | None = None) -> Application:
     folder = tmp_path / "team"
     folder.mkdir()
     (folder / "docker-compose.yml").write_text(text)
@@ -42,7 +42,8 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network") -> 
     source, problems = read_application(folder / "docker-compose.yml")
     assert problems == []
     assert source is not None
-    return plan_application(source, Setting(140, isolation, tmp_path / "generated" / "my-test", ("track",)))
+    folder = tmp_path / "generated" / "my-test"
+    return plan_application(source, Setting(140, isolation, folder, ("track",), time_seed=seed))
 
 
 def test_own_network(tmp_path: Path) -> None:
@@ -96,6 +97,24 @@ def test_host_network_keeps_what_is_host(tmp_path: Path) -> None:
     assert perception["ipc"] == "host"
     assert "/tmp:/tmp" in perception["volumes"]
     assert perception["depends_on"] == {"track": {"condition": "service_healthy"}}
+
+
+def test_its_time_is_the_test_s(tmp_path: Path) -> None:
+    """Also where variables are a list; what the file sets itself stays."""
+    text = COMPOSE.replace("- GAIN=2", "- GAIN=2\n      - OMP_NUM_THREADS=4\n      - LD_PRELOAD=/own.so")
+    services = planned(tmp_path, text, seed=7).compose["services"]
+    mount = {"type": "volume", "source": "dodo-time", "target": "/opt/dodo/time", "read_only": True}
+    for number, name in enumerate(("perception", "steering")):
+        assert services[name]["pid"] == "service:sandbox"
+        assert services[name]["volumes"][-1] == mount
+        variables = services[name]["environment"]
+        pairs = dict(item.split("=", 1) for item in variables) if isinstance(variables, list) else variables
+        assert pairs["DODO_TIME_SERVICE"] == str(number)
+        assert pairs["DODO_TIME"] == "/dev/shm/dodo-time"
+        assert pairs["PYTHONHASHSEED"] == "7"
+    assert services["perception"]["environment"]["LD_PRELOAD"] == "/opt/dodo/time/libdodo-time.so"
+    assert "LD_PRELOAD=/opt/dodo/time/libdodo-time.so:/own.so" in services["steering"]["environment"]
+    assert "OMP_NUM_THREADS=4" in services["steering"]["environment"]
 
 
 def test_processes(tmp_path: Path) -> None:
