@@ -16,7 +16,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -30,6 +32,7 @@ enum {
     END_MS = 100,         /* between looks whether the test is over */
     REPORT_MS = 500,      /* between reports on a busy thread */
     START_PATIENCE_S = 3, /* for services that have not begun yet, since the last one did */
+    START_MOST_S = 40,    /* then the clock says which did not */
     UNSEEN_WAIT_MS = 1000, /* that all must sleep, if one of them does not wait in the library and it is not known where */
     SHORTEST_NAP_US = 20,
     LONGEST_NAP_US = 1000,
@@ -46,7 +49,9 @@ static struct options {
 } options = {.services = 1, .clock_uid = -1};
 
 static struct time_page *page;
-static int command_file = -1, reply_file = -1, wakers[TIME_SLOTS];
+static int folder_file = -1, command_file = -1, reply_file = -1, wakers[TIME_SLOTS];
+static int64_t now_ns; /* the page tells it, and is written to by strangers */
+static bool is_overwritten, has_begun[TIME_SERVICES];
 static uint32_t waits_unseen[TIME_SLOTS]; /* one more than `wake` of a thread that was found to wait elsewhere, or has ended */
 static uint64_t grants;
 static uint32_t notes_told;
@@ -82,20 +87,26 @@ static void reply(const char *line)
         fprintf(stderr, "dodo-time: a reply was lost\n");
 }
 
-static void on_truncated_page(int number)
+/* The page is truncated, or a waker replaced. Until the clock reads that, it stays in the FIFO only as long as that is open. */
+static void on_destroyed(int number)
 {
     static const char line[] = "{\"destroyed\": true}\n";
+    int unread = 1;
     (void)number;
     if (write(reply_file, line, sizeof line - 1) < 0)
         _exit(1);
+    while (!is_over && !ioctl(reply_file, FIONREAD, &unread) && unread)
+        poll(NULL, 0, END_MS);
     _exit(DESTROYED);
 }
 
-/* The test is over: the application, which ends now, too, goes on as it likes until nothing of it is left. */
-static void on_end(int number)
+/* The test is over: the application, which ends now, too, goes on as it likes until nothing of it is left.
+ * As process 1 of a container, whose processes are the application's, the agent takes that from outside alone. */
+static void on_end(int number, siginfo_t *about, void *context)
 {
-    (void)number;
-    is_over = 1;
+    (void)number, (void)context;
+    if (getpid() != 1 || about->si_pid == 0)
+        is_over = 1;
 }
 
 static long futex(_Atomic uint32_t *word, int operation, uint32_t value, const struct timespec *timeout)
@@ -165,13 +176,15 @@ static struct time_slot *first_due(int64_t limit_ns, int64_t *due_ns)
 /* Wakes a thread that polls; what is in the folder is the agent's own. */
 static void write_waker(unsigned at)
 {
-    char name[16], path[4096];
+    char name[16];
+    struct stat found;
     if (!wakers[at]) {
         snprintf(name, sizeof name, "w%u", at);
-        path_of(path, sizeof path, name);
-        wakers[at] = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW);
+        wakers[at] = openat(folder_file, name, O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW);
+        if (wakers[at] < 0 || fstat(wakers[at], &found) || !S_ISFIFO(found.st_mode))
+            on_destroyed(0);
     }
-    if (wakers[at] < 0 || (write(wakers[at], "!", 1) < 0 && errno != EAGAIN))
+    if (write(wakers[at], "!", 1) < 0 && errno != EAGAIN)
         fail("a thread cannot be woken");
 }
 
@@ -216,8 +229,33 @@ static void note_unseen_waits(void)
 
 static void advance(int64_t to_ns)
 {
-    if (to_ns > page->now_ns)
-        page->now_ns = to_ns;
+    if (to_ns > now_ns)
+        now_ns = to_ns;
+    page->now_ns = now_ns;
+}
+
+static bool is_header_whole(void)
+{
+    return page->magic == TIME_MAGIC && page->version == TIME_VERSION && page->slots == TIME_SLOTS && page->now_ns == now_ns
+           && page->monotonic_base_ns == options.start_ns - 1000 * SECOND && page->seed == options.seed;
+}
+
+static void write_header(void)
+{
+    page->version = TIME_VERSION;
+    page->slots = TIME_SLOTS;
+    page->now_ns = now_ns;
+    page->monotonic_base_ns = options.start_ns - 1000 * SECOND;
+    page->seed = options.seed;
+    page->magic = TIME_MAGIC;
+}
+
+static void repair_header(void)
+{
+    if (is_header_whole())
+        return;
+    is_overwritten = true;
+    write_header();
 }
 
 /* -- replies -------------------------------------------------------------------------------------------------------- */
@@ -251,7 +289,8 @@ static int add_notes(char *text, size_t size)
     uint32_t written = page->notes, first = notes_told;
     if (written - first > TIME_NOTES)
         first = written - TIME_NOTES;
-    int length = 0;
+    int length = is_overwritten ? snprintf(text, size, "{\"kind\": \"page\", \"service\": -1, \"name\": \"\"}") : 0;
+    is_overwritten = false;
     for (uint32_t at = first; at != written && (size_t)length < size - 160; at++) {
         struct time_message *note = &page->note[at % TIME_NOTES];
         uint32_t kind = note->kind;
@@ -272,12 +311,12 @@ static void report_time(void)
     char line[4000], services[512] = "", notes[2800] = "";
     int length = 0;
     for (unsigned at = 0; at < options.services; at++)
-        if (page->processes[at])
+        if (has_begun[at])
             length += snprintf(services + length, sizeof services - (size_t)length, "%s%u", length ? ", " : "", at);
     add_notes(notes, sizeof notes);
     snprintf(line, sizeof line,
              "{\"now\": %lld, \"grants\": %llu, \"services\": [%s], \"repeatable\": %s, \"notes\": [%s]}\n",
-             (long long)page->now_ns, (unsigned long long)grants, services, is_repeatable ? "true" : "false", notes);
+             (long long)now_ns, (unsigned long long)grants, services, is_repeatable ? "true" : "false", notes);
     reply(line);
 }
 
@@ -319,6 +358,7 @@ static bool await_quiet(void)
         if (processes_are_quiet(is_strict)) {
             note_unseen_waits();
             free_dead_slots();
+            repair_header();
             return true;
         }
         asleep_since = !is_strict || !processes_are_quiet(false) ? 0 : asleep_since ? asleep_since : now;
@@ -369,7 +409,7 @@ static unsigned begun_services(void)
 {
     unsigned count = 0;
     for (unsigned at = 0; at < options.services; at++)
-        count += page->processes[at] > 0;
+        count += has_begun[at] |= page->processes[at] > 0;
     return count;
 }
 
@@ -377,8 +417,8 @@ static unsigned begun_services(void)
 static void start(void)
 {
     unsigned known = 0;
-    int64_t since = wall_ns();
-    while (begun_services() < options.services && !has_ended && !is_over) {
+    int64_t since = wall_ns(), end = since + START_MOST_S * SECOND;
+    while (begun_services() < options.services && wall_ns() < end && !has_ended && !is_over) {
         if (begun_services() != known) {
             known = begun_services();
             since = wall_ns();
@@ -392,6 +432,7 @@ static void start(void)
         usleep(2000);
     }
     run(options.begin_ns);
+    begun_services();
     is_serving = true;
 }
 
@@ -454,12 +495,8 @@ static void make_page(void)
     if (page == MAP_FAILED)
         fail(path);
     close(file);
-    page->version = TIME_VERSION;
-    page->slots = TIME_SLOTS;
-    page->now_ns = options.start_ns;
-    page->monotonic_base_ns = options.start_ns - 1000 * SECOND;
-    page->seed = options.seed;
-    page->magic = TIME_MAGIC;
+    now_ns = options.start_ns;
+    write_header();
 }
 
 static void set_up(void)
@@ -470,7 +507,7 @@ static void set_up(void)
         setrlimit(RLIMIT_NOFILE, &files);
     }
     umask(0);
-    if (mkdir(options.folder, 0755))
+    if (mkdir(options.folder, 0755) || (folder_file = open(options.folder, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)) < 0)
         fail(options.folder);
     make_page();
     for (unsigned at = 0; at < TIME_SLOTS; at++) {
@@ -480,8 +517,8 @@ static void set_up(void)
     }
     command_file = make_channel("command");
     reply_file = make_channel("reply");
-    signal(SIGTERM, on_end);
-    signal(SIGBUS, on_truncated_page);
+    sigaction(SIGTERM, &(struct sigaction){.sa_sigaction = on_end, .sa_flags = SA_SIGINFO | SA_RESTART}, NULL);
+    signal(SIGBUS, on_destroyed);
     char path[4096];
     path_of(path, sizeof path, "ready");
     int file = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
@@ -523,6 +560,7 @@ int main(int count, char **words)
 {
     read_options(count, words);
     signal(SIGCHLD, SIG_IGN); /* as process 1 of a container it would have to wait for orphans */
+    prctl(PR_SET_DUMPABLE, 0); /* in a container the application may have the same user: it must not trace the agent */
     set_up();
     processes_init(&(struct selection){options.nested, options.by_environment ? options.folder : NULL});
     start();
