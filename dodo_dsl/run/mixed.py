@@ -49,7 +49,7 @@ def holder(slug: str, command: Sequence[str] = (), volumes: Sequence[str] = ()) 
         "image": IMAGE,
         "entrypoint": [*command] or [shutil.which(_PROGRAM, path=os.defpath) or f"/bin/{_PROGRAM}", "infinity"],
         "user": "65534:65534",
-        "init": True,
+        "init": not command,  # as the first process, no other of its namespace can end it
         "ipc": "shareable",
         "shm_size": "256m",
         "read_only": True,

@@ -8,6 +8,7 @@ on and on without waiting is named.
 import json
 import os
 import select
+import stat
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -177,7 +178,11 @@ class TimeAgent:
 
 
 def _opened(path: Path, access: int) -> int:
-    return os.open(path, access | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOFOLLOW)
+    descriptor = os.open(path, access | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOFOLLOW)
+    if not stat.S_ISFIFO(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(f"{path} is no FIFO")
+    return descriptor
 
 
 @dataclass
@@ -379,7 +384,7 @@ class VirtualApplication:
     def _tell(self, reached: Reached) -> None:
         """Notes of the application's processes become the test's, each once; raises ServiceSilent."""
         missing = [name for number, name in enumerate(self._names) if number not in reached.begun]
-        if missing:
+        if missing and not self.frames:
             raise ServiceSilent(
                 f"service '{missing[0]}' never loaded DoDo's clock, as programs do not that are statically linked or "
                 "of another C library: run the test with --clock lockstep or --clock realtime"
@@ -401,5 +406,6 @@ _SENTENCES = {
     "static": "service '{service}' started '{name}', a statically linked program, which keeps the machine's time",
     "setuid": "service '{service}' started '{name}', which changes its user and so keeps the machine's time",
     "slots": "service '{service}' has more threads than DoDo's clock can tell the time ('{name}')",
+    "page": "the application wrote into what gives it the test's time; DoDo put right what others read there",
     "spin": "a thread of service '{service}' asks for the time again and again without waiting ('{name}')",
 }

@@ -301,6 +301,8 @@ class ProcessBackend:
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
         confined = confinement(command.folder, self.isolation, self.cid, limits, hidden)
+        if self._has_time:
+            confined = replace(confined, time=self._commands.time_folder)
         return asdict(replace(confined, masked=command.masked))
 
     @functools.cached_property

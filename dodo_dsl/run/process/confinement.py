@@ -40,6 +40,8 @@ class Confinement:
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     masked: tuple[str, ...] = ()
+    time: str = ""
+    """The folder by which it gets the test's time, where it may write into the page and wake its threads."""
 
 
 def confinement(folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
@@ -153,6 +155,7 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
             seen += ["--ro-bind-try", path, path]
     seen += ["--proc", "/proc", "--dev", "/dev"]
     seen += [word for path, source in mounts.shared.items() for word in ("--bind", str(source), path)]
+    seen += _time(confined.time)
     seen += [word for path in _EMPTY for word in ("--perms", "0755", "--dir", path)]
     read = (*_shown(confined, program), *confined.reads)
     hidden = _outermost(filter(os.path.exists, confined.hidden), (*read, confined.folder))
@@ -168,6 +171,15 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
         if path not in around:
             seen += _mask(path, read, mounts)
     return [*seen, *(word for path in (*covered, "/dev", "/") for word in ("--remount-ro", path))]
+
+
+def _time(folder: str) -> list[str]:
+    """No file there can be replaced, also where the application's user is DoDo's own; FIFOs can be written to."""
+    if not folder:
+        return []
+    page = f"{folder}/page"
+    channels = [word for name in ("command", "reply") for word in ("--ro-bind", os.devnull, f"{folder}/{name}")]
+    return ["--ro-bind", folder, folder, "--bind", page, page, *channels]
 
 
 def _mask(path: str, read: Sequence[str], mounts: Mounts) -> list[str]:

@@ -100,6 +100,17 @@ def test_a_program_elsewhere_is_shown_and_its_folder_is_not() -> None:
     assert not {"/srv", "/srv/bin", "/", "/home", "/var"} & set(bound)
 
 
+def test_what_gives_it_the_time_can_be_written_to_and_not_replaced() -> None:
+    """Also where its user is DoDo's: the agent's FIFOs to the clock are not there."""
+    argv = sandbox_words(Confinement("/app", "network", 130, time="/dev/shm/t"), MOUNTS, "/usr/bin/true", None, 5)
+    at = argv.index("/dev/shm/t")
+    assert argv[at - 1 : at + 5] == ["--ro-bind", "/dev/shm/t", "/dev/shm/t", "--bind", *["/dev/shm/t/page"] * 2]
+    assert argv[at + 5 : at + 11] == [
+        *("--ro-bind", "/dev/null", "/dev/shm/t/command"),
+        *("--ro-bind", "/dev/null", "/dev/shm/t/reply"),
+    ]
+
+
 def test_as_root_another_user_starts_it() -> None:
     argv = sandbox_words(Confinement("/app", "network", 130), MOUNTS, "/usr/bin/true", 64_130, 5)
     assert argv[argv.index("setpriv") + 1 :][:2] == ["--reuid=64130", "--regid=64130"]
