@@ -72,6 +72,7 @@ def built() -> ApplicationTime:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not _is_ready(folder):
             _build(sources, folder)
+            folder.chmod(0o755)  # programs of other users load it
     return ApplicationTime((folder / LIBRARY).resolve(), (folder / AGENT).resolve())
 
 

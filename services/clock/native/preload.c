@@ -15,7 +15,7 @@
 #include <sys/prctl.h>
 #include <sys/stat.h>
 
-enum stage { NEW, STARTING, STARTED, OUTSIDE };
+enum stage { NEW, STARTING, STARTED };
 
 struct real_functions real;
 __thread struct self self __attribute__((tls_model("initial-exec")));
@@ -311,12 +311,6 @@ static void begin_as_ready(void)
     pass_gate();
 }
 
-/* A health check of a container's, or a command that somebody runs in it, keeps the machine's time: nobody grants it. */
-static bool is_from_outside(void)
-{
-    return RAW_1(SYS_getppid, 0) == 0 && !getenv("DODO_TIME_PROCESS") && page->processes[service] > 0;
-}
-
 static void start(void)
 {
     int error = errno;
@@ -326,12 +320,6 @@ static void start(void)
     open_page();
     given = getenv("DODO_TIME_SERVICE");
     service = given ? (uint32_t)strtoul(given, NULL, 10) % TIME_SERVICES : 0;
-    if (is_from_outside()) {
-        unsetenv("LD_PRELOAD"); /* nor do its children */
-        stage = OUTSIDE;
-        errno = error;
-        return;
-    }
     take_process_number();
     adopt_slot(take_slot(process, next_thread_number()));
     processes_start();
@@ -344,7 +332,7 @@ bool is_managed(void)
 {
     if (self.slot)
         return true;
-    if (self.has_ended || stage == STARTING || stage == OUTSIDE)
+    if (self.has_ended || stage == STARTING)
         return false;
     if (stage == NEW)
         start();
@@ -353,8 +341,29 @@ bool is_managed(void)
     return self.slot != NULL;
 }
 
-__attribute__((constructor)) static void on_load(void)
+/* A health check of a container's, or a command that somebody runs in it, keeps the machine's time: nobody would let it
+ * go on. It begins again without the library. */
+static void leave_to_outside(char **words)
 {
+    const char *given = getenv("DODO_TIME_SERVICE");
+    if (stage != NEW || RAW_1(SYS_getppid, 0) != 0 || getenv("DODO_TIME_PROCESS"))
+        return;
+    open_page();
+    if (!page->processes[(given ? strtoul(given, NULL, 10) : 0) % TIME_SERVICES])
+        return;
+    const char *loaded = getenv("LD_PRELOAD"), *others = loaded ? strchr(loaded, ':') : NULL;
+    if (others)
+        setenv("LD_PRELOAD", others + 1, 1);
+    else
+        unsetenv("LD_PRELOAD");
+    RAW_3(SYS_execve, "/proc/self/exe", words, environ);
+    fail("a command that was run in the container cannot keep the machine's time");
+}
+
+__attribute__((constructor)) static void on_load(int count, char **words)
+{
+    (void)count;
+    leave_to_outside(words);
     is_managed();
 }
 
