@@ -187,7 +187,7 @@ def _shared(plan: Plan, service: PlannedService) -> list[str]:
 
 
 def _shared_mount(name: str) -> Mapping[str, Any]:
-    """The place to which the test's link leads in a container."""
+    """The position to which the test's link leads in a container."""
     return {**FILES_MOUNT, "source": f"../{SHARED}/{name}", "target": f"/{SHARED}/{name}"}
 
 

@@ -168,10 +168,10 @@ def pipeline_problems(
 
 
 def artifact_problems(compiled: "Compiled", options: JobOptions) -> list[Diagnostic]:
-    """A warning where the files of all tests together are larger than the artifact of the parent may be.
+    """A warning if the files of all tests together are larger than the artifact of the parent may be.
 
     GitLab accepts 100 MB (``max_artifacts_size``) unless an administrator allows more, and gitlab.com 1 GB. It counts
-    what is packed, which recordings of pictures hardly become smaller by. Sources as of ``pipeline_problems``.
+    what is packed, which recordings of frames hardly become smaller by. Sources as of ``pipeline_problems``.
     """
     if not options.artifact_mb:
         return []

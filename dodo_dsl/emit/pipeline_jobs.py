@@ -129,7 +129,7 @@ class JobOptions:
 
     @property
     def backend(self) -> str:
-        """Images that were built are what is tested, even where the application could run as processes."""
+        """Images that were built are what is tested, even if the application could run as processes."""
         return "docker" if self.images else ""
 
 

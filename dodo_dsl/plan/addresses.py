@@ -18,7 +18,7 @@ def _number(name: str, count: int) -> int:
 
 
 def cids(names: Sequence[str], isolations: Sequence[str], available: Sequence[int]) -> list[int]:
-    """A CID for each test: unique while the range lasts, beyond it only tests on a network of their own share one.
+    """A CID for each test: unique while the range lasts, beyond it only tests on their own network share one.
 
     Tests on the host network come first. Raises OutOfAddresses when they alone are more than the range.
     """

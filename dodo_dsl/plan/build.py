@@ -110,7 +110,7 @@ def _defaults(plans: Sequence[Plan], manifests: Mapping[str, Manifest]) -> dict[
 
 
 def _in_repository(deployment: Deployment, out: Path) -> Callable[[Path], bool]:
-    """Whether a job that checks out the repository has a file; raises FilesError where ``out`` cannot link to it."""
+    """Whether a job that checks out the repository has a file; raises FilesError if ``out`` cannot link to it."""
     root = deployment.root.resolve()
     if not out.is_relative_to(root):
         raise FilesError(f"--files repository needs an output folder in the repository '{root}', and '{out}' is none")
@@ -125,7 +125,7 @@ def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
 
 
 def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
-    """A volume that the engine cannot make for a test, as its name has to tell tests apart."""
+    """A volume that the engine cannot make for a test, because its name has to tell tests apart."""
     name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
     if not name:
         return None
@@ -155,7 +155,7 @@ def _import_paths(deployment: Deployment, folder: Path) -> tuple[str, ...]:
 def _cids(tests: Sequence[ResolvedTest], deployment: Deployment, built_in: int | None) -> list[int]:
     """A CID for each instance: its rig's, the one that is built into the application, or one of the range.
 
-    Tests may have the same one that is built in: those on networks of their own do not hear each other, and those on
+    Tests may have the same one that is built in: those on their own networks do not hear each other, and those on
     the host's wait for each other's leases.
     """
     reserved = [cid if test.rig and (cid := test.rig.cid) is not None else built_in for test in tests]
@@ -273,6 +273,7 @@ class _Builder:
             baseline=resolved_baseline(spec).values,
             import_paths=self.shared.imports,
             source_map=self.places,
+            timed=tuple(name for name, _ in self.application.timed),
         )
 
     def _subnet(self, services: Sequence[PlannedService]) -> str:
@@ -297,7 +298,7 @@ class _Builder:
         return tuple((name, e.value.text) for name, e in self.spec.variables.items() if isinstance(e.value, Scalar))
 
     def _messages(self) -> tuple[str, ...]:
-        """The deployment's messages, copied beside the test for its services to read."""
+        """The deployment's messages, copied next to the test for its services to read."""
         targets = [f"messages/{number}-{path.name}" for number, path in enumerate(self.deployment.messages)]
         self.files.update(
             FileCopy(t, path.resolve()) for t, path in zip(targets, self.deployment.messages, strict=True)
