@@ -13,7 +13,7 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.application.model import FILES
-from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, containers, copy_command
+from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, Variable, containers, copy_command
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions
 from dodo_dsl.plan.added_services import RECORDER
@@ -125,6 +125,18 @@ def _word(text: str) -> str:
     return text if _PLAIN.fullmatch(text) and text.lower() not in _WORDS else json_text(text)
 
 
+@functools.lru_cache(maxsize=_MOST_BLOCKS)
+def _variables(variables: tuple[Variable, ...], spaces: int) -> str:
+    """Environment variables, each below what it is for; a list of words that is long has a line for each."""
+    lines = []
+    for variable in variables:
+        lines += [f"# {variable.note}"] if variable.note else []
+        words = variable.lines
+        lines += [f"{variable.name}: >-", *(f"  {word}" for word in words)] if words else []
+        lines += [] if words else [f"{variable.name}: {_word(variable.value)}"]
+    return _indented(lines, spaces)
+
+
 def _within(value: Any) -> str:
     """A value between braces, where commas and colons say something."""
     return _yaml(value) if isinstance(value, str) and ("," in value or ":" in value) else _plain(value)
@@ -139,7 +151,9 @@ def _templates() -> jinja2.Environment:
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
         keep_trailing_newline=True,
     )
-    environment.filters.update(yaml=_yaml, plain=_plain, application=_application, dotenv=dotenv_line)
+    environment.filters.update(
+        yaml=_yaml, plain=_plain, variables=_variables, application=_application, dotenv=dotenv_line
+    )
     return environment
 
 
