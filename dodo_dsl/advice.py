@@ -75,7 +75,7 @@ def install(extra: str) -> str:
 
 
 def as_root(*commands: str) -> str:
-    """Commands for root, one after the other, as this user types them."""
+    """Commands for root, one after the other, in the form for this user."""
     return " && ".join(commands if os.geteuid() == 0 else [f"sudo {command}" for command in commands])
 
 

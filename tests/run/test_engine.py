@@ -483,7 +483,7 @@ def test_what_the_application_must_not_send_fails_the_test_whenever_it_is_read()
 
 
 def test_a_verdict_says_what_the_application_is_told() -> None:
-    told = "the application is told its true pose (opendlv.sim.Frame)"
+    told = "the application gets its true pose (opendlv.sim.Frame)"
     for stages, expected in ((drives(), f"it drove; {told}"), ({**READY, "begin": [(1.0, Lost("gone"))]}, "gone")):
         found = outcome(ScriptedBackend(replace(plan(), told=("opendlv.sim.Frame",)), stages))
         assert found.reason == expected
