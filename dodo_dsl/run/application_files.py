@@ -1,6 +1,6 @@
 """Files next to a compiled test: those that the application reads, its secrets, and what it never sees.
 
-Files of tests among an application's own are known by what they are, as their users choose the names: specs and what
+Files of tests among an application's own are known by what they are, because users choose the names: specs and what
 they name, maps, recordings, compiled tests and reports.
 """
 

@@ -240,7 +240,7 @@ EVERY, BLOCKS = "*", "blocks"
 def pick_walls(
     known: Obstacles, names: Sequence[str], others: Collection[str], path: Path, height: float
 ) -> dict[str, shapely.Geometry]:
-    """Obstacles, and blocks by their names, that a vehicle of ``height`` m must not touch; ``others`` are no walls.
+    """Obstacles, and blocks by their names, that a vehicle of ``height`` m must not touch; ``others`` are not walls.
 
     Raises ObstaclesError for a name that is neither, and if nothing stands in the vehicle's path.
     """

@@ -136,7 +136,7 @@ class ThreadTimes:
     """Adds up, from call to call, what the threads of services ran, and how long each service waited.
 
     A service waits as long as the thread of it that ran the most between two calls, as that does its work: threads that
-    wait side by side do not make its wait longer, and those that only look for something to do are no loss.
+    wait side by side do not make its wait longer, and those that only look for something to do cost nothing.
     """
 
     def __init__(self, proc: Path = Path("/proc")) -> None:
