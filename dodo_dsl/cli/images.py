@@ -229,7 +229,7 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     found = choose(options.name, (*names, *own), prefix, options.tag or deployment.image_tag)
     if options.name:
         return found
-    is_left = options.action == "sbom"  # what an image of somebody else's is made of, it may not be able to tell
+    is_left = options.action == "sbom"  # it may not know what somebody else's image is made of
     return [image for image in found if image.name not in own or (own[image.name] and not is_left)]
 
 

@@ -124,7 +124,7 @@ def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
 
 
 def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
-    """A volume that the engine cannot make for a test, because its name has to tell tests apart."""
+    """A volume that the engine cannot make for a test, because its name has to distinguish tests."""
     name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
     if not name:
         return None

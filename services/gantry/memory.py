@@ -47,7 +47,7 @@ def wanted(text: str | None, conversion: Conversion) -> dict[str, float]:
 
     They are its firmware's, by which no place, speed or acceleration is beyond the true limit, but where that is
     narrower than the memory can have: then it has the narrowest, and the programs that move the rig keep the true one.
-    Raises PortError for a text that is no such list.
+    Raises PortError for a text that is not such a list.
     """
     circle = conversion.circle
     found = {name: widest for name, (_, widest) in LIMITS.items()} | ({"yaw": CIRCLE_YAW} if circle else {})

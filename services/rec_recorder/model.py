@@ -26,7 +26,7 @@ class FloodError(RuntimeError):
 
 
 Kind = tuple[int, int]
-"""A message's id and sender stamp; the id is 0 for those that are too many to be told apart."""
+"""A message's id and sender stamp; the id is 0 for those that are too many to be counted separately."""
 
 
 class Traffic:

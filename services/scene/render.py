@@ -1,8 +1,8 @@
 """Pictures of a scene from anywhere, drawn with OpenCV and numpy.
 
 What was drawn from one place is moved to where it is seen from another close to it. Models move as wholes, by the shift
-and the scale of the middle of each. While a shutter is open that cannot be told from a new drawing, and saves culling,
-shading and sorting once more.
+and the scale of the middle of each. While a shutter is open that cannot be distinguished from a new drawing, and saves
+culling, shading and sorting once more.
 """
 
 import math
