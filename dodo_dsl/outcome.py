@@ -77,7 +77,9 @@ class Response:
     The time is the wall time less what the application waited for a processor. ``processor_*`` is the processor time,
     None if the application's processes cannot be seen from the test's services. ``slow`` counts answers that took
     longer than the period of the frames, ``over`` those beyond the limit of the test, None without one, ``uncopied``
-    those that did not carry the sample time of their frame.
+    those that did not carry the sample time of their frame. ``surplus`` counts answers beyond the one that counts for
+    a frame, ``surplus_frames`` the frames with any, and ``differing`` those of them that say something else. In
+    ``unasked`` of the ``pauses``, in which no frame is shown, the application went on sending, by its own clock.
     """
 
     answers: int
@@ -95,6 +97,11 @@ class Response:
     uncopied: int = 0
     worst_frame: int = 0
     """The number of the frame whose answer took the longest, from 1 on; 0 if that is not known."""
+    surplus: int = 0
+    surplus_frames: int = 0
+    differing: int = 0
+    pauses: int = 0
+    unasked: int = 0
 
     def in_words(self) -> str:
         """The times in a sentence, with the processor that they were measured on."""

@@ -6,6 +6,7 @@
 ``clock-level``: lockstep needs an environment that can wait, so hardware runs in real time.
 ``clock-rate``: in lockstep a test steps from frame to frame, so all rates have to fit the camera's.
 ``clock-answers``: in lockstep a message has to complete the application's answer to a frame.
+``clock-timed``: in lockstep only time that frames bring goes on, and not that of an application's own timers.
 ``rig-pool``: any rig of a pool can run the test: there are some, of one kind, and they can be distinguished.
 ``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
 ``rig-isolation``: hardware is on the host's network.
@@ -71,6 +72,10 @@ def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
         message = "no declared message completes a frame: the application's answer ends when it waits for the next one"
         hint = "declare x-dodo.answers, or x-dodo.done, at the application's service that sends last"
         yield Diagnostic(context.spec.span("clock"), "clock-answers", message, hint, severity="warning")
+    for name, span in context.application.timed if context.application else ():
+        message = f"this application acts by its own clock: '{name}' has timers, which in lockstep do not wait"
+        hint = "run it with 'clock: realtime', or 'clock: virtual'"
+        yield Diagnostic(span, "clock-timed", message, hint, severity="warning")
 
 
 def _rates(context: RuleContext) -> Iterator[Diagnostic]:

@@ -150,7 +150,7 @@ class Watch:
             with reserved(self._options.report, self._stdout):
                 report, said = self._options.report, self._options.verbosity
                 source = origin(self._options, deployment)
-                outcomes, _ = cli_run.run(runner, chosen, report, self._stdout, source, others, said)
+                outcomes, _, _ = cli_run.run(runner, chosen, report, self._stdout, source, others, said)
         self._show_change(outcomes)
         self.outcomes = {outcome.slug: outcome for outcome in [*others, *outcomes]}
         return runner.interrupted

@@ -285,13 +285,15 @@ class RunState:
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
-        answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
+        answers = judgement.judged_response(
+            self.response, plan.lockstep, [s.name for s in plan.application.services], plan.timed
+        )
         use = judgement.judged_use(self.resources, plan.resources)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
         base = tuple(against_baseline(judged, plan.baseline))
         findings = (*answers.findings, *use.findings, *worse(base))
-        considered = consider(decide(self.facts, findings), self._load())
+        considered = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
         found = self._explained(self._elsewhere(self._timed(considered.finding)))
         finding = self._without_display(self._with_told(self._with_printed(found)))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)

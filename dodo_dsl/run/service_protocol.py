@@ -35,6 +35,8 @@ _MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
 _OPTIONAL_CHECK_KEYS = {"exclusive"}
 _ADDRESS = re.compile(r"(?P<host>[0-9]{1,3}(\.[0-9]{1,3}){3}):(?P<port>[0-9]{1,5})", re.ASCII)
+_UNASKED = ("surplus", "surplus_frames", "differing", "pauses", "unasked")
+"""Counts of what no frame asked for."""
 _EVIDENCE_KEY = re.compile(r"[a-z][a-z0-9-]{0,39}")
 _MOST_EVIDENCE, _MAX_EVIDENCE_TEXT = 20, 200
 
@@ -126,10 +128,12 @@ def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
 def _response(message: dict[str, Any]) -> Responded | None:
     """How long the application took, where all of the numbers can be."""
     facts: dict[str, Any] = {field.name: message.get(field.name) for field in dataclasses.fields(Response)}
-    facts |= {name: message.get(name, 0) for name in ("uncopied", "worst_frame")}
+    facts |= {name: message.get(name, 0) for name in ("uncopied", "worst_frame", *_UNASKED)}
     counts = [facts["answers"], facts["slow"], facts["over"] or 0, facts["uncopied"]]
     times = [value for name, value in facts.items() if name.endswith("_s")]
     if not all(type(count) is int and 0 <= count <= counts[0] for count in counts) or counts[0] == 0:
+        return None
+    if not all(type(facts[name]) is int and 0 <= facts[name] < 1 << 63 for name in _UNASKED):
         return None
     if type(facts["worst_frame"]) is not int or not 0 <= facts["worst_frame"] <= counts[0] + 1:
         return None

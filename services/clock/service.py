@@ -87,7 +87,7 @@ class ClockService(Service):
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
         if self._channel.foreign:
             _log.warning("%d datagrams to the clock were not from services of the test", self._channel.foreign)
-        if facts := self._response.facts():
+        if facts := self._application.facts():
             self._report("response", **facts)
         self._report_time(last=True)
         if kind:

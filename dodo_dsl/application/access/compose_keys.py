@@ -160,7 +160,7 @@ MOUNT = _table(
         "consistency": KeyRow("kept", "Linux ignores it"),
         "image": KeyRow("kept", "a folder of an image"),
         "read_only": KeyRow("kept", "less access"),
-        "source": KeyRow("rewritten", "of the repository, to be read or as a copy; see docs/reference/applications.md"),
+        "source": KeyRow("rewritten", "of the repository, to be read or as a copy; see docs/reference/sandbox.md"),
         "target": KeyRow("kept", "a path in the container"),
         "tmpfs": KeyRow("rewritten", "the memory of `sandbox` at most"),
         "type": KeyRow("kept", "bind, volume, tmpfs and image only", values.mount_type),

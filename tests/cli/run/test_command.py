@@ -25,7 +25,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.report.viewer import page
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready
+from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready, Time
 from dodo_dsl.run.runner import Runner
 from tests.cli.terminal import Terminal
 from tests.run.scripted import FAILED, PASSED, Events, ScriptedBackend, ScriptedBackends, plan
@@ -247,6 +247,35 @@ def test_an_interrupt_leaves_the_other_tests_not_run(dodo: Command) -> None:
     document = json.loads(Path("report/results.json").read_text())
     assert [test["outcome"] for test in document["tests"]] == ["error"]
     assert [test["slug"] for test in document["not_run"]] == ["test--run-2", "test--run-3"]
+
+
+class EndsOtherwise(ScriptedBackend):
+    """The second of several runs ends later than the others."""
+
+    def __init__(self, tested: Plan, events: Mapping[str, Events]) -> None:
+        seconds = 5.0 if tested.slug.endswith("--run-2") else 4.0
+        passed = stages(Time(seconds, last=True), PASSED, Exited("track", 0))
+        super().__init__(tested, passed)
+
+
+@pytest.mark.parametrize(("lockstep", "count", "code"), [(60.0, 3, 1), (60.0, 1, 0), (0.0, 3, 0)])
+def test_repetitions_in_lockstep_that_differ_end_with_a_code(
+    dodo: Command, lockstep: float, count: int, code: int
+) -> None:
+    dodo.backend = EndsOtherwise
+    got, out, _ = dodo.run("--repeat", str(count), tested=plan(lockstep=lockstep))
+    differs = "test: the 3 runs in lockstep differ\n        test time: 4.0 s in runs 1, 3; 5.0 s in run 2\n"
+    assert (got, differs in out) == (code, bool(code))
+    document = json.loads(Path("report/results.json").read_text())
+    assert ("repeated" in document) is bool(code)
+
+
+def test_repetitions_in_lockstep_that_are_the_same_pass(dodo: Command) -> None:
+    dodo.stages = stages(Time(4.0, last=True), PASSED, Exited("track", 0))
+    code, out, _ = dodo.run("--repeat", "2", tested=plan(lockstep=60.0))
+    assert (code, "test: the 2 runs in lockstep have the same values\n" in out) == (0, True)
+    code, out, _ = dodo.run("--repeat", "2", "-q", tested=plan(lockstep=60.0))
+    assert (code, "same values" in out) == (0, False)
 
 
 def test_an_interrupt_waits_for_no_page_of_a_test_before(dodo: Command, monkeypatch: pytest.MonkeyPatch) -> None:
