@@ -147,7 +147,7 @@ def _is_alike(before: float | None, after: float | None, limit: Mapping[str, flo
 
 
 def _shown(value: float | None) -> str:
-    """As pages and texts show it: what no one sees is no change."""
+    """As pages and texts show it: what no one sees is not a change."""
     return "none" if value is None else f"{value:.4g}"
 
 
@@ -290,7 +290,7 @@ def value_text(number: float | None, unit: str) -> str:
 
 
 def difference(check: CheckChange) -> str:
-    """``-0.07 m``; empty where there is none to tell."""
+    """``-0.07 m``; empty if there is none."""
     return "" if not check.difference else f"{check.difference:+.3g} {check.unit}".rstrip()
 
 

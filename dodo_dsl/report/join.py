@@ -1,8 +1,9 @@
 """Any number of reports in one new folder, in which every link works offline.
 
 Copies are of files that reports hold: no symlinks, no more than fits. A report's ``drive.js`` is a script, and may come
-from a stranger: only the value that it assigns is kept, checked to be data, with this DoDo's page and scripts. For a
-comparison, the ways of another report's tests lie beside the pages of this one's, to be drawn over one another.
+from an untrusted source: only the value that it assigns is kept, checked to be data, with this DoDo's page and
+scripts. For a comparison, the ways of another report's tests lie beside the pages of this one's, to be drawn over one
+another.
 """
 
 import contextlib
@@ -259,7 +260,7 @@ def write_other_ways(folder: Path, comparison: Comparison | None, other: GivenRe
 
 
 def _way(source: Path, test: TestChange) -> dict[str, Any] | None:
-    """The positions of a test in another report, which may come from a stranger; None where there are none."""
+    """The positions of a test in another report, which is untrusted; None where there are none."""
     if not is_folder(source):
         return None
     with contextlib.suppress(NotCopied, OSError, KeyError, TypeError, ValueError, StopIteration, AttributeError):

@@ -71,7 +71,7 @@ def read_history(folder: Path) -> Past:
 
 
 def curve(past: Past, slug: str, check: Mapping[str, Any]) -> Markup:
-    """A check's values as a picture; empty with fewer than two of them, and for what is no history."""
+    """A check's values as a picture; empty with fewer than two of them, and for what is not a history."""
     try:
         values = [float(run["checks"][check["name"]]) for run in past.get(slug, ()) if check["name"] in run["checks"]]
         limits = [float(limit) for limit in (check.get("limit") or {}).values()]
@@ -198,7 +198,7 @@ def style() -> str:
 
 @functools.cache
 def environment() -> jinja2.Environment:
-    """Renders pages of texts that come from strangers."""
+    """Renders pages of untrusted texts."""
     return jinja2.Environment(
         bytecode_cache=compiled_templates(),
         loader=jinja2.FileSystemLoader(package_data.templates()),

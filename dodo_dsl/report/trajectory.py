@@ -48,7 +48,7 @@ class Way:
 
 @dataclass(frozen=True)
 class DrivenPath:
-    """A path in the world frame: x and y in metres, heading in radians, and seconds since its begin."""
+    """A path in the world frame: x and y in metres, heading in radians, and seconds since its start."""
 
     path: list[tuple[float, float, float, float]]
     ground: Ground

@@ -57,7 +57,7 @@
     body.append(...rows.map(({ row }) => row));
   }
 
-  // Whoever follows a link to a test that the filters hide wants to see it.
+  // A link to a test that the filters hide shows it.
   function reveal() {
     const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
     if (target && target.hidden) {

@@ -77,7 +77,7 @@ def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
     first, second = results.load(tmp_path / "results.json")[0].resources
     assert (first, second) == (replace(uses[0], processor_s=1.235, processor_share=0.25), uses[1])
     page = (tmp_path / "index.html").read_text()
-    for shown in ("1.23 s (25 %)", "150 MB", "300 MB/min", "1,460 MB", "too short to tell"):
+    for shown in ("1.23 s (25 %)", "150 MB", "300 MB/min", "1,460 MB", "too short to measure"):
         assert f">{shown}</td>" in page
     assert (
         second.in_words()

@@ -205,7 +205,7 @@ def _bodies(ground: Ground, own: int) -> Iterator[dict[str, Any]]:
         try:
             outline = model.footprint()
         except MapError:
-            continue  # told by the service that draws it
+            continue  # reported by the service that draws it
         yield {"name": shown(name, 80), "sender": stamp, "colour": list(colour_of(model)), "outline": outline[:_MOST]}
 
 
