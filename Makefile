@@ -31,7 +31,7 @@ help:
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
 	@echo "make schema   put what manifests say into the schema that editors read"
-	@echo "make site     build the documentation as a site, into build/site"
+	@echo "make site     build the documentation and a report to look at as a site, into build/site"
 	@echo "make release  check the version and the changelog, build wheel and sdist twice, into build/release"
 	@echo "make clean    remove what was built"
 
@@ -119,7 +119,8 @@ schema:
 
 site:
 	@scripts/setup dev
-	@.venv/bin/python -m sphinx -q -W --keep-going -d build/site-kept -c docs/site . build/site
+	@.venv/bin/python -m sphinx -q -W --keep-going -d build/site-kept -A demo=yes -c docs/site . build/site
+	@scripts/make-demo build/site/demo
 	@echo "build/site/docs/index.html"
 
 release: dev

@@ -312,8 +312,8 @@ def _refuse_twin(path: Path) -> None:
         twin = twin_token(path)
         if twin is not None and twin.stat().st_size == 0:
             raise SharedMemoryError(
-                f"shared memory '{path.name}' looks like '{twin.name}': the keys of {path} and {twin} collide "
-                f"(ftok); remove the unused one, or restart its creator"
+                f"shared memory '{path.name}' cannot be distinguished from '{twin.name}': "
+                f"the keys of {path} and {twin} collide (ftok); remove the unused one, or restart its creator"
             )
 
 

@@ -51,17 +51,18 @@ def decisive_value(outcome: Outcome) -> str:
 
     As for a test's margin, checks that cannot be better do not count.
     """
-    check = _decisive(outcome)
+    check = decisive(outcome)
     return f"{check['name']} {comparison.value_text(check['value'], check.get('unit') or '')}" if check else ""
 
 
 def decisive_limits(outcome: Outcome) -> str:
     """The limits of that check in words; empty without one."""
-    check = _decisive(outcome)
+    check = decisive(outcome)
     return ", ".join(comparison.limits(check)) if check else ""
 
 
-def _decisive(outcome: Outcome) -> Mapping[str, Any] | None:
+def decisive(outcome: Outcome) -> Mapping[str, Any] | None:
+    """The check whose value ``decisive_value`` shows."""
     checks = outcome.checks
     failed = [check for check in checks if not check["ok"] and not only_follows(check, checks)]
     shares = (
