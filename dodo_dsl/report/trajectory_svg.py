@@ -1,6 +1,6 @@
 """A drive from above as a small SVG: lines of the map, its cones, the path and where it ended.
 
-Pages put it inline, so that it follows their colours. As a report may come from a stranger, only what this module
+Pages put it inline, so that it follows their colours. Because a report is untrusted, only what this module
 could have written is put there.
 """
 
