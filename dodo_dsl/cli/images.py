@@ -44,7 +44,7 @@ def dockerfiles(deployment: Deployment) -> Dockerfiles:
 
 
 def require_dockerfiles(names: Collection[str], own: Dockerfiles, images: Sequence[Image]) -> None:
-    """Raises UsageError where an image is named that has no Dockerfile."""
+    """Raises UsageError if an image is named that has no Dockerfile."""
     for image in images:
         if image.name in names and own.get(image.name, Path()) is None:
             base = images_names.beside(image.reference, "base")

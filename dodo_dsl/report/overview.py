@@ -63,7 +63,7 @@ def write_history(folder: Path, past: Past) -> None:
 
 
 def read_history(folder: Path) -> Past:
-    """What ``write`` wrote into a report's folder; empty where there is nothing."""
+    """What ``write`` wrote into a report's folder; empty if there is nothing."""
     try:
         past = json.loads(regular_file.text(folder / FILE_NAME))
     except (OSError, ValueError, RecursionError):
@@ -131,7 +131,7 @@ class ReportPicture(NamedTuple):
 
 @dataclass(frozen=True)
 class ReportFiles:
-    """The files beside the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty.
+    """The files next to the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty.
 
     ``past`` are earlier values of checks, ``ways`` pictures of drives to put into the page.
     """

@@ -228,7 +228,7 @@ class GivenReport:
 
 
 def read_given(path: Path) -> GivenReport:
-    """The report in a folder, or of a file; raises ResultsError, also where a slug could leave its folder."""
+    """The report in a folder, or of a file; raises ResultsError, also if a slug could leave its folder."""
     is_file = not path.is_dir() and (path.is_file() or path.suffix == ".json")
     file = path if is_file else path / FILE_NAME
     found = read_results(file)

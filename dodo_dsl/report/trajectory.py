@@ -42,7 +42,7 @@ class Way:
 
     @property
     def goal(self) -> str:
-        """The obstacle to be reached; empty where there is none."""
+        """The obstacle to be reached; empty if there is none."""
         return next((name for name, role in self.roles.items() if role == "goal"), "")
 
 

@@ -42,7 +42,7 @@ def write(drive: DrivenPath, outcome: Outcome, target: Path) -> None:
 
 
 def read(path: Path) -> Markup:
-    """The picture in a file, empty where there is none or where it holds anything else."""
+    """The picture in a file, empty if there is none or if it holds anything else."""
     try:
         text = regular_file.text(path, _MOST_BYTES)
     except (OSError, ValueError):

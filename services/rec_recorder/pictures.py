@@ -70,7 +70,7 @@ class RecordedCamera:
         )
 
     def restart(self) -> None:
-        """Begin with a key frame at the next picture, as those before are not in the recording."""
+        """Begin with a key frame at the next picture, because those before are not in the recording."""
         self._source.skip()
         self._encoder = None
 

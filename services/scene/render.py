@@ -60,7 +60,7 @@ class Renderer:
     """Draws a scene; the same pose, and places of what moves, give the same bytes, whatever was drawn before."""
 
     def __init__(self, scene: Scene, width: int, height: int, fovy: float) -> None:
-        """The picture's size in pixels, the vertical field of view in rad; ValueError where they make no sense."""
+        """The picture's size in pixels, the vertical field of view in rad; ValueError if they make no sense."""
         self.camera = Pinhole(width, height, fovy)
         self.scene = scene
         self._tree = Tree(list(scene.faces))

@@ -31,7 +31,7 @@ READY = "ready"
 
 
 class LogLine(NamedTuple):
-    """A line at a time in s of the test, before it below zero, None where that is unknown."""
+    """A line at a time in s of the test, before it below zero, None if that is unknown."""
 
     time: float | None
     service: str

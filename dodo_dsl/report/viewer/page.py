@@ -57,7 +57,7 @@ class SpecLines:
         self._files: dict[str, list[str]] = {}
 
     def line(self, place: Place) -> str:
-        """The line without its indent; empty where there is no such file any more."""
+        """The line without its indent; empty if there is no such file any more."""
         if place.file not in self._files:
             self._files[place.file] = self._read(place.file)
         lines = self._files[place.file]

@@ -40,7 +40,7 @@ class Channel:
     every: int = 1
 
     def numbers(self, name: str) -> Values:
-        """A field as numbers; all NaN where there is no such field of numbers."""
+        """A field as numbers; all NaN if there is no such field of numbers."""
         values = self.fields.get(name)
         if values is None or isinstance(values, list):
             return np.full(len(self.times), np.nan)
