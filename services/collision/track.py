@@ -253,7 +253,7 @@ def pick_walls(
             what = (
                 "obstacle" if name == EVERY else f"block between {map_file.LOWEST:g} and {height:g} m above the ground"
             )
-            raise ObstaclesError(f"--walls: {name!r} is not a {what} in the map {path}")
+            raise ObstaclesError(f"--walls: {name!r} names no {what} in the map {path}")
     found = [each for name in names for each in ([name] if name in shapes else groups.get(name, [name]))]
     return pick(shapes, found, "walls", path)
 
