@@ -57,7 +57,7 @@ def assemble(folder: Path, wheels: Path | None, *, whole: bool = False) -> None:
 
 
 def _link(source: str, target: str) -> None:
-    """Hard-links a wheel, or copies it where that is impossible."""
+    """Hard-links a wheel, or copies it if that is impossible."""
     try:
         os.link(source, target)
     except OSError:

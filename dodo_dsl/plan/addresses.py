@@ -65,7 +65,7 @@ class Subnets:
     def give(self, name: str, containers: int = 1) -> str:
         """A test's subnet, with room for so many containers.
 
-        Raises OutOfAddresses where the network is smaller than one.
+        Raises OutOfAddresses if the network is smaller than one.
         """
         network, length = self._network, prefix(containers)
         if length < network.prefixlen:
@@ -76,7 +76,7 @@ class Subnets:
         return f"{ipaddress.IPv4Address(int(network.network_address) + (index << (32 - length)))}/{length}"
 
     def _free(self, first: int, length: int) -> int:
-        """The first free subnet of a length from ``first`` on; ``first`` where none is free."""
+        """The first free subnet of a length from ``first`` on; ``first`` if none is free."""
         count = 1 << (length - self._network.prefixlen)
         for step in range(0 if length in self._full else count):
             index = (first + step) % count

@@ -124,7 +124,7 @@ class _Process(NamedTuple):
     parent: int
     session: int
     start: int
-    """Ticks since the machine started, which tells a process from a later one with its number."""
+    """Ticks since the machine started, which distinguishes a process from a later one with its number."""
 
 
 class _Nanoseconds(NamedTuple):
