@@ -78,7 +78,7 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
     """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
     names = {check["name"] for check in outcome.checks}
     for check in outcome.checks:
-        places = list(_places(plan, check["name"], recorded)) if check.get("limit") else []
+        places = list(limit_places(plan, check["name"], recorded)) if check.get("limit") else []
         yield {
             "name": shown(check["name"], 100),
             "value": check["value"],
@@ -96,7 +96,8 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
         }
 
 
-def _places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
+def limit_places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
+    """Where the spec sets the limit of a check, each with the parameter's name, empty for a service's default."""
     if check in _OF_THE_TEST and "response" in plan.source_map:
         yield _OF_THE_TEST[check], plan.source_map["response"]
     if check.startswith(BASELINE) and "baseline" in plan.source_map:
