@@ -192,7 +192,7 @@ _UNITS = re.compile(r"(?<=\d) (?=\S)")
 _MOST_TEXT = 10_000
 """Characters of one text of others on the page."""
 _MOST_REPOSITORIES = 4
-_MOST_OF_A_LINE = 70
+_MOST_OF_A_LINE = 56
 """Characters of the reason of a test that passed, which has one line."""
 _DIRECTIONS = ("worse", "better", "different")
 
