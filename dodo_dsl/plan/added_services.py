@@ -20,7 +20,7 @@ from dodo_dsl.spec.model import NEVER, ON_FAILURE, Spec
 CLOCK = "dodo-clock"
 CLOCK_MANIFEST = "clock"
 RUNNER_VARIABLE = "DODO_RUNNER"
-"""Empty in the clock's container where no runner announces the begin of the test, as with ``docker compose up``."""
+"""Empty in the clock's container where no runner announces the start of the test, as with ``docker compose up``."""
 
 _WALL_FACTOR, _WALL_SPARE_S = 10.0, 60.0
 

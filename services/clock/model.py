@@ -78,6 +78,7 @@ class Stepper:
         """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
         self._deliver([encode(begin)], "")
         while not self.stopped():
+            self.application.pause()
             if not self._memories:
                 self.application.expect_at(self.now)
             going = self._go_each((*self.roles.advance, *self.roles.sense))

@@ -16,6 +16,7 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.pipeline_rules import KINDS
+from tests.emit.readers import pipeline
 from tests.gitlab.inputs import TEMPLATES, Refused, included, jobs, listed, merged, specified
 
 APPLICATION, DEPLOYMENT, RUN = TEMPLATES
@@ -135,7 +136,7 @@ def test_what_the_child_s_jobs_have_reaches_the_compiler(template: Path, tmp_pat
     assert all(variables[name]["expand"] is False for name in options), "the child's jobs have these variables"
     result = run_script(jobs(config)["compile"], tmp_path, {**given, "DODO_COMPILE_OPTIONS": SHIPPED_TEST})
     assert result.returncode == 0, result.stderr + result.stdout
-    child = yaml.safe_load((tmp_path / "generated/child.gitlab-ci.yml").read_text())
+    child = pipeline((tmp_path / "generated/child.gitlab-ci.yml").read_text())
     (job,) = [job for job in child.values() if "script" in job]
     assert (job["services"], job["tags"], job["image"]) == (services, ["a b"], "dodo:1")
     assert job["artifacts"]["access"] == "developer"
