@@ -161,8 +161,7 @@ def _cids(tests: Sequence[ResolvedTest], deployment: Deployment, built_in: int |
     """
     reserved = [cid if test.rig and (cid := test.rig.cid) is not None else built_in for test in tests]
     free = [test for test, cid in zip(tests, reserved, strict=True) if cid is None]
-    isolations = [isolation(test.spec, test.rig) for test in free]
-    given = iter(addresses.cids([test.spec.slug for test in free], isolations, deployment.cids))
+    given = iter(addresses.cids([isolation(test.spec, test.rig) for test in free], deployment.cids))
     return [next(given) if cid is None else cid for cid in reserved]
 
 
