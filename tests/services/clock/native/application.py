@@ -21,9 +21,9 @@ PATIENCE_S = 60.0
 NAMESPACES = ["unshare", *(["-U", "-r"] if os.getuid() else []), "-n", "-i", "-p", "-f", "--mount-proc", "--kill-child"]
 
 
-def compiled(folder: Path) -> Path:
+def compiled(folder: Path, optimization: str = "-O0") -> Path:
     """The folder with the library, the agent and the tests' programs."""
-    words = ["make", "-s", "-C", str(SOURCES), f"BUILD={folder}", "CFLAGS=-O0"]
+    words = ["make", "-s", "-C", str(SOURCES), f"BUILD={folder}", f"CFLAGS={optimization}"]
     subprocess.run(words, check=True, timeout=PATIENCE_S)
     programs = Path(__file__).with_name("programs.c")
     subprocess.run(["cc", "-pthread", "-o", folder / "programs", programs], check=True, timeout=PATIENCE_S)
