@@ -63,7 +63,11 @@ class Application:
                 f"(env DODO_TIME_SERVICE={number} {ours} {command} > {self._outputs}/out{number} 2>&1; {done}) &"
             )
         self._shell = subprocess.Popen([*NAMESPACES, "sh", "-c", "\n".join([*lines, "wait"])], stdin=subprocess.DEVNULL)
-        self._await(self.folder / "ready")
+        try:
+            self._await(self.folder / "ready")
+        except AssertionError:
+            self._end()
+            raise
         self._command = (self.folder / "command").open("wb", buffering=0)
         self._reply = (self.folder / "reply").open("rb", buffering=0)
 
@@ -73,10 +77,13 @@ class Application:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._shell.kill()
-        self._shell.wait(PATIENCE_S)
         self._command.close()
         self._reply.close()
+        self._end()
+
+    def _end(self) -> None:
+        self._shell.kill()
+        self._shell.wait(PATIENCE_S)
         self._scratch.cleanup()
 
     def run(self, seconds: float) -> dict[str, Any]:
