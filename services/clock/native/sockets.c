@@ -19,6 +19,21 @@ static bool may_block(int file, int flags)
     return status >= 0 && !(status & O_NONBLOCK);
 }
 
+enum { NOTED_FILES = 1024, LONGEST_TICK_NS = 10000001 };
+
+static int64_t receive_timeouts[NOTED_FILES];
+
+/* The kernel rounds a socket's timeout up to its ticks, whose length depends on how it was built. */
+PUBLIC int setsockopt(int file, int level, int option, const void *value, socklen_t size)
+{
+    long result = RAW_6(SYS_setsockopt, file, level, option, value, size, 0);
+    if (!result && level == SOL_SOCKET && option == SO_RCVTIMEO && file < NOTED_FILES && size >= sizeof(struct timeval)) {
+        const struct timeval *given = value;
+        receive_timeouts[file] = given->tv_sec * NANOSECONDS + given->tv_usec * 1000;
+    }
+    return (int)answer(result);
+}
+
 /* Of SO_RCVTIMEO or SO_SNDTIMEO. */
 static int64_t deadline_of(int file, int option)
 {
@@ -26,7 +41,9 @@ static int64_t deadline_of(int file, int option)
     socklen_t size = sizeof timeout;
     if (RAW_6(SYS_getsockopt, file, SOL_SOCKET, option, &timeout, &size, 0) || (!timeout.tv_sec && !timeout.tv_usec))
         return TIME_NEVER;
-    return later(now_ns(), timeout.tv_sec * NANOSECONDS + timeout.tv_usec * 1000);
+    int64_t rounded = timeout.tv_sec * NANOSECONDS + timeout.tv_usec * 1000;
+    int64_t noted = option == SO_RCVTIMEO && file < NOTED_FILES ? receive_timeouts[file] : 0;
+    return later(now_ns(), noted && noted <= rounded && rounded - noted < LONGEST_TICK_NS ? noted : rounded);
 }
 
 /* Repeats what would block until it need not, its timeout, or a signal. */
