@@ -162,7 +162,7 @@ class ApplicationSource:
 
     @property
     def other_roots(self) -> tuple[Path, ...]:
-        """The folders beside its repository whose files are the application's own."""
+        """The folders besides its repository whose files are the application's own."""
         own = repository(self.folder)
         return tuple(root for root in map(Path, self.access.roots) if root not in own)
 
@@ -264,7 +264,7 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
 
 
 def cid_variables(files: Iterable[EnvFile], folder: Path) -> tuple[str, ...]:
-    """The CID variables that files beside the compose file set."""
+    """The CID variables that files next to the compose file set."""
     found: set[str] = set()
     for file in files:
         if not file.path.startswith(("/", "~", "$")):

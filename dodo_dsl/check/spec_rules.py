@@ -125,7 +125,7 @@ def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
         yield from _kind(pool.kind, rigs)
     for word in pool.names:
         if word.text in EMULATED_RIGS:
-            message = f"'{word.text}' is in no pool, as every test has one of its own"
+            message = f"'{word.text}' is in no pool, because every test has its own"
             yield Diagnostic(word.span, "rig-pool", message, f"write 'rig: {word.text}'")
         elif word.text not in rigs:
             yield Diagnostic(word.span, "unknown-rig", f"unknown rig '{word.text}'", did_you_mean(word.text, rigs))
@@ -135,7 +135,7 @@ def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
         span = places.get(rig.name, pool.kind.span if pool.kind else context.spec.span("rig"))
         if rig.kind != found[0].kind:
             message = f"rig '{rig.name}' is {rig.kind}, and '{found[0].name}' is {found[0].kind}"
-            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can take each other's place")
+            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can replace each other")
         for other in found[:number]:
             if device := _same_device(other, rig):
                 message = (

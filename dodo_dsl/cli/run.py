@@ -30,7 +30,6 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import Drawings, next_report
 from dodo_dsl.report.repetitions import Repeated, repeated
 from dodo_dsl.report.results import Circumstances
-from dodo_dsl.report.viewer.names import LOGS
 from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.session import is_real
@@ -46,12 +45,14 @@ from dodo_dsl.terminal import printable
 def reserved(folder: Path, stdout: TextIO) -> Iterator[None]:
     """Holds a report's folder, as long as this process lives at most; says so when another run holds it already.
 
-    Both go on: their tests have folders of their own there, and the pages and results are those of the later end.
+    Both go on: their tests have their own folders there, and the pages and results are those of the later end.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         if not _locked(descriptor):
-            stdout.write(f"note: another run writes into '{folder}', too, and the report will be of the last to end; ")
+            stdout.write(
+                f"note: another run also writes into '{folder}': the last run to finish overwrites the report; "
+            )
             stdout.write("--report names another folder\n")
         yield
     finally:
@@ -157,7 +158,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     display.add_verbosity(
         parser,
         "print only what did not pass, and a last line with the counts",
-        "print each test's phases, checks, what the application used, and errors and warnings in logs",
+        "print each test's phases, sentence, checks, what the application used, and errors and warnings in logs",
     )
     selection.add_application(parser)
 
@@ -259,8 +260,9 @@ def run(
         with Drawings(target.folder) as drawings, runner.progress:
             outcomes = asyncio.run(runner.run(jobs, lambda job, outcome: drawings.begin(outcome, drawable(job))))
         not_run = runner.not_run()
-        logs = {job.plan.slug: job.report / LOGS for job in jobs}
-        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, logs)
+        plans = {job.plan.slug: job.plan for job in jobs}
+        about = {s: run_report.Reported(p, target.folder / s, report / s) for s, p in plans.items()}
+        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, about)
         ran = {job.plan.slug: job for job in jobs}
         repeats = repeated((ran[o.slug].folder, o, ran[o.slug].report) for o in outcomes)
         told = (each for each in repeats if each.differing or said is not Verbosity.QUIET)

@@ -159,7 +159,7 @@ def _kept_clock(names: Sequence[str]) -> str:
     if not names:
         return ""
     who = f"{names[0]} runs" if len(names) == 1 else f"{names[0]} and {len(names) - 1} more run"
-    return f"note: {who} in real time, as hardware does not wait\n"
+    return f"note: {who} in real time, because hardware does not wait\n"
 
 
 def compile_tests(

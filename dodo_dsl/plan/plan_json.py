@@ -53,11 +53,11 @@ def _without_nothing(value: Any) -> dict[str, Any]:
 
 
 def json_text(value: Any, option: int = 0) -> str:
-    """JSON by orjson; raises UnicodeEncodeError where a text is not UTF-8, as a path may be."""
+    """JSON by orjson; raises UnicodeEncodeError if a text is not UTF-8, as a path may be."""
     try:
         return orjson.dumps(value, option=option).decode()
     except TypeError:
-        json.dumps(value, ensure_ascii=False, default=dataclasses.asdict).encode()  # it tells which text
+        json.dumps(value, ensure_ascii=False, default=dataclasses.asdict).encode()  # it says which text
         raise
 
 

@@ -241,7 +241,7 @@ class RunState:
     def _explained(self, finding: Finding) -> Finding:
         """An error in place of a failure that may be due to what others used up.
 
-        What the application itself may have used up is told in a note, see ``_shortage_notes``.
+        What the application itself may have used up is in a note, see ``_shortage_notes``.
         """
         shortage = self.shortage
         if shortage.is_of_others and self._is_of_conditions(finding):
@@ -278,7 +278,7 @@ class RunState:
         return next((s.name for s in self.plan.application.services), "")
 
     def keep_tails(self, backend: Backend) -> None:
-        """The test is decided: what services write from now on, as they are ended, explains nothing."""
+        """The test is decided: what services write from now on, because they are being ended, explains nothing."""
         names = {*self.layer_of, *self.facts.evaluators, *(finding.service for finding in self.facts.findings)}
         self._tails = {name: tuple(backend.tail(name)) for name in names}
         self._unmatched = backend.unmatched()
@@ -332,7 +332,7 @@ class RunState:
         return () if self.is_unanswered or finding.result == "error" else tuple(never)
 
     def _with_told(self, finding: Finding) -> Finding:
-        """A verdict on an application that is told what none is on a road says so."""
+        """A verdict on an application that hears what none hears on a road says so."""
         words = told_in_words(self.plan.told)
         if not words or finding.result == "error":
             return finding
@@ -376,8 +376,8 @@ def pictured_by(plan: Plan) -> list[str]:
 class Standing:
     """The ``seconds`` of its own time that a test has reached, and the check nearest to its limit, in words.
 
-    In real time its time goes on by itself, and this is that of its begin, 0. Checks are known when their evaluator has
-    judged, so that ``nearest`` is empty where there is only one.
+    In real time its time goes on by itself, and this is that of its start, 0. Checks are known when their evaluator has
+    judged, so that ``nearest`` is empty if there is only one.
     """
 
     seconds: float

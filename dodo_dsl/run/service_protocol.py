@@ -76,7 +76,7 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
 
 
 def _address(text: object) -> Address | None:
-    """An IPv4 address with a port, None where it is none."""
+    """An IPv4 address with a port, None if it is none."""
     found = _ADDRESS.fullmatch(text) if isinstance(text, str) else None
     return (found["host"], int(found["port"])) if found and 0 < int(found["port"]) < 1 << 16 else None
 
@@ -93,7 +93,7 @@ def _told(service: str, message: dict[str, Any]) -> Event | None:
 
 
 def _flood(service: str, message: dict[str, Any]) -> Flooded | None:
-    """Who fills the recording, where the values can be."""
+    """The service that fills the recording, where the values can be."""
     what, name, sender, share = (message.get(key) for key in ("what", "message", "sender", "share"))
     if not (_is_text(what) and _is_text(name) and type(sender) is int and _is_number(share)):
         return None

@@ -48,7 +48,7 @@ class ResponseTimes:
     _processor: list[float] = field(default_factory=list)
 
     def add(self, wall_s: float, spent: Spent | None, is_copied: bool = True) -> None:
-        """One more answer; ``spent`` is None where the application's processes cannot be seen."""
+        """One more answer; ``spent`` is None if the application's processes cannot be seen."""
         self.uncopied += not is_copied
         if spent is None:
             self._taken.append(wall_s)
@@ -84,7 +84,7 @@ def _percentile(values: Sequence[float], share: float) -> float:
 
 
 def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
-    """The processor as Linux names it, with its clock where it says one; empty where it says nothing."""
+    """The processor as Linux names it, with its clock where it says one; empty if it says nothing."""
     try:
         lines = cpuinfo.read_text(errors="replace").splitlines()
     except OSError:

@@ -139,7 +139,7 @@ def test_libcluon_in_lockstep(tmp_path: Path) -> None:
         report, spec = folder / "report", variant(registry(folder), CURVE, "told", pose="declared")
         dodo("run", str(spec), "--application", str(path), "--report", str(report), code=1)
         test = results(report)["told"]
-        assert re.fullmatch("hit wall left .*; the application is told its true pose .*", test["reason"])
+        assert re.fullmatch("hit wall left .*; the application gets its true pose .*", test["reason"])
         log = (report / "told" / "logs" / "application.app.log").read_text()
         stamps = [json.loads(line)["stamp"] for line in log.splitlines() if line.startswith("{")]
         assert stamps[:3] == [1_700_000_000.0, 1_700_000_000.1, 1_700_000_000.2]

@@ -92,7 +92,7 @@ def too_busy(load: MachineLoad) -> str:
     return ""
 
 
-UNSEEN = "the limit of the time of an answer is not judged, as what containers wait for a processor cannot be seen"
+UNSEEN = "the limit of the time of an answer is not judged, because what containers wait for a processor cannot be seen"
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
 MOST_SURPLUS_FRAMES = 0.1
@@ -194,7 +194,7 @@ def own_clock(response: Response, timed: Sequence[str] = ()) -> str:
 SOON_S = 600.0
 """Memory that would reach its limit within this time, by the test's own, is worth a note."""
 UNSEEN_USE = (
-    "the limits of processor time and memory are not judged, as what the application uses cannot be measured here"
+    "the limits of processor time and memory are not judged, because what the application uses cannot be measured here"
 )
 _MB, _MINUTE_S = 1e6, 60.0
 

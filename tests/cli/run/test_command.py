@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import platform
+import re
 import signal
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -130,7 +131,7 @@ def test_an_error_is_an_error_in_junit(dodo: Command) -> None:
 def test_losses_of_messages_are_noted_below_the_test(dodo: Command) -> None:
     dodo.stages = stages(Overrun("track", 5), PASSED, Exited("track", 0))
     code, out, _ = dodo.run()
-    note = "service 'track' lost 5 messages, as its receive buffer was full: its verdict does not consider them"
+    note = "service 'track' lost 5 messages, because its receive buffer was full: its verdict does not consider them"
     assert (code, f"        note: {note}\n" in out) == (0, True), out
     assert dodo.result()["notes"] == [note]
 
@@ -159,7 +160,7 @@ def test_a_verdict_without_room_for_a_report_is_printed(dodo: Command, small_dis
             file.write(bytes(512))
     code, out, _ = dodo.run(report=str(small_disk))
     assert code == 3
-    assert "PASSED  test  it drove (" in out
+    assert re.search(r"^PASSED  test .* it drove$", out, re.MULTILINE)
     assert f"'{small_disk}' cannot take the whole report: No space left on device\n" in out
 
 
@@ -185,7 +186,7 @@ def test_tampered_compiled_tests_are_refused(dodo: Command, change: dict[str, ob
 
 USAGE = [
     (("--compiled", "nowhere"), "there is no compiled test at 'nowhere': No such file or directory"),
-    (("no-such-test",), "there is no test 'no-such-test'"),
+    (("no-such-test",), "unknown test 'no-such-test'"),
     (("--application", "none.yml"), "there is no file 'none.yml', expected the application's compose file"),
     (("a/b.dodo.yml",), "there is no test at"),
     (("--seed", "-1"), "'-1' is "),
@@ -210,7 +211,7 @@ def test_a_real_rig_is_never_kept_up(dodo: Command) -> None:
 def test_quiet_says_only_the_counts_of_a_run_that_passed(dodo: Command) -> None:
     assert dodo.run("-q")[1] == "1 passed, 0 failed, 0 in error\n"
     dodo.stages = ENDINGS["failed"]
-    assert [line.split()[0] for line in dodo.run("--quiet")[1].splitlines()] == ["FAILED", "0"]
+    assert [line.split()[0] for line in dodo.run("--quiet")[1].splitlines()] == ["FAILED", "in", "open", "0"]
 
 
 def test_quiet_and_verbose_do_not_go_together(dodo: Command, capsys: pytest.CaptureFixture[str]) -> None:
@@ -242,7 +243,7 @@ def interrupted(dodo: Command, count: int) -> tuple[int, str]:
 def test_an_interrupt_leaves_the_other_tests_not_run(dodo: Command) -> None:
     code, out = interrupted(dodo, 3)
     assert code == 130
-    assert "0 passed, 0 failed, 1 in error\n2 tests not run, as the run was interrupted: test[run=2], " in out
+    assert "0 passed, 0 failed, 1 in error\n2 tests not run, because the run was interrupted: test[run=2], " in out
     document = json.loads(Path("report/results.json").read_text())
     assert [test["outcome"] for test in document["tests"]] == ["error"]
     assert [test["slug"] for test in document["not_run"]] == ["test--run-2", "test--run-3"]
