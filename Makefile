@@ -18,7 +18,7 @@ PARTS := realtime-tests engine-tests fast-tests slow-tests first second
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test proof dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware format goldens schema site clean
+.PHONY: help demo check test proof dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware format goldens schema site release clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
@@ -31,7 +31,8 @@ help:
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
 	@echo "make schema   put what manifests say into the schema that editors read"
-	@echo "make site     build the documentation as a site, into build/site"
+	@echo "make site     build the documentation and a report to look at as a site, into build/site"
+	@echo "make release  check the version and the changelog, build wheel and sdist twice, into build/release"
 	@echo "make clean    remove what was built"
 
 demo:
@@ -117,8 +118,12 @@ schema:
 
 site:
 	@scripts/setup dev
-	@.venv/bin/python -m sphinx -q -W --keep-going -d build/site-kept -c docs/site . build/site
+	@.venv/bin/python -m sphinx -q -W --keep-going -d build/site-kept -A demo=yes -c docs/site . build/site
+	@scripts/make-demo build/site/demo
 	@echo "build/site/docs/index.html"
+
+release: dev
+	@.venv/bin/python scripts/release
 
 clean:
 	rm -rf .venv build dist generated dodo-report .pytest_cache .mypy_cache .ruff_cache .hypothesis

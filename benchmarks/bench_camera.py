@@ -1,8 +1,8 @@
-"""Pictures a second: the virtual camera beside OpenGL on llvmpipe, one core, 1280 x 720, 90 cones on a textured floor.
+"""Images a second: the virtual camera beside OpenGL on llvmpipe, one core, 1280 x 720, 90 cones on a textured floor.
 
     python benchmarks/bench_camera.py [FOLDER]
 
-Both draw the same drive, in turns; each picture ends in memory. FOLDER keeps the pictures of both. The same with a maze
+Both draw the same drive, in turns; each image ends in memory. FOLDER keeps the images of both. The same with a maze
 of 136 textured blocks follows, and the cost of each condition, alone. Without moderngl or EGL only the virtual camera
 is measured.
 """
@@ -110,7 +110,7 @@ def drive() -> list[CameraPose]:
 
 
 def rate(draw: Callable[[CameraPose], object], poses: Sequence[CameraPose]) -> float:
-    """Pictures a second from these poses."""
+    """Images a second from these poses."""
     start = time.perf_counter()
     for pose in poses:
         draw(pose)
@@ -147,11 +147,11 @@ MAZE = Scenery(f"virtual camera, {BLOCKS} blocks", make_maze, wander, 1, 0.95)
 
 
 def cost_of(condition: str, ours: Sequence[float], without: Sequence[float]) -> Row:
-    return cost_row(f"virtual camera, {condition}", "ms a picture", ours, "no condition", without)
+    return cost_row(f"virtual camera, {condition}", "ms an image", ours, "no condition", without)
 
 
 def beside(scenery: Scenery, folder: Path, keep: Path | None, budget: Budget, until: float) -> None:
-    """The rates of both in turns, and how alike their pictures are."""
+    """The rates of both in turns, and how alike their images are."""
     poses = scenery.poses()
     camera, gl = Renderer(load_scene(folder), *SIZE, FOVY), peer(folder)
     image = np.empty((SIZE[1], SIZE[0], 4), np.uint8)
@@ -171,11 +171,11 @@ def beside(scenery: Scenery, folder: Path, keep: Path | None, budget: Budget, un
     rest = {"peer": "moderngl on llvmpipe", "theirs": columns[1]} if gl else {"note": NO_PEER}
     row = scenery.speed(columns[0], **rest)
     report(row)
-    print(f"{scenery.what}\nvirtual-camera {median(row.ours):7.1f} pictures/s")
+    print(f"{scenery.what}\nvirtual-camera {median(row.ours):7.1f} images/s")
     if gl is None:
         plan(scenery.likeness([]), note=NO_PEER)
         return
-    print(f"moderngl       {median(row.theirs):7.1f} pictures/s on {gl.name}")
+    print(f"moderngl       {median(row.theirs):7.1f} images/s on {gl.name}")
     print(f"ratio          {median(row.ratios):7.2f} (target {scenery.ratio})")
     alike = [ssim(ours(pose), theirs(pose)) for pose in poses]
     report(scenery.likeness([min(alike)]))
@@ -217,14 +217,14 @@ def condition(folder: Path, name: str) -> Callable[[CameraPose], object]:
 
 
 def costs(folder: Path, budget: Budget) -> Iterator[str]:
-    """What each condition adds to a picture, in ms, measured in turns with none."""
+    """What each condition adds to an image, in ms, measured in turns with none."""
     draws = {name: condition(folder, name) for name in CONDITIONS}
     rounds = [{name: 1000 / rate(draw, drive()[::4]) for name, draw in draws.items()} for _ in budget.rounds(ROUNDS)]
     for name in list(CONDITIONS)[1:]:
         report(cost_of(name, [r[name] for r in rounds], [r["nothing"] for r in rounds]))
         added = median(r[name] - r["nothing"] for r in rounds)
         times = median(r[name] / r["nothing"] for r in rounds)
-        yield f"{name:<14} {added:+7.2f} ms a picture, {times:.2f} times the time"
+        yield f"{name:<14} {added:+7.2f} ms an image, {times:.2f} times the time"
 
 
 @contextmanager

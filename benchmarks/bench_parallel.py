@@ -1,6 +1,6 @@
 """Tests at once against one after the other, in lockstep and in real time: python benchmarks/bench_parallel.py [TESTS].
 
-Closed loops with pictures of 320x240 at 10 Hz and the example application, on the process backend. Prints how long both
+Closed loops with images of 320x240 at 10 Hz and the example application, on the process backend. Prints how long both
 ways take, and their ratio: with N tests in real time, N times as fast is the most that there can be; in lockstep, as
 many times as there are cores. All of them have to pass.
 """
@@ -28,7 +28,7 @@ SMALL = {"width: 640": "width: 320", "height: 480": "height: 240"}
 
 
 def small(folder: Path, tests: int) -> None:
-    """A repository with so many instances of a closed loop with small pictures."""
+    """A repository with so many instances of a closed loop with small images."""
     shutil.copytree(ROOT / "tests_registry" / "maps", folder / "tests" / "maps")
     shutil.copytree(ROOT / "examples" / "kiwi", folder / "app")
     spec = (ROOT / "tests_registry" / "sil-closed-straight" / "sil-closed-straight.dodo.yml").read_text()

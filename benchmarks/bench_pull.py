@@ -1,7 +1,7 @@
 """A cold pull of all services' images: shared layers beside one independent image a service.
 
 First the largest of all images as it lies on the engine. Then pushes DoDo's images (``dodo images build``) to an image
-registry of its own on 127.0.0.1, once as they are and once flattened to one layer each, and pulls both into an empty
+separate registry on 127.0.0.1, once as they are and once flattened to one layer each, and pulls both into an empty
 engine. Root on Debian with docker.io and docker-registry.
 """
 

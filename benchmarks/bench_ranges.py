@@ -2,7 +2,7 @@
 
     python benchmarks/bench_ranges.py
 
-Both look from the same places at the same outlines of 100 cones. shapely looks for the obstacles that a ray may meet
+Both look from the same positions at the same outlines of 100 cones. shapely looks for the obstacles that a ray may meet
 in its tree, and for the nearest point that the ray has in common with one. Processor time, of one core.
 """
 

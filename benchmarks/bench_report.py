@@ -2,7 +2,7 @@
 
 The suite page has 20, 100 and 1,000 tests, of which all failed, each tenth in the same way, as failed ones take the
 most room; each has eight checks with twenty earlier runs. The drive's page is of 60 s with a frame of 640x480 each
-100 ms. "Shown" is from the start of the navigation to the first picture on the screen after everything is loaded.
+100 ms. "Shown" is from the start of the navigation to the first image on the screen after everything is loaded.
 """
 
 import json

@@ -4,9 +4,9 @@
 
 Processor time (user and system, of all threads) a second of each service at its default rate, in percent of a core.
 All that a simulated test can have runs at once and drives the example application around the Kiwi track; camera,
-beacon, gantry and rec-replay run after it. In the drive the time is taken from a picture of 640 x 480 being in shared
-memory, when its readers are notified, to GroundSteeringRequest for this picture being received; and from the instant at
-which the picture was due, which includes drawing it.
+beacon, gantry and rec-replay run after it. In the drive the time is taken from an image of 640 x 480 being in shared
+memory, when its readers are notified, to GroundSteeringRequest for this image being received; and from the instant at
+which the image was due, which includes drawing it.
 """
 
 import itertools
@@ -39,7 +39,7 @@ SETTLE = 3.0
 PARTS = 4  # of the drive, which are the rounds of the ledger
 LONG, SHORT = 40.0, 8.0  # seconds of the drive, alone and in the ledger
 TICKS = os.sysconf("SC_CLK_TCK")
-LATENCIES = ("picture in memory to request", "picture due to request")
+LATENCIES = ("image in memory to request", "image due to request")
 Shares = dict[str, list[float]]
 Processes = dict[str, "subprocess.Popen[bytes]"]
 
@@ -108,7 +108,7 @@ def used(processes: Processes) -> dict[str, float]:
 
 
 class Watcher:
-    """Notes when readers were notified of each picture of a memory, by sample time, in us of the wall clock."""
+    """Notes when readers were notified of each image of a memory, by sample time, in us of the wall clock."""
 
     def __init__(self, name: str) -> None:
         self.shown: dict[int, int] = {}
@@ -131,7 +131,7 @@ class Watcher:
 
 
 def answers(session: Session, seconds: float) -> dict[int, int]:
-    """When the request for each picture came, by the picture's sample time."""
+    """When the request for each image came, by the image's sample time."""
     heard: dict[int, int] = {}
     wanted, end = session.messages.id(REQUEST), time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
@@ -144,11 +144,11 @@ def answers(session: Session, seconds: float) -> dict[int, int]:
 def show(name: str, milliseconds: Sequence[float]) -> None:
     report(cost_row(name, "ms", [float(np.median(part)) for part in np.array_split(milliseconds, PARTS)]))
     half, most, nearly_all = np.percentile(milliseconds, (50, 95, 99))
-    print(f"{name}: median {half:.1f} ms, 95 % {most:.1f} ms, 99 % {nearly_all:.1f} ms ({len(milliseconds)} pictures)")
+    print(f"{name}: median {half:.1f} ms, 95 % {most:.1f} ms, 99 % {nearly_all:.1f} ms ({len(milliseconds)} images)")
 
 
 def measured(programs: dict[str, list[str]], folder: Path, seconds: float, memory: str | None) -> Shares:
-    """Percent of a core of each in each part of the time; with a memory, prints the latencies of its pictures, too."""
+    """Percent of a core of each in each part of the time; with a memory, prints the latencies of its images, too."""
     heard: dict[int, int] = {}
     with running(programs, folder) as processes, Session(CID) as session, ExitStack() as stack:
         watcher = Watcher(memory) if memory else None
@@ -165,7 +165,7 @@ def measured(programs: dict[str, list[str]], folder: Path, seconds: float, memor
         both = sorted(heard.keys() & watcher.shown.keys())
         show(LATENCIES[0], [(heard[time] - watcher.shown[time]) / 1000 for time in both])
         show(LATENCIES[1], [(heard[time] - time) / 1000 for time in both])
-        print(f"pictures: {len(watcher.shown)} seen, {len(both)} answered")
+        print(f"images: {len(watcher.shown)} seen, {len(both)} answered")
     spans = list(itertools.pairwise(marks))
     return {n: [100 * (b[n] - a[n]) / (end - begin) for (begin, a), (end, b) in spans] for n in processes}
 

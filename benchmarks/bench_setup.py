@@ -40,7 +40,7 @@ def theirs(folder: Path) -> float:
     try:
         code = finished([*COMPOSE.split()], folder)
         seconds = time.perf_counter() - start
-    finally:  # also where this benchmark's time is over
+    finally:  # also if this benchmark's time is over
         finished(["docker", "compose", "down", "-v", "--timeout", "0"], folder)
     if code:
         raise RuntimeError(f"{COMPOSE} ended with {code}")

@@ -75,7 +75,7 @@ def install(extra: str) -> str:
 
 
 def as_root(*commands: str) -> str:
-    """Commands for root, one after the other, as this user types them."""
+    """Commands for root, one after the other, in the form for this user."""
     return " && ".join(commands if os.geteuid() == 0 else [f"sudo {command}" for command in commands])
 
 
@@ -114,7 +114,7 @@ def join(device: Path) -> str:
     if status.st_mode & 0o060 != 0o060 or status.st_gid == 0:
         return "only root may use it"
     words = ["usermod", "--append", "--groups", _name(grp.getgrgid, status.st_gid), _name(pwd.getpwuid, os.getuid())]
-    return f"{as_root(shlex.join(words))}, and log in anew"
+    return f"{as_root(shlex.join(words))}, and log in again"
 
 
 def _name(look_up: Callable[[int], Any], number: int) -> str:

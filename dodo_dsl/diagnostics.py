@@ -1,4 +1,4 @@
-"""Problems as values: place, rule, message and hint."""
+"""Problems as values: position, rule, message and hint."""
 
 import difflib
 import functools
@@ -25,7 +25,7 @@ _PARTS = re.compile(r"[-._]")
 
 @dataclass(frozen=True, order=True)
 class Span:
-    """A place in a file; line and column count from 1, ``length`` is what a code frame underlines.
+    """A position in a file; line and column count from 1, ``length`` is what a code frame underlines.
 
     There is no frame with a ``length`` of 0, as for lines that hold secrets.
     """
@@ -52,8 +52,8 @@ class Fix:
 class Diagnostic:
     """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` if there is exactly one.
 
-    ``tests`` are those that it depends on, where its place does not say so. ``about`` names what it says is missing, or
-    where something belongs, for problems that only follow from others.
+    ``tests`` are those that it depends on, where its position does not say so. ``about`` names what it says is
+    missing, or where something belongs, for problems that only follow from others.
     """
 
     span: Span
@@ -67,7 +67,7 @@ class Diagnostic:
 
     @property
     def sentence(self) -> str:
-        """The message, with the tests that have the problem, or their number where they are many."""
+        """The message, with the tests that have the problem, or their number if they are many."""
         if not self.tests:
             return self.message
         many = f"{len(self.tests)} tests, such as {self.tests[0]}"
@@ -85,7 +85,7 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
 
 
 def ordered(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """Sorted by place, each once."""
+    """Sorted by position, each once."""
     return sorted(set(diagnostics))
 
 

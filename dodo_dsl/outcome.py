@@ -77,7 +77,9 @@ class Response:
     The time is the wall time less what the application waited for a processor. ``processor_*`` is the processor time,
     None if the application's processes cannot be seen from the test's services. ``slow`` counts answers that took
     longer than the period of the frames, ``over`` those beyond the limit of the test, None without one, ``uncopied``
-    those that did not carry the sample time of their frame.
+    those that did not carry the sample time of their frame. ``surplus`` counts answers beyond the one that counts for
+    a frame, ``surplus_frames`` the frames with any, and ``differing`` those of them that say something else. In
+    ``unasked`` of the ``pauses``, in which no frame is shown, the application went on sending, by its own clock.
     """
 
     answers: int
@@ -95,6 +97,11 @@ class Response:
     uncopied: int = 0
     worst_frame: int = 0
     """The number of the frame whose answer took the longest, from 1 on; 0 if that is not known."""
+    surplus: int = 0
+    surplus_frames: int = 0
+    differing: int = 0
+    pauses: int = 0
+    unasked: int = 0
 
     def in_words(self) -> str:
         """The times in a sentence, with the processor that they were measured on."""
@@ -187,7 +194,7 @@ def with_margin(check: Mapping[str, Any]) -> dict[str, Any]:
 
     ``margin`` is the distance of the value to its nearest limit in the check's unit, negative beyond the limit.
     ``margin_share`` is margin / (abs(margin) + size), which lies between -1 and 1 and is 0 at the limit. The size is
-    half the range between both limits, that of the limit if there is one, and one unit where that is 0. It agrees
+    half the range between both limits, that of the limit if there is one, and one unit if that is 0. It agrees
     with ``ok``: a check that holds has no negative share, and one that fails at its limit or within has -1, as a wall
     that is touched.
     """
@@ -195,12 +202,12 @@ def with_margin(check: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def worst_margin(outcome: Outcome) -> float | None:
-    """How far a test is from failing, -1 to 1: the least share of its checks; negative exactly where it failed.
+    """How far a test is from failing, -1 to 1: the least share of its checks; negative exactly if it failed.
 
     None for an error, -1 for a failed test without a failing check that has a value. A check that holds with nothing
     to spare does not count, as three gates of three or no broken sample: it cannot be better. Nor does what differs
     from run to run, as the time of answers. 0 if no check is left of a passed test. A check that fails at its
-    limit, as a wall that is touched, does not say by how much, and counts only where no other check that failed does.
+    limit, as a wall that is touched, does not say by how much, and counts only if no other check that failed does.
     """
     if outcome.outcome == "error":
         return None
@@ -225,7 +232,7 @@ def against_baseline(
 ) -> Iterator[tuple[dict[str, Any], RecordedValue]]:
     """A check for each recorded value whose check has a limit now: on that side it may be worse by the tolerance only.
 
-    The tolerance is a share of the recorded value, or where that is 0 of the limit. Of two limits the nearer one to
+    The tolerance is a share of the recorded value, or if that is 0 of the limit. Of two limits the nearer one to
     the recorded value counts. What differs from run to run does not count.
     """
     counts: Counter[str] = Counter()

@@ -31,9 +31,9 @@ def printable(text: str) -> str:
 
 
 def columns(stream: TextIO | None = None) -> int:
-    """How many columns a line may have: COLUMNS, those of the stream's terminal, or of one beside it.
+    """How many columns a line may have: COLUMNS, those of the stream's terminal, or of another stream's.
 
-    80 on a terminal that does not tell, ``WIDE`` where there is none, as in the log of CI.
+    80 on a terminal of unknown width, ``WIDE`` if there is none, as in the log of CI.
     """
     written = os.environ.get("COLUMNS", "")
     known = int(written) if written.isdecimal() and len(written) <= len(str(_MOST_COLUMNS)) else 0
@@ -48,7 +48,7 @@ def columns(stream: TextIO | None = None) -> int:
 
 
 def width_of(stream: TextIO) -> int | None:
-    """How many columns a line may have on the stream's terminal; None where it is a file or a pipe."""
+    """How many columns a line may have on the stream's terminal; None if it is a file or a pipe."""
     return columns(stream) if stream.isatty() else None
 
 
@@ -101,7 +101,7 @@ def excerpt(line: str, start: int, length: int, room: int) -> tuple[str, str, st
 
 
 def _fitting(text: str, room: int) -> int:
-    """How many characters from the begin fit into so many columns."""
+    """How many characters from the start fit into so many columns."""
     for number, character in enumerate(text):
         room -= _cells(character)
         if room < 0:
@@ -110,7 +110,7 @@ def _fitting(text: str, room: int) -> int:
 
 
 def harmless(text: str) -> str:
-    """Lines that begin at the begin of a line, without control characters and commands to a CI log."""
+    """Lines that begin at the start of a line, without control characters and commands to a CI log."""
     plain = "".join(c if c.isprintable() or c in "\n\t" else "�" for c in text)
     return _OLD_COMMAND.sub("# ", _COMMAND.sub(r"\1 ", plain))
 
@@ -126,7 +126,7 @@ class HarmlessStream:
     def __init__(self, stream: TextIO) -> None:
         self.unescaped = stream
         self._line = ""
-        """The begin of the unfinished line: blanks, and a colon at most."""
+        """The start of the unfinished line: blanks, and a colon at most."""
         self._end = ""
         """The last characters."""
 

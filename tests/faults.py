@@ -31,8 +31,8 @@ FAULTS = (
 BACKENDS = ("process", "docker", "mixed")
 TOP = """# Faults
 
-The outcome of a test when something around it goes wrong, and the message with which DoDo reports it. *Failed* blames
-the application; *error* means that there is no verdict on it. In each case nothing is left behind (processes,
+The outcome of a test when something around it goes wrong, and DoDo's message. *Failed* is the application's
+fault; *error* means that DoDo could not judge it. In each case nothing is left behind (processes,
 containers, networks, volumes, shared memory, leases), or the next run removes it and reports that, and tests that run
 at the same time are not affected.
 

@@ -192,7 +192,7 @@ def test_an_engine_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.Monk
     socket.touch(0o660)
     monkeypatch.setattr(os, "access", lambda path, _: path != socket)
     monkeypatch.setattr(Path, "stat", lambda path, **_: os.stat_result((0o140660, 0, 0, 0, 0, 12, 0, 0, 0, 0)))
-    assert re.fullmatch(r"sudo usermod --append --groups \w+ \w+, and log in anew", advice.join(socket))
+    assert re.fullmatch(r"sudo usermod --append --groups \w+ \w+, and log in again", advice.join(socket))
     monkeypatch.undo()
     monkeypatch.setenv("DOCKER_HOST", "tcp://10.0.0.1")
     assert "unset DOCKER_HOST" in advice.engine()

@@ -141,7 +141,7 @@ def _started(
                 os.killpg(process.pid, signal.SIGINT)
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(GRACE)
-        finally:  # also where somebody does not wait for that
+        finally:  # also if somebody does not wait for that
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()

@@ -1,4 +1,4 @@
-"""One picture of the virtual camera under each condition: python benchmarks/pictures/contact_sheet.py FILE.png"""
+"""One image of the virtual camera under each condition: python benchmarks/pictures/contact_sheet.py FILE.png"""
 
 import math
 import sys

@@ -24,13 +24,13 @@ NEAR, FAR = 0.01, 2000.0
 VERTEX = """
 #version 330
 uniform mat4 camera;
-in vec3 place; in vec3 tint; in vec2 spot;
+in vec3 position; in vec3 tint; in vec2 spot;
 flat out vec3 colour; out vec2 tile;
 void main() { gl_Position = camera * vec4(place, 1.0); colour = tint; tile = spot; }
 """
 FRAGMENT = """
 #version 330
-uniform sampler2D picture; uniform bool textured;
+uniform sampler2D image; uniform bool textured;
 flat in vec3 colour; in vec2 tile;
 out vec4 pixel;
 void main() { pixel = vec4((textured ? texture(picture, tile).rgb : colour).bgr, 1.0); }
@@ -51,7 +51,7 @@ def lit(corners: Array, colour: Array) -> Array:
 
 
 def model_triangles(entry: ModelEntry) -> Array:
-    """Rows (n, 8) of place, colour and texture of all copies of a model."""
+    """Rows (n, 8) of position, colour and texture of all copies of a model."""
     import trimesh
 
     assert not isinstance(entry.paint, Path)
@@ -66,7 +66,7 @@ def model_triangles(entry: ModelEntry) -> Array:
 
 
 def block_triangles(entry: BlockEntry, instance: Instance) -> Array:
-    """Rows (36, 8) of place, colour and texture of a block."""
+    """Rows (36, 8) of position, colour and texture of a block."""
     size, rows = np.array(entry.dimension), []
     colour = np.zeros(3) if isinstance(entry.paint, Path) else np.array(entry.paint)
     for axis in range(3):
@@ -82,7 +82,7 @@ def block_triangles(entry: BlockEntry, instance: Instance) -> Array:
 
 
 class GlPeer:
-    """Draws a map with OpenGL and reads the picture back, which is upside down in OpenGL and so drawn that way."""
+    """Draws a map with OpenGL and reads the image back, which is upside down in OpenGL and so drawn that way."""
 
     def __init__(self, path: Path, width: int, height: int, fovy: float) -> None:
         """Size in pixels, vertical field of view in rad."""
@@ -123,7 +123,7 @@ class GlPeer:
         return self._plain(rows)[0], texture
 
     def render(self, position: Array, axes: Array) -> Image:
-        """The picture (height, width, 4) in the order B, G, R, A, the next one drawn over it.
+        """The image (height, width, 4) in the order B, G, R, A, the next one drawn over it.
 
         ``position`` (3,) in the world, ``axes`` (3, 3) of the camera as rows: right, down and forward.
         """
@@ -148,7 +148,7 @@ def grey(picture: Image) -> Array:
 
 
 def ssim(one: Image, other: Image) -> float:
-    """Structural similarity of two pictures (Wang et al. 2004): grey, a Gaussian window of 1.5 pixels."""
+    """Structural similarity of two images (Wang et al. 2004): grey, a Gaussian window of 1.5 pixels."""
     a, b = grey(one), grey(other)
 
     def mean(values: Array) -> Array:

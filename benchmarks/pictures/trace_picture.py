@@ -13,7 +13,7 @@ from typing import Any
 from dodo_dsl import atomic
 
 WIDTH, LEFT, RIGHT, LANE, GAP = 960, 160, 20, 26, 34
-"""Pixels: of the picture, beside the bars, of a lane, and above each trace."""
+"""Pixels: of the image, beside the bars, of a lane, and above each trace."""
 LETTER = 6.2
 COLOURS = (
     "#4878cf", "#6acc65", "#d65f5f", "#b47cc7", "#c4ad66", "#77bedb",
@@ -29,7 +29,7 @@ def spans(trace: dict[str, Any]) -> tuple[list[str], list[dict[str, Any]]]:
 
 
 def draw(traces: dict[str, dict[str, Any]]) -> str:
-    """The picture; ``traces`` by their titles."""
+    """The image; ``traces`` by their titles."""
     found = {title: spans(trace) for title, trace in traces.items()}
     longest = max(phase["ts"] + phase["dur"] for _, phases in found.values() for phase in phases) / 1e6
     scale, top, rows = (WIDTH - LEFT - RIGHT) / longest, 0, list[str]()

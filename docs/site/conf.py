@@ -11,7 +11,9 @@ root_doc = "docs/index"
 include_patterns = [
     "README.md",
     "CHANGELOG.md",
+    "CODE_OF_CONDUCT.md",
     "CONTRIBUTING.md",
+    "SECURITY.md",
     "benchmarks/README.md",
     "docs/*.md",
     "docs/**/*.md",
@@ -26,3 +28,14 @@ html_theme = "furo"
 html_title = "DoDo"
 html_copy_source = False
 html_show_sphinx = False
+templates_path = ["."]
+html_sidebars = {
+    "**": [
+        "sidebar/brand.html",
+        "sidebar/search.html",
+        "sidebar/scroll-start.html",
+        "sidebar/navigation.html",
+        "demo.html",
+        "sidebar/scroll-end.html",
+    ]
+}

@@ -112,7 +112,7 @@ def variables_of(file: Path) -> Mapping[str, str]:
 
 
 def text_of(file: Path) -> str:
-    """The begin of a regular file; empty where there is none, and for symlinks."""
+    """The start of a regular file; empty if there is none, and for symlinks."""
     if file.is_symlink() or not file.is_file():
         return ""
     with file.open("rb") as stream:

@@ -59,7 +59,7 @@ def _texts(value: Any, change: Change) -> Any:
 
 
 def _as_relative(path: str) -> str:
-    """A path whose variable is part of a file's name, after ``./``: ``${CAR:-kiwi}.env`` is beside the compose file."""
+    """A path with a variable in a file's name, after ``./``: ``${CAR:-kiwi}.env`` is next to the compose file."""
     if not path.startswith("$") or "://" in path or _HERE.match(path):
         return path
     end = interpolation.end_of_variable(path, 0)

@@ -1,6 +1,6 @@
 """All files of an application merged into one document, with what they extend and include.
 
-``docker compose`` also reads files that it finds beside those that DoDo was given: a warning names them.
+``docker compose`` also reads files that it finds next to those that DoDo was given: a warning names them.
 """
 
 import os
@@ -157,7 +157,7 @@ def _found(
     services = document.get("services")
     entries = services.entries if isinstance(services, source.Mapping) else {}
     if base.name not in entries:
-        files.problem(word.span, f"there is no service '{base.name}' to extend", did_you_mean(base.name, entries))
+        files.problem(word.span, f"unknown service '{base.name}' to extend", did_you_mean(base.name, entries))
         return None
     if base in chain or len(chain) > MAX_DEPTH:
         names = " extends ".join(f"'{service.name}'" for service in (*chain, base))
@@ -191,7 +191,7 @@ _PLAIN = re.compile(r"[\w./-]+")
 def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnostic]:
     """A warning where compose would read other files together with one of ``paths``.
 
-    Its hint names files as ``dodo.yml`` does, which is in ``root`` or else beside them.
+    Its hint names files as ``dodo.yml`` does, which is in ``root`` or else next to them.
     """
     folder = paths[0].parent
     named = [_whole_file(path) for path in paths]
@@ -221,7 +221,7 @@ def _discovered(folder: Path) -> tuple[list[Path], str]:
     there = [
         [_whole_file(folder / name) for name in names if (folder / name).is_file()] for names in (_NAMES, _OVERRIDES)
     ]
-    return [paths[0] for paths in there if paths], "which it finds beside this file"
+    return [paths[0] for paths in there if paths], "which it finds next to this file"
 
 
 def _whole_file(path: Path) -> Path:

@@ -25,7 +25,7 @@ FILES = "dodo-files"
 """The service that copies the files of the repository to which an application may write."""
 KEYS = ("x-dodo", "x-dodo-process")
 
-_ABOUT_NO_MESSAGES = {"tune", "cid", "display"}
+_ABOUT_NO_MESSAGES = {"tune", "cid", "display", "timed"}
 
 Word = tuple[str, Span]
 
@@ -89,9 +89,19 @@ class ComposeService:
     @property
     def has_display(self) -> bool:
         """Whether its process is to have an X server."""
+        return self._true("display") is not None
+
+    @property
+    def timed(self) -> Span | None:
+        """The place that declares its own timers."""
+        return self._true("timed")
+
+    def _true(self, key: str) -> Span | None:
+        """The place of a key of ``x-dodo`` that is true."""
         about = self.node.get(KEYS[0])
-        word = about.get("display") if isinstance(about, source.Mapping) else None
-        return isinstance(word, Scalar) and word.value is True
+        entry = about.entries.get(key) if isinstance(about, source.Mapping) else None
+        is_true = entry is not None and isinstance(entry.value, Scalar) and entry.value.value is True
+        return entry.key if entry and is_true else None
 
 
 @dataclass(frozen=True)
@@ -139,6 +149,11 @@ class ApplicationSource:
         values = [cid.value for cid in self.cids if isinstance(cid.value, int)]
         return values[0] if values else None
 
+    @property
+    def timed(self) -> tuple[Word, ...]:
+        """The services that declare their own timers, each with the place."""
+        return tuple((each.name, each.timed) for each in self.services.values() if each.timed)
+
     @functools.cached_property
     def paths(self) -> HostPaths:
         """The host's paths as the application may use them."""
@@ -147,7 +162,7 @@ class ApplicationSource:
 
     @property
     def other_roots(self) -> tuple[Path, ...]:
-        """The folders beside its repository whose files are the application's own."""
+        """The folders besides its repository whose files are the application's own."""
         own = repository(self.folder)
         return tuple(root for root in map(Path, self.access.roots) if root not in own)
 
@@ -249,7 +264,7 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
 
 
 def cid_variables(files: Iterable[EnvFile], folder: Path) -> tuple[str, ...]:
-    """The CID variables that files beside the compose file set."""
+    """The CID variables that files next to the compose file set."""
     found: set[str] = set()
     for file in files:
         if not file.path.startswith(("/", "~", "$")):

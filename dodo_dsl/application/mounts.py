@@ -31,7 +31,7 @@ _MB = 10**6
 class Shown:
     """A path of the host that the engine mounts; ``steps`` lead to it in ``node``; ``writer`` may be empty.
 
-    ``is_required`` tells that the engine does not make what is missing.
+    ``is_required`` means that the engine does not make what is missing.
     """
 
     node: Node
@@ -52,7 +52,7 @@ def nested_mounts(application: ApplicationSource) -> Iterator[Diagnostic]:
 
 
 def within_another(source: str, mounts: Sequence[tuple[str, str]], paths: HostPaths) -> tuple[str, str] | None:
-    """Why a path is no mount beside the others, each with who writes to it or an empty string, and what to do."""
+    """Why a path cannot be mounted with the others, each with the service that writes to it or empty, and a hint."""
     if paths.is_open(source):
         return None
     for other, writer in mounts:

@@ -16,9 +16,9 @@ _FLAG = re.compile(r"--(?P<flag>name|width|height)(?:\.(?P<format>\w+))?(?:=(?P<
 
 @dataclass(frozen=True)
 class AskedPictures:
-    """What a service of an application asks for; ``formats`` by the memory's name, empty where nothing says one.
+    """What a service of an application asks for; ``formats`` by the memory's name, empty if nothing says one.
 
-    ``width`` and ``height`` in pixels, 0 where they are not given.
+    ``width`` and ``height`` in pixels, 0 if they are not given.
     """
 
     service: str

@@ -38,7 +38,7 @@ def compiled(pattern: str) -> Any:
         text = error.args[0] if error.args else ""
         raise PatternError(text.decode(errors="replace") if isinstance(text, bytes) else str(text)) from None
     except UnicodeEncodeError:
-        raise PatternError("it is no text in UTF-8") from None
+        raise PatternError("it is not UTF-8 text") from None
     if found.programsize > _MAX_SIZE:
         raise PatternError(f"it is as large as {found.programsize} instructions of RE2, expected at most {_MAX_SIZE}")
     return found
@@ -85,7 +85,7 @@ def _unknown_fields(line: PrintedLine, groups: list[str], definition: Definition
             message = f"{definition.name} has no field '{group[:80]}'"
             fields = ", ".join([*types, SAMPLE_TIME])
             hint = did_you_mean(group, [*types, SAMPLE_TIME]) or f"groups of the pattern may be {fields}"
-            hint = "write 'sender: 0' beside 'match' for a sender stamp" if group == "sender" else hint
+            hint = "write 'sender: 0' next to 'match' for a sender stamp" if group == "sender" else hint
             yield Diagnostic(line.match_span, LINES_RULE, message, hint)
         elif group in types and types[group] not in SCALARS:
             message = f"field '{group}' of {definition.name} is a message itself, which a line cannot give"

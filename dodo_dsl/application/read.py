@@ -88,7 +88,7 @@ def read_application(
 
 
 def as_written(path: Path) -> ApplicationSource | None:
-    """The application of a compose file with whatever else is wrong with it; None where it is no compose file."""
+    """The application of a compose file with whatever else is wrong with it; None if it is not a compose file."""
     roots = repository(path.resolve().parent)
     files = ComposeFiles(source.read, roots)
     document = load(files, [path])
@@ -149,7 +149,7 @@ def _declared_cids(nodes: Iterable[source.Mapping]) -> Iterator[source.Scalar]:
 
 
 def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Problems of everything beside the services."""
+    """Problems of everything except the services."""
     raw = plain(interpolated_node(document, application.known))
     look = Look(application.paths, limits=application.limits, passed=application.access.passed)
     for finding in shared_findings(raw, look):

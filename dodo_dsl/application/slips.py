@@ -177,6 +177,6 @@ def _slip(written: str) -> tuple[str, str]:
         return "'${}' names no variable", "for example ${GAIN:-1}, or $${} for the text itself"
     known = _WITHOUT_OPERATOR.fullmatch(written)
     if known:
-        return f"'{shown}' is no variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
+        return f"'{shown}' is not a variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
     what = "the name of a variable has letters, digits and underscores"
-    return f"'{shown}' is no variable of compose", f"{what}; text that begins with ${{ is written $${{"
+    return f"'{shown}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"

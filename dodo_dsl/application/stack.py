@@ -20,7 +20,7 @@ RULE = "application-stack"
 class Part(NamedTuple):
     """A service of the stack: its ``names``, a pattern, and what a test has ``instead``.
 
-    ``is_world`` tells that it makes what a test's environment or action makes, so that both would speak.
+    ``is_world`` means that it makes what a test's environment or action makes, so that both would speak.
     """
 
     names: str

@@ -24,7 +24,7 @@ _COMMANDS = ("entrypoint", "command")
 
 
 def owner(name: str) -> str:
-    """Why a test may not set a variable; empty where it may."""
+    """Why a test may not set a variable; empty if it may."""
     if name in CID_VARIABLES:
         return "it holds the test's own CID"
     if name.upper().startswith("DODO_"):
@@ -35,7 +35,7 @@ def owner(name: str) -> str:
 
 
 def split_by(application: ApplicationSource, name: str, value: str) -> str:
-    """The service whose command, a string, a value would tear apart with a quotation mark or the like; else empty."""
+    """The service whose command, a string, a value would tear apart with a quotation mark or similar; else empty."""
     for service in application.services.values():
         commands = (service.node.get(key) for key in _COMMANDS)
         if _SPLIT & set(value) and any(isinstance(c, Scalar) and name in names(c.text) for c in commands):

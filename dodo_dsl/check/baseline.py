@@ -34,7 +34,7 @@ class ResolvedBaseline:
 
 
 class _WrongBaseline(Exception):
-    """The problem, at its place in the spec."""
+    """The problem, at its position in the spec."""
 
     def __init__(self, span: Span, rule: str, message: str, hint: str = "", fix: Fix | None = None) -> None:
         super().__init__(message)

@@ -18,7 +18,7 @@ from dodo_dsl.spec.values import default_value
 
 @dataclass(frozen=True)
 class ArgumentExplained:
-    """A parameter with the value of its flag; ``origin`` is a place, "default", or the service or rig that gives it."""
+    """A parameter with its flag's value; ``origin`` is a position, "default", or the service or rig that gives it."""
 
     name: str
     value: str
@@ -56,7 +56,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Asked:
-    """What the application must produce, or may produce where ``required`` is false."""
+    """What the application must produce, or may produce if ``required`` is false."""
 
     kind: str
     port: str

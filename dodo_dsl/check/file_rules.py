@@ -1,7 +1,7 @@
 """Rules on the files that parameters name, and on the limits by which evaluators judge.
 
-``wrong-file``: what is in a file, read as the services read it, at the place in the file. A file whose parameter has no
-format is JSON of the shape that the manifest names.
+``wrong-file``: what is in a file, read as the services read it, at the position in the file. A file whose parameter
+has no format is JSON of the shape that the manifest names.
 ``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
 ``short-timeout``: the test's timeout leaves room for the longest time that an evaluator waits.
 ``no-limit``: an evaluator has something to judge by; ``empty-file``: so has the file that it judges by. A test that can

@@ -46,7 +46,7 @@ class Problems:
         return replace(self, of_services=tuple(kept))
 
     def of(self, specs: Iterable[Spec]) -> tuple[Diagnostic, ...]:
-        """What these instances have, sorted by place, each once and with the tests that it depends on."""
+        """What these instances have, sorted by position, each once and with the tests that it depends on."""
         instances: dict[Path, list[Spec]] = {}
         for spec in specs:
             instances.setdefault(spec.path, []).append(spec)
@@ -70,7 +70,7 @@ def _of(instances: Sequence[Spec], found: Sequence[Diagnostic]) -> Iterator[Diag
 def _having(
     instances: Mapping[Path, Sequence[Spec]], by_rules: Mapping[Path, Sequence[Diagnostic]]
 ) -> Mapping[Diagnostic, tuple[str, ...]]:
-    """The tests that are named with each problem: none where its place says whose it is, or where it is of a file."""
+    """The tests named with each problem: none if its position shows whose it is, or if it is of a file."""
     names: dict[Diagnostic, list[str]] = {}
     at_home = set[Diagnostic]()
     for path, found in by_rules.items():
@@ -92,7 +92,7 @@ def _without_consequences(
 ) -> Iterator[Diagnostic]:
     """The problems without those that follow from others, so that each mistake is reported once.
 
-    At ``unfilled`` places stand placeholders whose dimension or range is wrong itself.
+    At ``unfilled`` positions stand placeholders whose dimension or range is wrong itself.
     """
     told = {_place(d) for d in found if d.rule in _VALUE}
     moved = {

@@ -90,14 +90,14 @@ def may_send(service: ResolvedService, port: Port, ids: frozenset[tuple[str, int
 
 
 def without_pictures(service: ResolvedService) -> Path | None:
-    """The recording that a service plays, if that has no pictures; None if it may have some."""
+    """The recording that a service plays, if that has no frames; None if it may have some."""
     path = _recording(service)
     image = known_ids(())[IMAGE]
     return None if path is None or holds(path, image, _NO_STAMP) else path
 
 
 def picture_size(service: ResolvedService) -> tuple[int, int]:
-    """Width and height of the pictures that a service makes: as written, or of its recording; 0 if unknown."""
+    """Width and height of the frames that a service makes: as written, or of its recording; 0 if unknown."""
     path = _recording(service)
     if path is not None:
         sender = service.texts.get("video-sender", "")

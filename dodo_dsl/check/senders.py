@@ -77,12 +77,12 @@ def told(wiring: Wiring) -> tuple[End, ...]:
 
 
 def told_in_words(names: tuple[str, ...]) -> str:
-    """What an application hears that none hears on a road, by ``names`` of ``told``; empty for none."""
+    """What an application hears that no car does on a road, by ``names`` of ``told``; empty for none."""
     if not names:
         return ""
     listed = ", ".join(names)
     is_pose = any(name.partition("/")[0] in POSE for name in names)
-    return f"the application is told its true pose ({listed})" if is_pose else f"the application is told {listed}"
+    return f"the application gets its true pose ({listed})" if is_pose else f"the application gets {listed}"
 
 
 def services(test: ResolvedTest, automatic: tuple[str, ...]) -> tuple[str, ...]:

@@ -8,8 +8,8 @@ Parameters fit the manifest: known, complete, of the right type and unit, within
 ``missing-file``, ``path-escape``. ``unused-parameter``: those that are set have an effect beside the others.
 ``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
 ``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
-``camera-source``: what a rig's computer can take pictures from, in which sizes, and how often.
-``camera-size``: a camera's optics, as they were measured, are those of pictures of one size. ``out-of-range``: sizes
+``camera-source``: what a rig's computer can take frames from, in which sizes, and how often.
+``camera-size``: a camera's optics, as they were measured, are those of frames of one size. ``out-of-range``: sizes
 are even.
 """
 
@@ -225,21 +225,21 @@ def _problems(context: RuleContext, service: ResolvedService, argument: Argument
     if source not in _NAMES and not source.startswith("/dev/") and not PurePath(source).suffix:
         known = "write a device such as /dev/video0, rpicam or file"
         hint = did_you_mean(source, _NAMES) if closest(source, _NAMES) else known
-        yield Diagnostic(span, "camera-source", f"'{source}' is not a source of pictures", hint)
+        yield Diagnostic(span, "camera-source", f"'{source}' is not a source of frames", hint)
     elif source == EMULATED and context.rig is not None and not context.rig.is_emulated:
         message = f"rig '{context.rig.name}' is hardware, and an emulated camera sees nothing of it"
         yield Diagnostic(span, "camera-source", message, "write a device such as /dev/video0, or rpicam")
     elif source == _FILE and _FILE not in service.use.parameters:
-        message = f"'{service.use.name}' has the source 'file', but no 'file' to take pictures from"
+        message = f"'{service.use.name}' has the source 'file', but no 'file' to take frames from"
         yield Diagnostic(span, "camera-source", message, "write 'file: ...' under 'with' in the test, or a device")
     elif source == RPICAM and (width := service.texts.get("width", "")).isdigit() and int(width) % _ALIGNED:
-        message = f"rpicam-vid gives pictures whose width is a multiple of {_ALIGNED}, not {width}"
+        message = f"rpicam-vid gives frames whose width is a multiple of {_ALIGNED}, not {width}"
         hint = f"write a width of {max(int(width) // _ALIGNED, 1) * _ALIGNED}"
         yield Diagnostic(span, "camera-source", message, hint)
 
 
 def _odd(service: ResolvedService) -> Iterator[Diagnostic]:
-    """Sizes that pictures in I420 cannot have, where a colour is that of two by two pixels."""
+    """Sizes that frames in I420 cannot have, where a colour is that of two by two pixels."""
     for name in ("width", "height") if _I420 in service.arguments else ():
         argument, text = service.arguments.get(name), service.texts.get(name, "")
         if argument and text.isdigit() and int(text) % 2 and (name, service.texts.get("source")) != ("width", RPICAM):
@@ -250,7 +250,7 @@ def _odd(service: ResolvedService) -> Iterator[Diagnostic]:
 
 
 def _exposure(service: ResolvedService, source: str) -> Iterator[Diagnostic]:
-    """Pictures of a real camera that would come faster than it can expose them."""
+    """Frames of a real camera that would come faster than it can expose them."""
     if source != RPICAM and not source.startswith("/dev/"):
         return
     try:
@@ -260,14 +260,14 @@ def _exposure(service: ResolvedService, source: str) -> Iterator[Diagnostic]:
     if rate * exposure > 1 + 1e-9:
         places = (service.use.parameters.get(name) for name in ("exposure", "freq"))
         span = next((entry.value.span for entry in places if entry), service.use.span)
-        message = f"an exposure of {exposure * 1e3:g} ms does not fit into the {1e3 / rate:.3g} ms between two pictures"
+        message = f"an exposure of {exposure * 1e3:g} ms does not fit into the {1e3 / rate:.3g} ms between two frames"
         most, fastest = math.floor(1e4 / rate) / 10, math.floor(10 / exposure) / 10
         hint = f"write an exposure of at most {most:g} ms, or a freq of at most {fastest:g} Hz"
         yield Diagnostic(span, "camera-source", message, hint)
 
 
 def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
-    """A service that takes optics from the rig and works on pictures of another size."""
+    """A service that takes optics from the rig and works on frames of another size."""
     taken = (a.parameter for a in service.arguments.values() if (a.parameter.rig or "").startswith(_OPTICS))
     if rig is None or not any(p.name not in service.use.parameters and rig.entry(p.rig or "") for p in taken):
         return
@@ -275,9 +275,9 @@ def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
     given = [service.texts.get(name, "") for name in ("width", "height")]
     if all(measured) and all(given) and measured != given:
         where = service.use.parameters.get("width") or rig.entry(f"{_OPTICS}.width")
-        message = f"the camera of rig '{rig.name}' was measured in pictures of {' x '.join(measured)}, "
+        message = f"the camera of rig '{rig.name}' was measured in frames of {' x '.join(measured)}, "
         message += f"and '{service.use.name}' has them of {' x '.join(given)}"
-        hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take pictures of the measured size"
+        hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take frames of the measured size"
         yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)
 
 

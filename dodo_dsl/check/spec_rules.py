@@ -6,6 +6,7 @@
 ``clock-level``: lockstep needs an environment that can wait, so hardware runs in real time.
 ``clock-rate``: in lockstep a test steps from frame to frame, so all rates have to fit the camera's.
 ``clock-answers``: in lockstep a message has to complete the application's answer to a frame.
+``clock-timed``: in lockstep only time that frames bring goes on, and not that of an application's own timers.
 ``clock-virtual``: where the application's time is the test's, no answer is slow, and no printed line has a time.
 ``rig-pool``: any rig of a pool can run the test: there are some, of one kind, and they can be distinguished.
 ``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
@@ -75,6 +76,11 @@ def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
         message = "no declared message completes a frame: the application's answer ends when it waits for the next one"
         hint = "declare x-dodo.answers, or x-dodo.done, at the application's service that sends last"
         yield Diagnostic(context.spec.span("clock"), "clock-answers", message, hint, severity="warning")
+    timed = context.application.timed if context.application and context.spec.clock != VIRTUAL else ()
+    for name, span in timed:
+        message = f"this application acts by its own clock: '{name}' has timers, which in lockstep do not wait"
+        hint = "run it with 'clock: realtime', or 'clock: virtual'"
+        yield Diagnostic(span, "clock-timed", message, hint, severity="warning")
 
 
 def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
@@ -119,7 +125,7 @@ def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
         yield from _kind(pool.kind, rigs)
     for word in pool.names:
         if word.text in EMULATED_RIGS:
-            message = f"'{word.text}' is in no pool, as every test has one of its own"
+            message = f"'{word.text}' is in no pool, because every test has its own"
             yield Diagnostic(word.span, "rig-pool", message, f"write 'rig: {word.text}'")
         elif word.text not in rigs:
             yield Diagnostic(word.span, "unknown-rig", f"unknown rig '{word.text}'", did_you_mean(word.text, rigs))
@@ -129,7 +135,7 @@ def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
         span = places.get(rig.name, pool.kind.span if pool.kind else context.spec.span("rig"))
         if rig.kind != found[0].kind:
             message = f"rig '{rig.name}' is {rig.kind}, and '{found[0].name}' is {found[0].kind}"
-            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can take each other's place")
+            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can replace each other")
         for other in found[:number]:
             if device := _same_device(other, rig):
                 message = (

@@ -203,17 +203,17 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
-    """Memories in which no picture will ever be: their services play recordings without."""
+    """Memories in which no frame will ever be: their services play recordings without."""
     for service, names in asked.items():
         for name in sorted(names.keys() & recordings.keys()):
             file = recordings[name].name
-            message = f"the application's '{service}' reads pictures from '{name}', and '{file}' has none"
+            message = f"the application's '{service}' reads frames from '{name}', and '{file}' has none"
             hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
             yield Diagnostic(names[name], "application-memory", message, hint, "warning")
 
 
 def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
-    """Pictures whose bytes the application would take for others, or refuse."""
+    """Frames whose bytes the application would take for others, or refuse."""
     if context.application is None or not context.spec.is_whole or not context.test.is_complete:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
@@ -238,7 +238,7 @@ def _sizes(context: RuleContext, service: ResolvedService, asked: AskedPictures)
     size, other = (f"{width} x {height}" for width, height in (wanted, made))
     written = [use.parameters[key].value.span for key in ("width", "height", "rec") if key in use.parameters]
     who = f"the application's '{asked.service}'"
-    message = f"{who} asks for pictures of {size} pixels, and '{use.name}' makes them of {other}"
+    message = f"{who} asks for frames of {size} pixels, and '{use.name}' makes them of {other}"
     flags = f"--width={made[0]} --height={made[1]}"
     hint = f"{flags} in the command of '{asked.service}'"
     if "width" in service.arguments and not (context.rig and not context.rig.is_emulated):

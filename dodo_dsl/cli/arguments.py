@@ -22,7 +22,7 @@ class Arguments(argparse.ArgumentParser):
         super().error(masked(message))
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Raises ArgumentError, without an argument of its own, for what is none of an action's choices."""
+        """Raises ArgumentError, without its own argument, for what is none of an action's choices."""
         if action.choices is not None and value not in action.choices:
             raise argparse.ArgumentError(None, _wrong_choice(action, str(value)))
 

@@ -43,7 +43,7 @@ Fixes = dict[Span, Fix]
 
 
 def apply_fixes(diagnostics: Iterable[Diagnostic], root: Path) -> str:
-    """Mends the files of the repository at ``root`` and returns the diff; each file appears whole. Raises OSError."""
+    """Fixes the files of the repository at ``root`` and returns the diff; each file appears whole. Raises OSError."""
     by_file: dict[Path, Fixes] = defaultdict(dict)
     for diagnostic in diagnostics:
         path = Path(diagnostic.span.file)
@@ -252,7 +252,7 @@ def _fixed(checked: Checked, options: argparse.Namespace, out: TextIO) -> Checke
 
 
 def _log(style: str, stdout: TextIO, stderr: TextIO) -> TextIO | None:
-    """Where people read what is wrong: a report is for a file, and the log of its job tells the same as text.
+    """Where people read what is wrong: a report is for a file, and the log of its job shows the same as text.
 
     None for JSON, which a program reads, and where the report itself is on the terminal.
     """

@@ -56,7 +56,7 @@ class Pictures:
 
     @property
     def note(self) -> str:
-        """What a new test takes from the application; empty where that is nothing."""
+        """What a new test takes from the application; empty if that is nothing."""
         named = ", ".join(self.memories.values())
         return f"its pictures are those of '{self.service}': {named}, {self.width}x{self.height}\n" if named else ""
 
@@ -93,7 +93,7 @@ class Declarable:
 
 
 def declarable(file: Path) -> Declarable | None:
-    """None where the name of the file says all."""
+    """None if the name of the file says all."""
     application = as_written(file)
     if application is None:
         return None
@@ -103,7 +103,7 @@ def declarable(file: Path) -> Declarable | None:
 
 
 def _said(service: ComposeService, application: ApplicationSource) -> str:
-    """The keys of x-dodo that a service's sources tell, where its compose file has none."""
+    """The keys of x-dodo that a service's sources show, where its compose file has none."""
     build = service.node.get("build")
     context = build.get("context") if isinstance(build, source.Mapping) else build
     if service.declared or not isinstance(context, source.Scalar) or not is_local(context.text):

@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def pull(options: argparse.Namespace, stdout: TextIO) -> int:
-    """Pulls what is missing or newer in its registry; raises UsageError where there is no room for it."""
+    """Pulls what is missing or newer in its registry; raises UsageError if there is no room for it."""
     checked, rig = _tests(options)
     docker_command.require_engine()
     docker_command.require_buildx()
@@ -67,7 +67,7 @@ def _tests(options: argparse.Namespace) -> tuple[Checked, Rig]:
     rigs = selection.checked_deployment().rigs
     if options.rig not in rigs:
         hint = did_you_mean(options.rig, rigs)
-        raise UsageError(f"there is no rig '{options.rig}' in dodo.yml" + (f"; {hint}" if hint else ""))
+        raise UsageError(f"unknown rig '{options.rig}' in dodo.yml" + (f"; {hint}" if hint else ""))
     checked = selection.select([], (), options.application)
     tests = tuple(test for test in checked.tests if test.spec.rig == options.rig)
     if not tests:
@@ -120,7 +120,7 @@ def _of_application(plan: Plan, folder: Path) -> tuple[set[str], set[str]]:
 
 
 def _room(rig: Rig, images: Sequence[RemoteImage]) -> str:
-    """How much room the images need and find; raises UsageError where they find too little."""
+    """How much room the images need and find; raises UsageError if they find too little."""
     all_of_them = UNPACKED * remote.bytes_of(images)
     packed = remote.bytes_of(images, remote.local_layers())
     folder = Path(docker_command.ask("info", "--format", "{{.DockerRootDir}}"))

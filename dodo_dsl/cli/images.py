@@ -32,7 +32,7 @@ Dockerfiles = Mapping[str, Path | None]
 
 
 def dockerfiles(deployment: Deployment) -> Dockerfiles:
-    """The Dockerfile of each own image, None where there is none; raises UsageError for manifests with problems."""
+    """The Dockerfile of each own image, None if there is none; raises UsageError for manifests with problems."""
     if not deployment.services:
         return {}
     manifests, problems = load_manifests(deployment.services)
@@ -49,13 +49,13 @@ def require_dockerfiles(names: Collection[str], own: Dockerfiles, images: Sequen
         if image.name in names and own.get(image.name, Path()) is None:
             base = images_names.beside(image.reference, "base")
             raise UsageError(
-                f"there is no Dockerfile beside the service.yml of '{image.name}': write one there, or build "
+                f"there is no Dockerfile next to the service.yml of '{image.name}': write one there, or build "
                 f"{image.reference} from your own Dockerfile on {base}"
             )
 
 
 def build_own(image: Image, dockerfile: Path, stdout: TextIO) -> None:
-    """Builds an image; raises UsageError where the one below it is missing, and DockerError."""
+    """Builds an image; raises UsageError if the one below it is missing, and DockerError."""
     base = images_names.base_of(image, dockerfile)
     if base.startswith(f"{Deployment.image_prefix}/") and not docker_command.is_local(base):
         prefix, _, last = base.rpartition("/")
@@ -146,7 +146,7 @@ def _platforms(text: str) -> list[str]:
     found = list(dict.fromkeys(text.split(",")))
     for one in found:
         if not PLATFORM.fullmatch(one):
-            raise argparse.ArgumentTypeError(f"there is no platform '{one}'; write them as linux/amd64,linux/arm64")
+            raise argparse.ArgumentTypeError(f"unknown platform '{one}'; write platforms as linux/amd64,linux/arm64")
     return found
 
 
@@ -179,7 +179,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 
 def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    """Writes the application's checked builds as a compose file; raises UsageError where there is no application."""
+    """Writes the application's checked builds as a compose file; raises UsageError if there is no application."""
     deployment = selection.checked_deployment()
     files = selection.existing_files(options.application) or deployment.application
     if not files:
@@ -201,7 +201,7 @@ def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) ->
 def _own_contexts(
     builds: dict[str, Any], source: ApplicationSource, deployment: Deployment, folder: Path | None, stderr: TextIO
 ) -> dict[str, Any]:
-    """The same builds with contexts of their own in a folder; raises UsageError where it cannot be made."""
+    """The same builds with their own contexts in a folder; raises UsageError if it cannot be made."""
     if folder is None:
         return builds
     try:

@@ -41,7 +41,7 @@ class KnownRun:
 
 
 def known_run(recording: Path) -> KnownRun | None:
-    """The run whose report holds a recording, from ``results.json`` above its folder; None where there is none."""
+    """The run whose report holds a recording, from ``results.json`` above its folder; None if there is none."""
     folder = recording.resolve().parent
     try:
         outcomes = results.load(folder.parent / results.FILE_NAME)

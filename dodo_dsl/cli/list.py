@@ -94,7 +94,7 @@ def _services(checked: Checked) -> list[dict[str, str]]:
 def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
     manifest = checked.manifests.get(name)
     if manifest is None:
-        raise UsageError(f"there is no service '{name}'; {did_you_mean(name, checked.manifests)}")
+        raise UsageError(f"unknown service '{name}'; {did_you_mean(name, checked.manifests)}")
     lines = [f"{manifest.name} ({', '.join(manifest.layers)}): {manifest.description}", "", "parameters:"]
     for parameter in manifest.parameters.values():
         default = "" if parameter.default in (None, []) else f", default {parameter.default}"
@@ -125,7 +125,7 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
 
 
 def _found_by(manifest: Manifest) -> str:
-    """The variable by which Python finds a service that is run by hand; empty where it does without."""
+    """The variable by which Python finds a service that is run by hand; empty if it does without."""
     folders = [] if Path("services", "base").is_dir() else [package_data.root()]
     if not manifest.folder.is_relative_to(package_data.services()):
         folders.append(manifest.folder.resolve().parents[1])
@@ -159,7 +159,7 @@ def _rows(specs: Sequence[Spec], unfolded: bool) -> list[tuple[str, ...]]:
     tests: dict[Path, list[Spec]] = defaultdict(list)
     for spec in specs:
         tests[spec.path].append(spec)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for spec, *others in tests.values():
         if others and not unfolded:
             dimensions = ", ".join(name for name, _ in (*spec.choice.values, *spec.choice.shown))

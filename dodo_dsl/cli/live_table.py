@@ -1,21 +1,23 @@
 """The table that a terminal shows while tests run: a line for each, with its phase, its own time and how fast it is."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self, TextIO
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import Progress as Bars
 from rich.progress import ProgressColumn, SpinnerColumn, Task, TextColumn
 from rich.text import Text
 
-from dodo_dsl.cli.progress import about, count
+from dodo_dsl.cli.progress import about, count, ending
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.terminal import printable, unescaped
 
 _STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
+_WORDS = {"passed": "passed", "failed": "failed", "error": "in error"}
 _FIELDS = {"state": "", "pace": None, "nearest": ""}
 
 
@@ -46,24 +48,36 @@ class _PaceColumn(ProgressColumn):
         return Text(pace.text(self._now()) if pace else "")
 
 
+class _Bars(Bars):
+    """The lines of running tests, and below them one on all others."""
+
+    rest = ""
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        yield from super().get_renderables()
+        if self.rest:
+            yield Text(self.rest)
+
+
 class LiveProgress:
-    """A line for each running test; the outcomes of others stand above. Texts of services are never rich's markup."""
+    """A line for each running test; those that did not pass stand above. Texts of services are never rich's markup."""
 
     def __init__(self, stream: TextIO, slugs: Sequence[str], now: Callable[[], float] = time.monotonic) -> None:
         """``now`` gives seconds that never go back."""
         self._now = now
         self._width = max(map(len, slugs), default=0)
-        self._progress: Any = Bars(
+        self._progress: Any = _Bars(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),
             TextColumn("{task.fields[state]}", markup=False),
             _PaceColumn(now),
             TextColumn("{task.fields[nearest]}", markup=False),
             console=Console(file=unescaped(stream)),
+            transient=True,
         )
-        self._rest: Any = None
         self._tasks: dict[str, Any] = {}
         self._began: dict[str, float] = {}
+        self._ended: Counter[str] = Counter()
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -88,12 +102,14 @@ class LiveProgress:
             self._progress.update(self._tasks[slug], pace=pace, nearest=printable(standing.nearest))
 
     def done(self, outcome: Outcome) -> None:
-        name = f"{printable(outcome.slug):<{self._width}}  "
-        self._progress.console.print(Text.assemble(name, (outcome.outcome, _STYLES[outcome.outcome])))
+        self._ended[outcome.outcome] += 1
+        if outcome.outcome != "passed":
+            name = f"{printable(outcome.slug):<{self._width}}  "
+            verdict = (outcome.outcome, _STYLES[outcome.outcome])
+            self._progress.console.print(Text.assemble(name, verdict, ending(outcome)))
         if (task := self._tasks.pop(outcome.slug, None)) is not None:
             self._progress.remove_task(task)
 
     def rest(self, seconds: float, tests: int) -> None:
-        if self._rest is None:
-            self._rest = self._progress.add_task("", total=None, **_FIELDS)
-        self._progress.update(self._rest, state=f"{count(tests)} to go, {about(seconds)}")
+        ended = "".join(f"{self._ended[kind]} {word}, " for kind, word in _WORDS.items() if self._ended[kind])
+        self._progress.rest = f"{ended}{count(tests)} to go, {about(seconds)}"

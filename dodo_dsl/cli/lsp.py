@@ -33,7 +33,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         )
     sys.stdout.flush()
     with (
-        contextlib.redirect_stdout(sys.stderr),  # what is printed by mistake is no message
+        contextlib.redirect_stdout(sys.stderr),  # what is printed by mistake is not a message
         os.fdopen(os.dup(1), "wb") as messages,
         os.fdopen(os.dup(0), "rb") as requests,
     ):

@@ -102,13 +102,13 @@ class Questions:
         line = self.stdin.readline()
         if not line:
             self.stdout.write("\n")
-            raise UsageError("nothing was written, as the input ended before all was answered")
+            raise UsageError("nothing was written: the input ended before all questions were answered")
         return line.strip()
 
 
 _NO_APPLICATION = (
     f"write your application's compose file, and name it in {FILE_NAME}: application: {COMPOSE_FILES[0]}\n"
-    "      (dodo new --application, in an empty folder, writes an application to begin with, and a test)"
+    "      (dodo new --application, in an empty folder, writes a first application and a test)"
 )
 
 
@@ -116,7 +116,7 @@ _NO_APPLICATION = (
 class Destination:
     """The repository's root, the registry that takes the test, and the files that the repository lacks for it.
 
-    ``todo`` says what the user has to do before the test can run, empty where an application is named and there.
+    ``todo`` says what the user has to do before the test can run, empty if an application is named and there.
     """
 
     root: Path
@@ -141,7 +141,7 @@ def destination(checked: Checked) -> Destination:
 def _registry(deployment: Deployment, diagnostics: Sequence[Diagnostic]) -> Path:
     """The first registry that belongs to the repository itself, and not to a DoDo that is installed in it.
 
-    One that does not exist yet counts where there is no other.
+    One that does not exist yet counts if there is no other.
     """
     own = [d for d in diagnostics if d.span.file == str(deployment.file) and d.severity == "error"]
     wrong = [d for d in own if d.rule != "missing-file"]
@@ -152,7 +152,7 @@ def _registry(deployment: Deployment, diagnostics: Sequence[Diagnostic]) -> Path
         if registry.resolve().is_relative_to(root) and not package_data.is_shipped(registry, root):
             return registry
     file = shown_path(str(deployment.file))
-    raise UsageError(f'{file} names no folder for own tests; write in it: registry: [{REGISTRY}, "dodo:"]')
+    raise UsageError(f'{file} names no folder for your own tests; add to it: registry: [{REGISTRY}, "dodo:"]')
 
 
 _FIRST = "sil-first"

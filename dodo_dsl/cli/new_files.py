@@ -150,12 +150,12 @@ IGNORED = ".gitignore"
 _JOB = "compile"
 _STAGE = "test"
 _OWN = ("script", "trigger", "extends", "run")
-"""What a job of its own has, and no change to a job of the template."""
+"""What its own job has, and no change to a job of the template."""
 
 
 @dataclass(frozen=True)
 class KeptPipeline:
-    """``warning`` is empty where no job has the name of DoDo's; ``stages`` where the stage of DoDo's jobs is there."""
+    """``warning`` is empty if no job has the name of DoDo's; ``stages`` where the stage of DoDo's jobs is there."""
 
     includes_dodo: bool = False
     warning: str = ""

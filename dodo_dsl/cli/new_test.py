@@ -78,7 +78,7 @@ def base_test(name: str, specs: list[Spec]) -> Spec:
         if spec.name == name:
             return spec
     hint = did_you_mean(name, [s.name for s in specs if s.name])
-    raise UsageError(f"there is no test '{name}' to extend" + (f"; {hint}" if hint else ""))
+    raise UsageError(f"unknown test '{name}' to extend" + (f"; {hint}" if hint else ""))
 
 
 def spec_files(name: str, folder: Path, root: Path, text: bytes) -> list[New]:
@@ -89,7 +89,7 @@ def spec_files(name: str, folder: Path, root: Path, text: bytes) -> list[New]:
 
 
 def _schema_line(folder: Path, root: Path) -> bytes:
-    """The line that tells an editor the schema."""
+    """The line that names the schema for an editor."""
     schema = Path(os.path.relpath(schema_of_specs(root), folder)).as_posix()
     return f"# yaml-language-server: $schema={schema}\n".encode()
 
@@ -108,7 +108,7 @@ _SHIPPED = {
 
 @dataclass(frozen=True)
 class Start:
-    """``template`` is empty where ``shipped`` is copied, for the reason ``why``."""
+    """``template`` is empty if ``shipped`` is copied, for the reason ``why``."""
 
     level: str
     kind: str
@@ -118,7 +118,7 @@ class Start:
 
 
 def start(level: str, kind: str, name: str = "NAME") -> Start:
-    """What the test ``name`` begins with; raises UsageError where none can have the level and the kind."""
+    """What the test ``name`` begins with; raises UsageError if none can have the level and the kind."""
     if (level, kind) == ("dil", "closed-loop"):
         reason = "a dil test cannot be closed-loop: what was recorded does not react to the application"
         raise UsageError(f"{reason}; try: dodo new {name} --level dil --kind open-loop")
@@ -146,11 +146,11 @@ def listing(shipped: Sequence[Spec]) -> str:
     return (
         "dodo new NAME writes a test, which begins as\n"
         + _table(rows)
-        + "\nor, with --level dil --rec FILE.rec, as a test of a recording of your own\n"
+        + "\nor, with --level dil --rec FILE.rec, as a test of your own recording\n"
         + "\nor as a copy of a test that ships with DoDo\n"
         + _table(copies)
         + "\ndodo new --application writes an application and a test that it passes, dodo new --deployment what a\n"
-        + "repository needs beside its application and its tests; dodo new --help says more\n"
+        + "repository needs besides its application and its tests; dodo new --help says more\n"
     )
 
 

@@ -96,7 +96,7 @@ class PipelineFile:
 
 
 def pipeline_file(root: Path) -> PipelineFile | None:
-    """The pipeline of the repository that ``root`` is in, or None where there is none."""
+    """The pipeline of the repository that ``root`` is in, or None if there is none."""
     top = _top(root)
     return read(top / FILE) if (top / FILE).is_file() else None
 
@@ -113,7 +113,7 @@ def read(path: Path) -> PipelineFile:
 
 
 def problems(root: Path) -> list[Diagnostic]:
-    """What in the pipeline of the repository goes beside DoDo's jobs, or their settings beside them."""
+    """What in the pipeline of the repository runs in addition to DoDo's jobs, or their settings."""
     found = pipeline_file(root)
     if found is None:
         return []
@@ -274,7 +274,7 @@ def _spliced(item: source.Node, root: source.Mapping, depth: int) -> list[Any]:
 
 
 def _extended(name: str, config: Mapping[str, Any], depth: int = 0) -> dict[str, Any] | None:
-    """A job with what it extends; None where that is in a file that is not read."""
+    """A job with what it extends; None if that is in a file that is not read."""
     job = config.get(name)
     if not isinstance(job, dict) or depth > _DEPTH:
         return None

@@ -19,7 +19,7 @@ _NOTHING = ":"
 _RUBY_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 ARTIFACT, REPOSITORY = "artifact", "repository"
 ARTIFACT_MB = 100
-"""What an artifact may have by default in a GitLab of one's own."""
+"""What an artifact may have by default in one's own GitLab."""
 _IMAGE = re.compile(r"DODO_IMAGE_[A-Z0-9_]+=[A-Za-z0-9_.:/@-]+")
 
 
@@ -96,10 +96,10 @@ def tags(text: str) -> tuple[str, ...]:
             words = json.loads(text)
         except ValueError:
             raise argparse.ArgumentTypeError(
-                f"'{text}' is no list of tags, such as '[\"sil\"]' or 'sil,docker'"
+                f"'{text}' is not a list of tags, such as '[\"sil\"]' or 'sil,docker'"
             ) from None
     if not all(isinstance(word, str) for word in words):
-        raise argparse.ArgumentTypeError(f"'{text}' holds something that is no tag")
+        raise argparse.ArgumentTypeError(f"'{text}' contains something that is not a tag")
     return tuple(dict.fromkeys(word.strip() for word in words if word.strip()))
 
 
@@ -111,7 +111,7 @@ def services(text: str) -> tuple[str | dict[str, Any], ...]:
         found = None
     if not isinstance(found, list) or not all(isinstance(one, str | dict) and one for one in found):
         raise argparse.ArgumentTypeError(
-            f"'{text.strip()}' is no list of services, such as '[\"docker:dind\"]'; texts with a backslash are none"
+            f"'{text.strip()}' is not a list of services, such as '[\"docker:dind\"]'; a backslash is not allowed"
         )
     if unnamed := [one for one in found if isinstance(one, dict) and not isinstance(one.get("name"), str)]:
         raise argparse.ArgumentTypeError(f"the service {json.dumps(unnamed[0])} has no name")
@@ -121,7 +121,7 @@ def services(text: str) -> tuple[str | dict[str, Any], ...]:
 def _as_json(text: str) -> str:
     """``{:name=>"a"}`` and ``{name: "a"}`` as ``{"name": "a"}``; texts stay as they are, where Ruby escapes alike.
 
-    A backslash may be one that GitLab took away on the way here, so that no other than that of a quote is read.
+    A backslash may be one that GitLab took away before, so that no other than that of a quote is read.
     """
     parts, end = [], 0
     for found in _RUBY_TEXT.finditer(text):

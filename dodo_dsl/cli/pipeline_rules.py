@@ -60,7 +60,7 @@ KINDS: Mapping[str, Variables] = {
     "child of a branch's pipeline": {**_BRANCH, **_OPEN, "CI_PIPELINE_SOURCE": "parent_pipeline"},
     "child of a merge request's pipeline": CHILD_OF_REQUEST,
 }
-"""The variables of each kind of pipeline by which rules tell it; others are empty."""
+"""The variables of each kind of pipeline by which rules recognise it; others are empty."""
 
 _TOKEN = re.compile(
     r"""\s*(?:(?P<sign>\|\||&&|==|!=|=~|!~|\(|\))|\$(?P<variable>\w+)|"(?P<double>[^"]*)"|'(?P<single>[^']*)'"""

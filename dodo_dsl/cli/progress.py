@@ -6,27 +6,27 @@ from typing import Self, TextIO
 
 from dodo_dsl.cli import display
 from dodo_dsl.cli.display import Verbosity
-from dodo_dsl.diagnostics import Piece
 from dodo_dsl.outcome import Outcome
+from dodo_dsl.plan.model import LAYERS
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.runner import Progress
 from dodo_dsl.terminal import printable
 
+_STEPS = ("taking down", *(f"waiting for {layer}" for layer in LAYERS))
+"""Phases that only ``-v`` shows."""
 
-def summary_line(outcome: Outcome, width: int) -> list[Piece]:
-    """One line about a finished test, in parts."""
-    times = ""
-    if outcome.setup_s is not None and outcome.execution_s is not None:
-        times = f" (set-up {outcome.setup_s:.1f} s, ran {outcome.execution_s:.1f} s)"
-    verdict = (f"{outcome.outcome.upper():<6}", display.OF_OUTCOMES[outcome.outcome])
-    return [verdict, (f"  {printable(outcome.name):<{width}}  {printable(outcome.reason)}{times}\n", "")]
+
+def ending(outcome: Outcome) -> str:
+    """What follows the word for an outcome: why, where a test did not pass."""
+    return "" if outcome.outcome == "passed" else f": {printable(outcome.reason)}"
 
 
 class PlainProgress:
-    """One line per phase, with the seconds since the start of the run."""
+    """A line for each phase, with the seconds since the start of the run."""
 
-    def __init__(self, stream: TextIO, slugs: Sequence[str]) -> None:
+    def __init__(self, stream: TextIO, slugs: Sequence[str], is_verbose: bool = False) -> None:
         self.stream = stream
+        self.is_verbose = is_verbose
         self.width = max(map(len, slugs), default=0)
         self.start = time.monotonic()
 
@@ -41,18 +41,19 @@ class PlainProgress:
         self.stream.flush()
 
     def phase(self, slug: str, text: str) -> None:
-        self.note(self._head(slug) + text)
+        if self.is_verbose or text not in _STEPS:
+            self.note(self._head(slug) + text)
 
     def standing(self, slug: str, standing: Standing) -> None:
-        """How far a test is takes no line of its own."""
+        """Shows nothing: a line for each would be too many."""
 
     def done(self, outcome: Outcome) -> None:
         verdict = (outcome.outcome, display.OF_OUTCOMES[outcome.outcome])
-        display.write_coloured(self.stream, [(self._head(outcome.slug), ""), verdict, ("\n", "")])
+        display.write_coloured(self.stream, [(self._head(outcome.slug), ""), verdict, (f"{ending(outcome)}\n", "")])
         self.stream.flush()
 
     def _head(self, slug: str) -> str:
-        """The begin of a line about a test."""
+        """The start of a line about a test."""
         return f"[{time.monotonic() - self.start:6.1f} s] {printable(slug):<{self.width}}  "
 
     def rest(self, seconds: float, tests: int) -> None:
@@ -97,7 +98,7 @@ def choose(stream: TextIO, slugs: Sequence[str], verbosity: Verbosity = Verbosit
     if verbosity is Verbosity.QUIET:
         return NoProgress()
     if verbosity is Verbosity.VERBOSE or not display.commands_terminal(stream):
-        return PlainProgress(stream, slugs)
+        return PlainProgress(stream, slugs, verbosity is Verbosity.VERBOSE)
     from dodo_dsl.cli.live_table import LiveProgress
 
     return LiveProgress(stream, slugs)

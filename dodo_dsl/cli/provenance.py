@@ -88,7 +88,7 @@ def asking(folders: Mapping[str, Path]) -> Iterator[Asking]:
 
 @contextlib.contextmanager
 def _git(folder: Path, *words: str) -> Iterator["subprocess.Popen[str]"]:
-    """In a session of its own, so that Ctrl-C is not for it."""
+    """In its own session, so that Ctrl-C is not for it."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     process = subprocess.Popen(
         ["git", "--no-optional-locks", *_CONFIGURED, "-C", str(folder), *words],  # noqa: S607

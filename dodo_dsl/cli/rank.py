@@ -41,12 +41,12 @@ class TestScore:
 
     @property
     def mean(self) -> float:
-        """0 where no run was judged."""
+        """0 if no run was judged."""
         return statistics.fmean(self.scores) if self.scores else 0.0
 
     @property
     def failure_rate(self) -> float:
-        """Share of the judged runs that failed; 1 where none was judged, as nothing speaks for the application."""
+        """Share of the judged runs that failed; 1 if none was judged, because nothing speaks for the application."""
         return self.failed / len(self.scores) if self.scores else 1.0
 
 
@@ -54,7 +54,7 @@ class TestScore:
 class TeamScore:
     """A team with its tests by name, all those that any team ran.
 
-    ``interval`` is that of the score, None where a test has fewer than two judged runs.
+    ``interval`` is that of the score, None if a test has fewer than two judged runs.
     """
 
     name: str
@@ -228,7 +228,7 @@ def load_teams(words: Sequence[str]) -> dict[str, list[Outcome]]:
 
 
 def _named(word: str) -> tuple[str, Path]:
-    """A team's name, empty where it is not written, and its file."""
+    """A team's name, empty if it is not written, and its file."""
     name, equals, file = word.partition("=")
     if equals and name and not Path(word).exists():
         word = file

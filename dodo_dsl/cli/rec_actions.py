@@ -38,7 +38,7 @@ class RecJob:
     stderr: TextIO
 
     def tell(self, text: str) -> None:
-        """A sentence for the user, beside the result."""
+        """A sentence for the user, besides the result."""
         tell(self.stderr, text)
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""A test of a recording of one's own: what is played, and the signal that is judged, as the recording has them."""
+"""A test of one's own recording: what is played, and the signal that is judged, as the recording has them."""
 
 import json
 import math
@@ -41,7 +41,7 @@ SHARE_OF_MEAN, SHARE_OF_DISTANCE = 10, 50
 """Limits of the distance to the recorded signal, in percent of its range."""
 FEWEST = 10
 DEFAULT_GAP_S = 1
-"""Longer gaps are shortened by the player unless it is told otherwise, but not in a target."""
+"""Longer gaps are shortened by the player unless it is set otherwise, but not in a target."""
 LARGEST_BYTES = 200 << 20
 _START_UP_S = 10
 _MEMORIES = ("video0.argb", "video0.i420")
@@ -72,7 +72,7 @@ class RecordedDrive:
 
     @property
     def range(self) -> float:
-        """Of the signal; its largest value where it is constant, 1 where that is 0."""
+        """Of the signal; its largest value where it is constant, 1 if that is 0."""
         values = self.values or (0.0,)
         return max(values) - min(values) or max(map(abs, values)) or 1.0
 
@@ -125,7 +125,7 @@ def _retimed(recording: Recording, times: Numbers) -> bytes:
 
 
 def _target(path: Path, streams: list[MessageStream]) -> MessageStream | None:
-    """The signal to judge; None where there are only pictures, which have to be answered."""
+    """The signal to judge; None if there are only pictures, which have to be answered."""
     for name in SIGNALS:
         found = [stream for stream in streams if stream.name == name and stream.count >= FEWEST]
         if found:
@@ -212,7 +212,9 @@ def _limit(value: float) -> str:
 def _found(path: Path, drive: RecordedDrive, field: str) -> str:
     lines = [f"{shown_path(str(path))}: {drive.duration:.1f} s, {_cameras(drive.cameras)}"]
     if drive.target is None:
-        lines.append(f"judged: whether each picture is answered by {drive.answer}/0, as there is no recorded signal")
+        lines.append(
+            f"judged: whether each picture is answered by {drive.answer}/0, because there is no recorded signal"
+        )
     else:
         target = f"{drive.target.name}/{drive.target.sender_stamp}"
         values = f"{len(drive.values)} values from {min(drive.values):g} to {max(drive.values):g}"
@@ -222,11 +224,9 @@ def _found(path: Path, drive: RecordedDrive, field: str) -> str:
             f"other sender stamps of it are {', '.join(map(str, drive.others))}: change 'target-sender' for them"
         )
     if drive.retimed is not None:
-        lines.append(
-            "its sample times are of several drives: the test has a copy with the times of receipt in their place"
-        )
+        lines.append("its sample times are of several drives: the test has a copy with the times of receipt instead")
     if not drive.cameras:
-        lines.append("the test is in real time, as only pictures can be waited for in lockstep")
+        lines.append("the test is in real time, because lockstep can only wait for pictures")
     return "".join(f"{line}\n" for line in lines)
 
 

@@ -94,7 +94,7 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Rig]:
     rig = deployment.rig(options.rig)
     if rig is None:
         raise UsageError(
-            f"there is no rig '{options.rig}', expected one of {', '.join([*EMULATED_RIGS, *deployment.rigs])}"
+            f"unknown rig '{options.rig}', expected one of {', '.join([*EMULATED_RIGS, *deployment.rigs])}"
         )
     return [rig]
 

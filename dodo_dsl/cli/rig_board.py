@@ -23,7 +23,7 @@ def make(options: argparse.Namespace) -> str:
     from dodo_dsl.run.rigs import camera_calibration  # OpenCV takes a second to import
 
     if options.output.suffix.lower() != ".svg":
-        raise UsageError(f"'{options.output}' is no name of an SVG file, expected one that ends in .svg")
+        raise UsageError(f"'{options.output}' is not the name of an SVG file, expected one that ends in .svg")
     refuse_existing([options.output], options.force)
     atomic.write_text(options.output, camera_calibration.svg())
     squares = f"{camera_calibration.COLUMNS} x {camera_calibration.ROWS} squares of {camera_calibration.SQUARE:g} mm"

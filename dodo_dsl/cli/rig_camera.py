@@ -70,13 +70,15 @@ def _of_folder(folder: Path, say: Callable[[str], None]) -> list[BoardView]:
         if seen is not None:
             views.append(seen)
         else:
-            reason = "is no picture" if picture is None else f"shows fewer than {FEWEST_CORNERS} corners of the board"
-            say(f"{file}: not used, as it {reason}")
+            reason = (
+                "is not a picture" if picture is None else f"shows fewer than {FEWEST_CORNERS} corners of the board"
+            )
+            say(f"{file}: not used, because it {reason}")
     return views
 
 
 def _picture(data: bytes) -> Any:
-    """The grey picture of a file's bytes; None where they are none."""
+    """The grey picture of a file's bytes; None if they are none."""
     return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
 
 

@@ -28,8 +28,8 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.addresses import subnets
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import Drawings, next_report
+from dodo_dsl.report.repetitions import Repeated, repeated
 from dodo_dsl.report.results import Circumstances
-from dodo_dsl.report.viewer.names import LOGS
 from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.session import is_real
@@ -45,12 +45,14 @@ from dodo_dsl.terminal import printable
 def reserved(folder: Path, stdout: TextIO) -> Iterator[None]:
     """Holds a report's folder, as long as this process lives at most; says so when another run holds it already.
 
-    Both go on: their tests have folders of their own there, and the pages and results are those of the later end.
+    Both go on: their tests have their own folders there, and the pages and results are those of the later end.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         if not _locked(descriptor):
-            stdout.write(f"note: another run writes into '{folder}', too, and the report will be of the last to end; ")
+            stdout.write(
+                f"note: another run also writes into '{folder}': the last run to finish overwrites the report; "
+            )
             stdout.write("--report names another folder\n")
         yield
     finally:
@@ -105,12 +107,14 @@ EXAMPLES = """examples:
   dodo run 'sil-*' -j 4                        by pattern, four at a time
   dodo run --application ../app/docker-compose.yml --level sil
   dodo run 'sil-*' --repeat 20 --fail-fast     how often they pass, until one does not
+  dodo run sil-closed-straight --repeat 2      in lockstep: whether both runs have the same values
   dodo run sil-closed-straight --samples 16    at 16 values of its ranges, the same ones for each --seed
   dodo run sil-closed-straight --watch         again whenever spec, map or application is saved
   dodo run -q                                  only what did not pass, and the counts
   dodo run --compiled generated/sil-closed-straight --report dodo-report
 
-exit codes: 0 all passed, 1 some failed, 2 wrong usage or spec, 3 some ended in error, 130 interrupted
+exit codes: 0 all passed, 1 some failed, or repetitions in lockstep differ, 2 wrong usage or spec, 3 some ended in
+error, 130 interrupted
 """
 
 
@@ -139,7 +143,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--report", type=Path, default=REPORT, metavar="DIR", help="folder of the report (default: dodo-report)"
     )
     parser.add_argument("--seed", type=seed, metavar="N", help="override the specs' seed")
-    parser.add_argument("--repeat", type=positive, default=1, metavar="N", help="run every test N times")
+    parser.add_argument("--repeat", type=positive, default=1, metavar="N",
+                        help="run every test N times; in lockstep, say which values differ")  # fmt: skip
     parser.add_argument("--samples", type=positive, metavar="N",
                         help="run each test with 'vary' at N values of its ranges")  # fmt: skip
     parser.add_argument("--fail-fast", action="store_true", help="start no further test after one that did not pass")
@@ -153,7 +158,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     display.add_verbosity(
         parser,
         "print only what did not pass, and a last line with the counts",
-        "print each test's phases, checks, what the application used, and errors and warnings in logs",
+        "print each test's phases, sentence, checks, what the application used, and errors and warnings in logs",
     )
     selection.add_application(parser)
 
@@ -178,11 +183,12 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
             runner = runner_of(options, jobs, deployment, quietly, load)
         with reserved(options.report, stdout):
             source, said = origin(options, deployment), options.verbosity
-            outcomes, is_reported = run(runner, jobs, options.report, stdout, source, said=said)
+            outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, said=said)
         if runner.kept:
             stdout.write("\n".join(["", *runner.kept, ""]))
             folder.kept = True
-    return max(_exit_code(outcomes, runner.interrupted), Exit.OK if is_reported else Exit.ERROR)
+    differs = Exit.PROBLEMS if any(each.differing for each in repeats) else Exit.OK
+    return max(_exit_code(outcomes, runner.interrupted), differs, Exit.OK if is_reported else Exit.ERROR)
 
 
 def _refuse_to_keep(plans: Sequence[Plan]) -> None:
@@ -242,8 +248,8 @@ def run(
     source: Origin,
     others: Sequence[Outcome] = (),
     said: Verbosity = Verbosity.NORMAL,
-) -> tuple[list[Outcome], bool]:
-    """The outcomes, and whether the report holds all of them; they are printed in any case.
+) -> tuple[list[Outcome], bool, Sequence[Repeated]]:
+    """The outcomes, whether the report holds all of them, and repetitions; they are printed in any case.
 
     ``others`` are outcomes of tests that did not run again and stay in the report.
     """
@@ -254,18 +260,23 @@ def run(
         with Drawings(target.folder) as drawings, runner.progress:
             outcomes = asyncio.run(runner.run(jobs, lambda job, outcome: drawings.begin(outcome, drawable(job))))
         not_run = runner.not_run()
-        logs = {job.plan.slug: job.report / LOGS for job in jobs}
-        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, logs)
+        plans = {job.plan.slug: job.plan for job in jobs}
+        about = {s: run_report.Reported(p, target.folder / s, report / s) for s, p in plans.items()}
+        run_report.write_summary(stdout, outcomes, {job.plan.slug: job.test for job in jobs}, not_run, said, about)
+        ran = {job.plan.slug: job for job in jobs}
+        repeats = repeated((ran[o.slug].folder, o, ran[o.slug].report) for o in outcomes)
+        told = (each for each in repeats if each.differing or said is not Verbosity.QUIET)
+        stdout.writelines(f"{printable(line)}\n" for each in told for line in each.lines())
         stdout.flush()
         with undisturbed():
-            circumstances = Circumstances((record(),), tuple(not_run))
+            circumstances = Circumstances((record(),), tuple(not_run), tuple(repeats))
             written = save_report(
                 target, report, jobs, runner.backends.name, outcomes, others, circumstances, drawings.problems()
             )
     stdout.writelines(f"{printable(problem)}\n" for problem in written.problems)
     if said is not Verbosity.QUIET or not written.is_whole:
         stdout.write(f"{written.sentence}\n")
-    return outcomes, written.is_whole
+    return outcomes, written.is_whole, repeats
 
 
 def _exit_code(outcomes: Sequence[Outcome], interrupted: bool) -> Exit:

@@ -26,6 +26,7 @@ from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import named, runs
 from dodo_dsl.plan.test_files import file_problem
 from dodo_dsl.run.backends import Job
+from dodo_dsl.run.history import History
 from dodo_dsl.run.rigs.session import is_real
 from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
@@ -95,8 +96,11 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     report = _usable(options.report, [named(p).slug for p in plans])
     families = {plan.slug: tests.get(plan.slug, named(plan).slug) for plan in plans}
     found: dict[str, Job] = {}
+    history = History()
     for run in runs(plans, settings.repeat):
         plan = named(run.plan)
+        if not plan.lockstep and history.is_timed(plan.spec, families[run.test]):
+            plan = replace(plan, timed=plan.timed or ("application",))
         job = Job(plan, folders[run.test], report / plan.slug, families[run.test])
         first = found.get(plan.slug)
         found[plan.slug] = replace(first, others=(*first.others, job)) if first else job
@@ -155,7 +159,7 @@ def _kept_clock(names: Sequence[str]) -> str:
     if not names:
         return ""
     who = f"{names[0]} runs" if len(names) == 1 else f"{names[0]} and {len(names) - 1} more run"
-    return f"note: {who} in real time, as hardware does not wait\n"
+    return f"note: {who} in real time, because hardware does not wait\n"
 
 
 def compile_tests(

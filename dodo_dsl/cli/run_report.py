@@ -1,27 +1,48 @@
 """The end of a run: its summary, its report on disk, and the history of its tests."""
 
 import itertools
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
+from dodo_dsl import package_data
 from dodo_dsl.cli import display
 from dodo_dsl.cli.display import Verbosity
-from dodo_dsl.cli.progress import count, summary_line
-from dodo_dsl.diagnostics import Piece
+from dodo_dsl.cli.progress import count
+from dodo_dsl.diagnostics import Piece, shown_path
 from dodo_dsl.outcome import NotRun, Outcome
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import comparison, results
-from dodo_dsl.report.instances import worst_instances
+from dodo_dsl.report.instances import decisive_limits, decisive_value, worst_instances
 from dodo_dsl.report.next_report import NextReport
 from dodo_dsl.report.report_folder import Drawable, write_report
+from dodo_dsl.report.viewer.names import LOGS, PAGE
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.history import History
-from dodo_dsl.terminal import printable
+from dodo_dsl.terminal import cells, clipped, printable, width_of
 
 _MOST_NAMES = 5
 _MOST_COMPLAINTS = 20
 """Of one service of a test."""
+_INDENT = len("PASSED  ")
+_NARROWEST_NAME = 20
+_BESIDE_NAME = 44
+"""Columns of a row without its name: the outcome, two times, and a margin without its limit."""
+
+
+@dataclass(frozen=True)
+class Reported:
+    """What the summary says of a test beyond its outcome: its Plan, its folder in the report, and that as shown."""
+
+    plan: Plan
+    folder: Path
+    shown: Path
+
+    def page(self) -> Path:
+        """The page to open: the test's own, or else the report's."""
+        return self.shown / PAGE if (self.folder / PAGE).is_file() else self.shown.parent / "index.html"
 
 
 def write_summary(
@@ -30,28 +51,30 @@ def write_summary(
     tests: Mapping[str, str],
     not_run: Sequence[NotRun],
     verbosity: Verbosity = Verbosity.NORMAL,
-    logs: Mapping[str, Path] | None = None,
+    reported: Mapping[str, Reported] | None = None,
 ) -> None:
-    """One line per test with its explanation, then the counts; ``tests`` has each slug's name without repetition.
+    """A table of the tests that passed, then each of the others with what explains it, then the counts.
 
-    ``logs`` are the folders with the logs of tests by their slugs, of which errors and warnings are shown if verbose.
+    ``tests`` has each slug's name without repetition. Lines fit into a terminal; a file or pipe gets them whole.
     """
     is_quiet = verbosity is Verbosity.QUIET
-    shown = [outcome for outcome in outcomes if not is_quiet or outcome.outcome != "passed"]
     blank = "" if is_quiet else "\n"
     stream.write(blank)
-    width = max((len(outcome.name) for outcome in shown), default=0)
-    for outcome in shown:
-        display.write_coloured(stream, summary_line(outcome, width))
-        stream.writelines(f"        note: {printable(note)}\n" for note in outcome.notes)
+    width, about = width_of(stream), reported or {}
+    passed = [] if is_quiet else [outcome for outcome in outcomes if outcome.outcome == "passed"]
+    rows = _table(passed, width)
+    display.write_coloured(stream, next(rows, ()))
+    for outcome, row in zip(passed, rows, strict=True):
+        display.write_coloured(stream, row)
         if verbosity is Verbosity.VERBOSE:
-            stream.writelines(
-                f"        {printable(comparison.check_line(check, outcome.checks))}\n" for check in outcome.checks
-            )
-            stream.writelines(f"        {printable(use.service)}: {use.in_words()}\n" for use in outcome.resources)
-            display.write_coloured(stream, _complaints((logs or {}).get(outcome.slug)))
-        if outcome.outcome != "passed":
-            stream.writelines(f"        | {printable(line)}\n" for line in outcome.last_lines)
+            display.write_coloured(stream, _wrapped(f"{outcome.reason}{_times(outcome)}", width))
+        _write_details(stream, outcome, verbosity, about.get(outcome.slug), width)
+    others = sorted((o for o in outcomes if o.outcome != "passed"), key=lambda o: o.outcome == "error")
+    names = max((len(outcome.name) for outcome in others), default=0)
+    for outcome in others:
+        head = f"{printable(outcome.name):<{names}}  {outcome.reason}{_times(outcome)}"
+        display.write_coloured(stream, _wrapped(head, width, outcome))
+        _write_details(stream, outcome, verbosity, about.get(outcome.slug), width)
     stream.write(blank)
     if not is_quiet:
         stream.writelines(f"{printable(worst.in_words())}\n" for worst in worst_instances(outcomes))
@@ -59,10 +82,106 @@ def write_summary(
         stream.writelines(f"{line}\n" for line in _rates(outcomes, tests))
     display.write_coloured(stream, _counts(outcomes))
     if not_run:
-        names = ", ".join(test.name for test in not_run[:_MOST_NAMES])
+        some = ", ".join(test.name for test in not_run[:_MOST_NAMES])
         more = f" and {len(not_run) - _MOST_NAMES} more" if len(not_run) > _MOST_NAMES else ""
         display.write_coloured(stream, [(f"{count(len(not_run))} not run", "not run")])
-        stream.write(f", as {not_run[0].reason}: {printable(names)}{more}\n")
+        stream.write(f", because {not_run[0].reason}: {printable(some)}{more}\n")
+
+
+def _table(passed: Sequence[Outcome], width: int | None) -> Iterator[list[Piece]]:
+    """A heading, then a row for each test: its own time, the wall time of set-up and drive, and its smallest margin."""
+    if not passed:
+        return
+    most = None if width is None else max(_NARROWEST_NAME, width - _BESIDE_NAME)
+    names = max((len(o.name) for o in passed if most is None or len(o.name) <= most), default=_NARROWEST_NAME)
+    heading = f"{'':{_INDENT}}{'test':<{names}}  {'time':>7}  {'wall':>7}  smallest margin"
+    yield [(clipped(heading, width) + "\n", "gutter")]
+    for outcome in passed:
+        wall = None if outcome.execution_s is None else (outcome.setup_s or 0.0) + outcome.execution_s
+        own = outcome.execution_s if outcome.sim_s is None else outcome.sim_s
+        figures = "  ".join(("" if seconds is None else f"{seconds:.1f} s").rjust(7) for seconds in (own, wall))
+        name = printable(outcome.name)
+        if len(name) > names:
+            name += f"\n{'':{_INDENT + names}}"
+        room = None if width is None else width - _INDENT - names - 20
+        line = f"  {name:<{names}}  {figures}  {_margin(outcome, room)}".rstrip()
+        yield [("PASSED", "passed"), (f"{line}\n", "")]
+
+
+def _margin(outcome: Outcome, room: int | None) -> str:
+    """The check nearest to its limit, with the limit where there is room; the verdict's sentence where none has one."""
+    value = decisive_value(outcome)
+    limit = decisive_limits(outcome)
+    whole = printable(f"{value} ({limit})" if limit else value or outcome.reason)
+    return clipped(whole if room is None or cells(whole) <= room or not value else printable(value), room)
+
+
+def _times(outcome: Outcome) -> str:
+    if outcome.setup_s is None or outcome.execution_s is None:
+        return ""
+    return f" (set-up {outcome.setup_s:.1f} s, ran {outcome.execution_s:.1f} s)"
+
+
+def _wrapped(text: str, width: int | None, outcome: Outcome | None = None) -> Iterator[Piece]:
+    """Indented lines, the first of which begins with the outcome; one line if there is no width."""
+    whole = f"{'':{_INDENT}}{printable(text)}"
+    wrapper = textwrap.TextWrapper(
+        width or len(whole) + 1,
+        subsequent_indent=" " * _INDENT,
+        break_long_words=False,
+        break_on_hyphens=False,
+        replace_whitespace=False,
+    )
+    lines = "\n".join(wrapper.wrap(whole)) if width else whole
+    if outcome:
+        yield f"{outcome.outcome.upper():<6}", display.OF_OUTCOMES[outcome.outcome]
+        lines = lines[6:]
+    yield f"{lines}\n", ""
+
+
+def _write_details(
+    stream: TextIO, outcome: Outcome, verbosity: Verbosity, about: Reported | None, width: int | None
+) -> None:
+    """What explains an outcome, below its line."""
+
+    def say(text: str) -> None:
+        display.write_coloured(stream, _wrapped(text, width))
+
+    is_verbose = verbosity is Verbosity.VERBOSE
+    failed = [c for c in outcome.checks if not c["ok"] and not comparison.only_follows(c, outcome.checks)]
+    for check in outcome.checks if is_verbose else failed:
+        say(comparison.check_line(check, outcome.checks))
+    if outcome.outcome != "passed" and about:
+        for place in _places(outcome, about.plan, failed):
+            stream.write(f"{'':{_INDENT}}in {printable(place)}\n")
+    for note in outcome.notes:
+        say(f"note: {note}")
+    if is_verbose:
+        for use in outcome.resources:
+            say(f"{use.service}: {use.in_words()}")
+        display.write_coloured(stream, _complaints(about.folder / LOGS if about else None))
+    if outcome.outcome != "passed":
+        stream.writelines(f"{'':{_INDENT}}| {printable(line)}\n" for line in outcome.last_lines)
+        if about:
+            stream.write(f"{'':{_INDENT}}open {printable(str(about.page()))}\n")
+
+
+def _places(outcome: Outcome, plan: Plan, failed: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Where the spec sets the limits that were not met; else where it has the service that the sentence names."""
+    from dodo_dsl.report.viewer.page import limit_places
+
+    found = [place for check in failed for _, place in limit_places(plan, check["name"], {})]
+    judges = [v["evaluator"] for v in outcome.verdicts if v.get("outcome") == "failed"]
+    found = found or [place for name in judges if (place := plan.source_map.get(f"evaluation.{name}"))]
+    found = found or list(filter(None, (plan.place_named_in(outcome.reason) or plan.source_map.get("name"),)))
+    places = dict.fromkeys(f"{_shown_file(place.file)}:{place.line}:{place.column}" for place in found)
+    return list(places) or [_shown_file(plan.spec)]
+
+
+def _shown_file(name: str) -> str:
+    """The path of a spec's file from the working folder, which may lie below that of the deployment."""
+    roots = (Path.cwd(), *Path.cwd().parents, package_data.registry())
+    return next((shown_path(str(root / name)) for root in roots if (root / name).is_file()), name)
 
 
 def _complaints(logs: Path | None) -> Iterator[Piece]:

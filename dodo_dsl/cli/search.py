@@ -142,7 +142,7 @@ def _registry(study: Study) -> Path:
     """The folder of the user's own tests; raises UsageError for a test that ships."""
     root = study.test.spec.location.root
     if package_data.is_shipped(root, study.checked.deployment.root):
-        raise UsageError("'--save' is for tests of your own: copy this one with 'dodo new NAME --extends'")
+        raise UsageError("'--save' is for your own tests: copy this one with 'dodo new NAME --extends'")
     return root
 
 

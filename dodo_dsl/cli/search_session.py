@@ -51,7 +51,7 @@ class SearchSession:
         )
 
     def compiled(self, checked: compiler.Checked) -> compiler.Compilation:
-        """The tests at their nominal values, with their problems shown; raises UsageError where some are errors."""
+        """The tests at their nominal values, with their problems shown; raises UsageError if some are errors."""
         try:
             made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
         except compiler.NoApplication:
@@ -138,7 +138,7 @@ class SearchProgress:
         self._show(drive)
 
     def count(self, drive: Drive, repeat: int = 1) -> None:
-        """Counts a drive, also one of an earlier command; one that repeats another is no further failure."""
+        """Counts a drive, also one of an earlier command; one that repeats another is not a further failure."""
         if repeat > 1 and not self._shrinks:
             self._total = self._total and self._total + 1
         self._done += 1

@@ -128,7 +128,7 @@ def _named(word: str, specs: Sequence[Spec], deployment: Deployment) -> list[Spe
         hint = _shipped_hint(word, deployment) or did_you_mean(
             word, list(dict.fromkeys(s.location.stem for s in specs))
         )
-        raise NoSuchTest(f"there is no test '{word}'" + (f"; {hint}" if hint else ""))
+        raise NoSuchTest(f"unknown test '{word}'" + (f"; {hint}" if hint else ""))
     return found
 
 

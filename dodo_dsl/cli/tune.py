@@ -108,7 +108,7 @@ def _limits(own: SearchSession, driven: Scenarios) -> DriveLimits:
     if driven.rigs:
         options.minutes = options.minutes or _RIG_MINUTES
         options.metres = options.metres or _RIG_METRES
-        said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of way"
+        said = f"on rig {', '.join(driven.rigs)}: at most {options.minutes:g} min, and {options.metres:g} m of driving"
         own.stdout.write(printable(said) + "\n")
     deadline = time.monotonic() + options.minutes * 60 if options.minutes else None
     return DriveLimits(deadline, options.metres or math.inf)

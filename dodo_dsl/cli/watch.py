@@ -1,7 +1,7 @@
 """dodo run --watch: compile and run again, in lockstep, what a saved file affects.
 
 Which files are saved is found by looking at their times: the same on every file system. Editors replace files, write
-beside them and rename, and network file systems and containers tell nobody, which is why nothing waits for the
+next to them and rename, and network file systems and containers notify nobody, so nothing waits for the
 kernel's notices. Looking at a thousand files takes some milliseconds.
 """
 
@@ -151,7 +151,7 @@ class Watch:
             with reserved(self._options.report, self._stdout):
                 report, said = self._options.report, self._options.verbosity
                 source = origin(self._options, deployment)
-                outcomes, _ = cli_run.run(runner, chosen, report, self._stdout, source, others, said)
+                outcomes, _, _ = cli_run.run(runner, chosen, report, self._stdout, source, others, said)
         self._show_change(outcomes)
         self.outcomes = {outcome.slug: outcome for outcome in [*others, *outcomes]}
         return runner.interrupted

@@ -31,9 +31,9 @@ Defaults = Mapping[str, Mapping[str, str]]
 """The values that flags of a service have without being given: by the service's manifest, then by the flag."""
 
 _NOTES = {
-    "DODO_CLOCK": "Time is the test's own, in steps of dodo-clock, and not the machine's.",
-    "DODO_READERS": "So many programs of the application have to wait for a frame before it comes.",
-    "DODO_SENDERS": "Who alone may send a message, as message=services.",
+    "DODO_CLOCK": "Services take the time from dodo-clock, which steps the test, and not from the machine.",
+    "DODO_READERS": "How many programs of the application read each frame; it comes when all are waiting.",
+    "DODO_SENDERS": "Who alone may send a message, as message=services; with none behind =, nobody.",
     "DODO_WORLD": "The services that get what the application must not hear.",
     "DODO_TOLD": "What the application gets of that, as it declares in x-dodo.",
     "DODO_TRUTH": "What only evaluators get.",
@@ -187,7 +187,7 @@ def _shared(plan: Plan, service: PlannedService) -> list[str]:
 
 
 def _shared_mount(name: str) -> Mapping[str, Any]:
-    """The place to which the test's link leads in a container."""
+    """The position to which the test's link leads in a container."""
     return {**FILES_MOUNT, "source": f"../{SHARED}/{name}", "target": f"/{SHARED}/{name}"}
 
 

@@ -141,7 +141,7 @@ def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[
 
 
 def _write_copies(folder: Path, wanted: Sequence[FileCopy]) -> None:
-    for path in _former_links(folder, wanted):  # before anything else: a folder may come into its place
+    for path in _former_links(folder, wanted):  # before anything else: a folder may replace it
         path.unlink()
     for copy in wanted:
         if _is_copied(folder, copy):
@@ -172,7 +172,7 @@ def _is_copied(folder: Path, copy: FileCopy) -> bool:
 
 
 def _open_to_containers(folder: Path) -> None:
-    """Everybody may read the files, whatever the umask, as users of containers must; the folder above may be closed."""
+    """Everybody may read the files, for any umask, as users of containers must; the folder above may be closed."""
     for path in (folder, *folder.rglob("*")) if folder.is_dir() else ():
         if path.is_symlink():
             continue

@@ -12,7 +12,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
-from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions, PipelineJob, packed
+from dodo_dsl.emit.pipeline_jobs import (
+    NO_OPTIONS,
+    NOTHING_COMMON,
+    SPARE_MINUTES,
+    CommonSettings,
+    JobOptions,
+    PipelineJob,
+    factored,
+    packed,
+)
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.runs import by_test, named, pooled
 from dodo_dsl.plan.test_files import FileCopy
@@ -29,7 +38,7 @@ RULE = "pipeline-limit"
 MAX_NAME = 255
 MAX_BYTES = 5 << 20
 MAX_JOBS_FREE = 500
-MAX_JOBS_PARSED = 850
+MAX_JOBS_PARSED = 1700
 _MOST_NAMED = 3
 _ARTIFACT_HINT = (
     "let the jobs take them from the repository or Git LFS with --files repository, or shorten recordings with "
@@ -61,7 +70,10 @@ class SearchJobs:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The stages in order, whether a gate precedes hil, the variables, the jobs, and what those without a test have."""
+    """The stages in order, whether a gate precedes hil, the variables, the jobs, and what those without a test have.
+
+    What is ``common`` to the jobs of tests is not in them.
+    """
 
     stages: tuple[str, ...]
     gate: bool
@@ -69,6 +81,7 @@ class Pipeline:
     jobs: tuple[PipelineJob, ...]
     searches: tuple[SearchJobs, ...] = ()
     options: JobOptions = NO_OPTIONS
+    common: CommonSettings = NOTHING_COMMON
 
 
 def pipeline(
@@ -91,7 +104,8 @@ def pipeline(
     if options.most_jobs:
         timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
         jobs = packed(jobs, options.most_jobs, {**timeouts, **options.seconds(by_test(suite.plans))})
-    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options)
+    common, jobs = factored(jobs, options)
+    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options, common)
 
 
 def _variables(suite: Suite, options: JobOptions) -> dict[str, str]:
@@ -141,9 +155,9 @@ def pipeline_problems(
     A job's name has at most 255 characters. The archive of an artifact that holds the YAML of a child pipeline has at
     most 5 MB (``max_artifacts_content_include_size``). The number of jobs of a pipeline is unlimited on a self-managed
     GitLab unless an administrator limits it, and 500, 1,500 or 2,000 on gitlab.com, by its tier. A YAML file may take
-    2 MB of memory when parsed (``max_yaml_size_bytes``); a job takes 2.3 to 2.4 kB of that in Ruby. All limits but the
-    first can be raised, so numbers of jobs are warnings. A job's limit of 50 ``needs`` is never reached: the job
-    ``gate`` represents all tests before it.
+    2 MB of memory when parsed (``max_yaml_size_bytes``); a job takes 0.7 to 1.2 kB of that in Ruby, as GitLab counts
+    before it looks at what jobs extend. All limits but the first can be raised, so numbers of jobs are warnings. A
+    job's limit of 50 ``needs`` is never reached: the job ``gate`` represents all tests before it.
 
     Sources: https://docs.gitlab.com/administration/cicd/limits/ and
     https://docs.gitlab.com/user/gitlab_com/#cicd
@@ -154,10 +168,10 @@ def pipeline_problems(
 
 
 def artifact_problems(compiled: "Compiled", options: JobOptions) -> list[Diagnostic]:
-    """A warning where the files of all tests together are larger than the artifact of the parent may be.
+    """A warning if the files of all tests together are larger than the artifact of the parent may be.
 
     GitLab accepts 100 MB (``max_artifacts_size``) unless an administrator allows more, and gitlab.com 1 GB. It counts
-    what is packed, which recordings of pictures hardly become smaller by. Sources as of ``pipeline_problems``.
+    what is packed, which recordings of frames hardly become smaller by. Sources as of ``pipeline_problems``.
     """
     if not options.artifact_mb:
         return []

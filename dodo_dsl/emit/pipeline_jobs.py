@@ -129,8 +129,44 @@ class JobOptions:
 
     @property
     def backend(self) -> str:
-        """Images that were built are what is tested, even where the application could run as processes."""
+        """Images that were built are what is tested, even if the application could run as processes."""
         return "docker" if self.images else ""
 
 
 NO_OPTIONS = JobOptions()
+
+
+@dataclass(frozen=True)
+class CommonSettings:
+    """What jobs of tests have in common; those on rigs have ``tags`` of their own instead."""
+
+    tags: tuple[str, ...] = ()
+    image: str = ""
+    services: tuple[str | Mapping[str, Any], ...] = ()
+    before_script: str = ""
+
+
+NOTHING_COMMON = CommonSettings()
+
+
+def factored(jobs: Sequence[PipelineJob], options: JobOptions) -> tuple[CommonSettings, tuple[PipelineJob, ...]]:
+    """What the jobs have in common, and the jobs without it.
+
+    A job cannot be without an image, services or commands that it inherits, so these are common only to all jobs.
+    """
+    wanted = CommonSettings(options.tags, options.image, options.services, options.before_script)
+    shared = {
+        name: value
+        for name, value in vars(wanted).items()
+        if all(getattr(job, name) == value for job in jobs) or (name == "tags" and _are_replaced(jobs, options.tags))
+    }
+    kept = (
+        replace(job, **{name: type(value)() for name, value in shared.items() if getattr(job, name) == value})
+        for job in jobs
+    )
+    return CommonSettings(**shared), tuple(kept)
+
+
+def _are_replaced(jobs: Sequence[PipelineJob], tags: Sequence[str]) -> bool:
+    """Whether some jobs have the tags, and all others have tags instead."""
+    return any(job.tags == tags for job in jobs) and all(job.tags for job in jobs)

@@ -15,7 +15,8 @@ from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, containers, copy_command
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
-from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, JobOptions
+from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions
+from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan, Suite
 from dodo_dsl.plan.plan_json import json_text, to_json
 from dodo_dsl.source import resolve
@@ -159,6 +160,7 @@ def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
                 layer=layer,
                 common=containers(plan, layer, defaults),
                 ready_tries=READY_TRIES,
+                recorder=RECORDER,
                 own_network=own_network,
                 sandbox=own_network and layer == LAYERS[0],
                 copies=plan.application.copies if layer == LAYERS[0] else {},
@@ -187,7 +189,7 @@ def render_pipeline(
     """The child pipeline; ``folder`` is the output folder's name, as the parent's artifact has it."""
     child = pipeline(suite, folder, searches, options)
     parts = {field.name: getattr(child, field.name) for field in fields(child)}
-    return File(CHILD, _render("child.gitlab-ci.yml.j2", **parts))
+    return File(CHILD, _render("child.gitlab-ci.yml.j2", spare_minutes=SPARE_MINUTES, **parts))
 
 
 def render(suite: Suite, folder: str) -> list[File]:

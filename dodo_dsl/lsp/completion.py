@@ -1,6 +1,6 @@
 """Completion: the keys, services, parameters, values and units that may stand at the cursor.
 
-A text that is being written is most often no YAML: the cursor's place is found in what stands before it.
+A text that is being written is most often no YAML: the cursor's position is found in what stands before it.
 """
 
 import re
@@ -158,7 +158,7 @@ _KEY, _SERVICE, _VALUE, _UNIT = (
     types.CompletionItemKind.Unit,
 )
 Offer = tuple[str, types.CompletionItemKind, str, str]
-"""A word, what it is, what stands beside it, and its documentation as Markdown."""
+"""A word, what it is, what is next to it, and its documentation as Markdown."""
 TRIGGERS = [" ", "{", "[", ",", "$", ".", "/"]
 
 

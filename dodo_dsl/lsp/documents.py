@@ -1,4 +1,4 @@
-"""The open documents of an editor, places in their texts, and the keys that lead to a place.
+"""The open documents of an editor, positions in their texts, and the keys that lead to a position.
 
 YAML counts lines and columns, an editor lines and code units.
 """

@@ -31,7 +31,7 @@ def definition(scene: DocumentContext, position: types.Position, codec: Position
 
 
 def _spans(scene: DocumentContext, place: DocumentPlace) -> Iterator[Span]:
-    """Where what stands at a place is defined."""
+    """Where what stands at a position is defined."""
     steps = place.steps
     if scene.schema == "deployment":
         if steps and steps[0] in _FILES and not place.is_key:

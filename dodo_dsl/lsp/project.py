@@ -77,7 +77,7 @@ class ChangedSources(Sources):
     def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> Ruled:
         """Instances that are the very objects of the check before keep what it found.
 
-        A test is checked again, too, where another one took or gave up its name.
+        A test is checked again, too, if another one took or gave up its name.
         """
         former, found = self._ruled if self._inputs == inputs else ((), {})
         known = {id(test.spec): test for test in former}
@@ -214,7 +214,7 @@ class DocumentContext:
         return next((s for s in services if (s.use.layer, s.use.name) == (layer, name)), None)
 
     def manifest(self, steps: Steps, uses: str = "") -> Manifest | None:
-        """The manifest of the service that a place belongs to, which an extended test may name."""
+        """The manifest of the service that a position belongs to, which an extended test may name."""
         if len(steps) < 2 or steps[0] not in LAYERS or self.schema != "dodo":
             return None
         layer, name = str(steps[0]), str(steps[1])
@@ -224,7 +224,7 @@ class DocumentContext:
         return self.manifests.get(written)
 
     def parameter(self, place: DocumentPlace) -> Parameter | None:
-        """The parameter that a place belongs to."""
+        """The parameter that a position belongs to."""
         manifest = self.manifest(place.steps)
         if manifest is None or len(place.steps) < 4 or place.steps[2] != WITH:
             return None

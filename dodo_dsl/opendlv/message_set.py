@@ -105,7 +105,7 @@ class MessageSet:
     def load(cls, *paths: Path, standard: Sequence[Definition] = ()) -> "MessageSet":
         """The standard messages and those of the files, which replace standard ones of the same name or id.
 
-        Other messages than those that DoDo knows by itself may be the standard. Raises OdvdError, also where two of
+        Other messages than those that DoDo knows by itself may be the standard. Raises OdvdError, also if two of
         the files disagree or use DoDo's own ids.
         """
         if not paths and not standard:
@@ -154,7 +154,7 @@ class MessageSet:
     def decode(self, id_: int, payload: bytes) -> Any:
         """The message in a payload: fields in any order, the first of equal ones counts, absent ones default.
 
-        Raises MessageError for bytes that are no such message, UnknownMessage for an unknown id.
+        Raises MessageError for bytes that are not such a message, UnknownMessage for an unknown id.
         """
         return decode(self.layout(id_), payload)
 

@@ -22,7 +22,7 @@ class OdvdError(ValueError):
 
 
 class TextPlace(NamedTuple):
-    """A place in a file; line and column count from 1."""
+    """A position in a file; line and column count from 1."""
 
     file: str
     line: int

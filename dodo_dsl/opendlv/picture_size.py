@@ -1,9 +1,9 @@
-"""Width and height of pictures, read before they are decoded: a file of a megabyte may unfold to gigabytes."""
+"""Width and height of images, read before they are decoded: a file of a megabyte may unfold to gigabytes."""
 
 import zlib
 
 MAX_PIXELS = 7680 * 4320
-"""Of a picture that is decoded: 8K, which takes 133 MB as B, G, R, A."""
+"""Of an image that is decoded: 8K, which takes 133 MB as B, G, R, A."""
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
@@ -25,35 +25,35 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 
 def problem_of(data: bytes) -> str:
-    """Why a picture file cannot be decoded here, without its name; empty when it can, as far as its header shows."""
+    """Why an image file cannot be decoded here, without its name; empty when it can, as far as its header shows."""
     size = picture_size(data)
     if size is None:
-        return "not a readable picture, expected PNG or JPEG"
-    return too_large(*size) or ("" if all(size) else "a picture without an area") or _cut(data)
+        return "not a readable image, expected PNG or JPEG"
+    return too_large(*size) or ("" if all(size) else "an image without an area") or _cut(data)
 
 
 def _cut(data: bytes) -> str:
-    """Where a file ends before its picture does, or a part of a PNG is damaged; empty for whole ones."""
+    """Where a file ends before its image does, or a part of a PNG is damaged; empty for whole ones."""
     if data.startswith(_JPEG):
-        return "" if _JPEG_END in data else f"the picture is cut: its {len(data)} bytes have no end"
+        return "" if _JPEG_END in data else f"the image is cut: its {len(data)} bytes have no end"
     at = len(_PNG)
     while at + _PNG_AROUND <= len(data):
         end = at + _PNG_AROUND + _number(data, at, 4)
         if end > len(data):
             break
         if zlib.crc32(memoryview(data)[at + 4 : end - 4]) != _number(data, end - 4, 4):
-            return f"the picture is damaged at byte {at}: a checksum is wrong"
+            return f"the image is damaged at byte {at}: a checksum is wrong"
         if data[at + 4 : at + 8] == b"IEND":
             return ""
         at = end
-    return f"the picture is cut: its {len(data)} bytes have no end"
+    return f"the image is cut: its {len(data)} bytes have no end"
 
 
 def too_large(width: int, height: int) -> str:
-    """A sentence on a picture that is too large to be decoded; empty for others."""
+    """A sentence on an image that is too large to be decoded; empty for others."""
     if width * height <= MAX_PIXELS:
         return ""
-    return f"a picture of {width} x {height} pixels, expected at most {MAX_PIXELS} in all"
+    return f"an image of {width} x {height} pixels, expected at most {MAX_PIXELS} in all"
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int] | None:

@@ -1,4 +1,4 @@
-"""The pixel formats of camera frames in shared memory, and pictures from and to them.
+"""The pixel formats of camera frames in shared memory, and images from and to them.
 
 ``argb`` has 4 bytes per pixel, in memory blue, green, red, alpha; ``bgr`` 3, and ``rgb`` in the order of its letters;
 ``i420`` planes of brightness and, at half the width and height, of two colours (12 bits per pixel).
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 Picture = NDArray[np.uint8]
 
 FORMATS = ("argb", "i420", "bgr", "rgb")
-"""Services that show pictures offer the first two, and the others where ``name.bgr`` and ``name.rgb`` ask for them."""
+"""Services that show images offer the first two, and the others where ``name.bgr`` and ``name.rgb`` ask for them."""
 HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3, "rgb": 6}  # twice the bytes a pixel
 
 
 class PixelError(ValueError):
-    """A memory's size, or a format's name, that fits no picture."""
+    """A memory's size, or a format's name, that fits no image."""
 
 
 def size(format_: str, width: int, height: int) -> int:
-    """Bytes of a picture; raises PixelError for an unknown format, and for i420 with an odd width or height."""
+    """Bytes of an image; raises PixelError for an unknown format, and for i420 with an odd width or height."""
     if format_ not in FORMATS:
         raise PixelError(f"unknown pixel format '{format_}', expected one of {', '.join(FORMATS)}")
     if format_ == "i420" and (width % 2 or height % 2):
@@ -35,14 +35,14 @@ def format_of(name: str, memory_size: int, width: int, height: int) -> str:
     for format_, half_bytes in HALF_BYTES.items():
         if 0 < memory_size == width * height * half_bytes // 2:
             return "rgb" if format_ == "bgr" and name.endswith(".rgb") else format_
-    raise PixelError(f"memory '{name}' has {memory_size} bytes, not a picture of {width} x {height} pixels")
+    raise PixelError(f"memory '{name}' has {memory_size} bytes, not an image of {width} x {height} pixels")
 
 
 def view(data: Any, format_: str, width: int, height: int) -> Picture:
     """The bytes of a memory as an array, without a copy; raises PixelError if there are too few.
 
     Its shape is (height, width, 4) for argb, (height, width, 3) for bgr and rgb, and (height * 3 / 2, width) for i420;
-    bytes behind the picture are left out.
+    bytes behind the image are left out.
     """
     wanted = size(format_, width, height)
     flat = np.frombuffer(data, np.uint8)
@@ -59,12 +59,12 @@ _FROM_ARGB = {"bgr": "COLOR_BGRA2BGR", "rgb": "COLOR_BGRA2RGB"}
 
 
 def to_bgr(picture: Picture, format_: str) -> Picture:
-    """A picture as blue, green, red (height, width, 3)."""
+    """An image as blue, green, red (height, width, 3)."""
     return _converted(picture, _TO_BGR.get(format_))
 
 
 def to_i420(picture: Picture, format_: str) -> Picture:
-    """A picture as i420, shaped as ``view`` has it; raises PixelError if width or height are odd."""
+    """An image as i420, shaped as ``view`` has it; raises PixelError if width or height are odd."""
     if format_ == "i420":
         return picture.copy()
     size("i420", picture.shape[1], picture.shape[0])
@@ -72,12 +72,12 @@ def to_i420(picture: Picture, format_: str) -> Picture:
 
 
 def from_bgr(picture: Picture, format_: str) -> Picture:
-    """A picture of blue, green, red in another format, shaped as ``view`` has it; alpha is 255."""
+    """An image of blue, green, red in another format, shaped as ``view`` has it; alpha is 255."""
     return _converted(picture, _FROM_BGR.get(format_))
 
 
 def with_copies(argb: Picture, i420: Picture | None, formats: Iterable[str]) -> dict[str, Picture]:
-    """A picture by its formats: the two that there are, and those of ``formats`` that have to be made of argb."""
+    """An image by its formats: the two that there are, and those of ``formats`` that have to be made of argb."""
     pictures = {"argb": argb} if i420 is None else {"argb": argb, "i420": i420}
     return pictures | {each: _converted(argb, _FROM_ARGB[each]) for each in formats if each in _FROM_ARGB}
 

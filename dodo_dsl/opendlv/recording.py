@@ -38,7 +38,7 @@ class DamagePlace:
 
 @dataclass
 class Damage:
-    """All skipped bytes: ``count`` places with ``size`` bytes in total; ``places`` has the first thousand."""
+    """All skipped bytes: ``count`` positions with ``size`` bytes in total; ``places`` has the first thousand."""
 
     places: list[DamagePlace] = field(default_factory=list)
     count: int = 0
@@ -49,7 +49,7 @@ class Damage:
         return self.count > 0
 
     def add(self, offset: int, size: int, reason: str) -> None:
-        """Note bytes in the order of the file; neighbours are one place with the first reason."""
+        """Note bytes in the order of the file; neighbours are one position with the first reason."""
         self.size += size
         if offset == self._end:
             if self.count <= MAX_PLACES:
@@ -63,7 +63,7 @@ class Damage:
     def __str__(self) -> str:
         if not self:
             return "nothing was skipped"
-        rest = f", and {self.count - 1} more places, {self.size} bytes together" if self.count > 1 else ""
+        rest = f", and {self.count - 1} more positions, {self.size} bytes together" if self.count > 1 else ""
         return f"skipped {self.places[0]}{rest}"
 
 
@@ -78,7 +78,7 @@ _CUT, _GARBAGE, _NO_ENVELOPE = "a frame that is cut short", "no frame begins her
 class Batch:
     """Some frames of a recording: positions in ``table`` count in ``data``, which begins at byte ``base`` of the file.
 
-    ``base`` is -1 where the frames were gathered from several places.
+    ``base`` is -1 where the frames were gathered from several positions.
     """
 
     data: bytes
@@ -238,7 +238,7 @@ class Recording:
 
     The index takes 36 bytes of memory a message; ``index`` has the columns offset, size (bytes), data_type,
     sender_stamp, sampled and time (microseconds since the epoch), a row for each message in the order of the file.
-    ``time`` is the sample time, or where that is zero when the message was received, or else sent.
+    ``time`` is the sample time, or if that is zero when the message was received, or else sent.
     """
 
     def __init__(self, path: Path, progress: Callable[[int], None] | None = None) -> None:

@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.recording import Recording
 DAY = 86_400_000_000
 IMAGE = 1055
 MOST_BACK = 1_000_000
-"""Microseconds that a message may lie before the one before it of the same sender; pictures must be in order."""
+"""Microseconds that a message may lie before the one before it of the same sender; images must be in order."""
 TOOLS = range(1, 13)
 """Ids of messages of players and recorders, whose times are those of the tool."""
 _SECONDS = ((365.25 * 86_400, "years"), (86_400, "days"), (60, "minutes"), (0, ""))
@@ -39,7 +39,7 @@ def within(recording: Recording, rows: Numbers) -> Numbers:
 def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:
     """What is wrong with the times of rows, in a sentence with the first of them; empty if they may be right.
 
-    ``time`` counts: the sample time, or where that is zero when the message was received, or else sent. With
+    ``time`` counts: the sample time, or if that is zero when the message was received, or else sent. With
     ``in_order`` those of a message and sender must not go back, nor a message repeat.
     """
     rows = rows[~np.isin(recording.index["data_type"][rows], list(TOOLS))]

@@ -43,7 +43,7 @@ class SharedMemory:
         """Make memory of ``size`` bytes, all zero, and what belongs to it; ``close`` removes it all.
 
         What a dead creator left under this name is removed first. ``posix`` selects the mode (by default the
-        environment does). Raises SharedMemoryError, also where a living process holds memory of this name.
+        environment does). Raises SharedMemoryError, also if a living process holds memory of this name.
         """
         if not 0 < size < 2**32:
             raise SharedMemoryError(f"shared memory '{name}' cannot have {size} bytes")

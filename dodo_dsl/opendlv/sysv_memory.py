@@ -137,7 +137,7 @@ class Result(Enum):
 
 
 def operate_semaphore(id_: int, value: int, timeout: float | None, undo: bool = False) -> Result:
-    """Add ``value`` to a semaphore (waiting while it would become negative), or wait for zero where ``value`` is 0.
+    """Add ``value`` to a semaphore (waiting while it would become negative), or wait for zero if ``value`` is 0.
 
     ``undo`` lets the kernel take the change back when this process dies. Raises OSError when the semaphore is gone.
     """
@@ -312,8 +312,8 @@ def _refuse_twin(path: Path) -> None:
         twin = twin_token(path)
         if twin is not None and twin.stat().st_size == 0:
             raise SharedMemoryError(
-                f"shared memory '{path.name}' cannot be told from '{twin.name}': the keys of {path} and {twin} collide "
-                f"(ftok); remove the unused one, or restart its creator"
+                f"shared memory '{path.name}' cannot be distinguished from '{twin.name}': "
+                f"the keys of {path} and {twin} collide (ftok); remove the unused one, or restart its creator"
             )
 
 

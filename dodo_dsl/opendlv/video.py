@@ -1,6 +1,6 @@
-"""Compressed camera frames to pictures, and pictures to packets of h264, through PyAV.
+"""Compressed camera frames to images, and images to packets of h264, through PyAV.
 
-Frames are those of recordings (``opendlv.proxy.ImageReading``), pictures those of a shared memory.
+Frames are those of recordings (``opendlv.proxy.ImageReading``), images those of a shared memory.
 """
 
 import shlex
@@ -39,7 +39,7 @@ class DecodedFrame:
         self.height: int = frame.height
 
     def pixels(self, kind: str) -> NDArray[np.uint8]:
-        """The picture as in OpenDLV's memory: ``argb`` (height, width, 4: B, G, R, A), ``bgr`` (height, width, 3)
+        """The image as in OpenDLV's memory: ``argb`` (height, width, 4: B, G, R, A), ``bgr`` (height, width, 3)
         or ``i420`` (height * 3 / 2, width: the planes Y, U, V).
         """
         array: NDArray[np.uint8] = self._frame.to_ndarray(format=_AV_NAMES[kind])
@@ -50,7 +50,7 @@ class VideoDecoder:
     """Decodes the packets of one camera in their order; raises VideoError for an unknown format.
 
     Decoding begins at the first key frame; packets before it, and such that are damaged, give no frame. Nor do those
-    of pictures with more than MAX_PIXELS, whatever size a message declares: they are not decoded at all.
+    of images with more than MAX_PIXELS, whatever size a message declares: they are not decoded at all.
     """
 
     def __init__(self, format_: str) -> None:
@@ -86,7 +86,7 @@ class VideoDecoder:
 
 
 def has_key_frame(packet: bytes) -> bool:
-    """Whether an h264 packet holds a slice of a picture that stands alone (ITU-T H.264, table 7-1, type 5)."""
+    """Whether an h264 packet holds a slice of an image that stands alone (ITU-T H.264, table 7-1, type 5)."""
     at = packet.find(_START)
     while 0 <= at < len(packet) - len(_START):
         if packet[at + len(_START)] & 0x1F == _IDR:
@@ -112,13 +112,13 @@ _PLANAR = "yuv420p"
 
 
 class VideoEncoder:
-    """Encodes the pictures of one camera, ``kind`` being one of the formats of ``pixels``.
+    """Encodes the images of one camera, ``kind`` being one of the formats of ``pixels``.
 
-    Every ``key_interval``-th picture stands alone and brings what a decoder needs. ``quality`` is x264's constant rate
+    Every ``key_interval``-th image stands alone and brings what a decoder needs. ``quality`` is x264's constant rate
     factor, 0 (best) to 51; lossy packets are of the baseline profile, which all decoders know. ``lossless`` packets
     give back the same bytes (alpha aside) and need a decoder of the High 4:4:4 profile, such as FFmpeg. ``fast`` ones
     take less time and more room.
-    One thread, no look-ahead: a packet comes with its picture, the same for the same pictures.
+    One thread, no look-ahead: a packet comes with its image, the same for the same images.
     Raises VideoError for sizes that h264 cannot have, and where PyAV is not installed.
     """
 
@@ -146,21 +146,21 @@ class VideoEncoder:
         try:
             self._codec.open()
         except self._av.FFmpegError as error:
-            raise VideoError(f"pictures of {width} x {height} pixels cannot be encoded: {error}") from None
+            raise VideoError(f"images of {width} x {height} pixels cannot be encoded: {error}") from None
 
     @property
     def _is_rgb(self) -> bool:
         return self._pixels != _PLANAR
 
     def encode(self, picture: NDArray[np.uint8]) -> bytes:
-        """The packet of a picture, shaped as ``pixels.view`` has it; raises VideoError."""
+        """The packet of an image, shaped as ``pixels.view`` has it; raises VideoError."""
         frame = self._frame(picture)
         frame.pts = self._next * 100_000
         self._next += 1
         try:
             return b"".join(bytes(packet) for packet in self._codec.encode(frame))
         except self._av.FFmpegError as error:
-            raise VideoError(f"a picture cannot be encoded: {error}") from None
+            raise VideoError(f"an image cannot be encoded: {error}") from None
 
     def _frame(self, picture: NDArray[np.uint8]) -> Any:
         if self._kind == "i420":

@@ -78,8 +78,9 @@ def build(
         out / "test",
         functools.cache(copies),  # tests share maps and recordings
         functools.cache(lambda setting: replace(plan_application(application, setting), hidden=hidden)),
+        addresses.Subnets(deployment.subnets),
     )
-    builders = [_Builder(test, cid, index, shared) for index, (test, cid) in enumerate(zip(ordered, cids, strict=True))]
+    builders = [_Builder(test, cid, shared) for test, cid in zip(ordered, cids, strict=True)]
     plans = []
     for builder in builders:
         before_each()
@@ -109,7 +110,7 @@ def _defaults(plans: Sequence[Plan], manifests: Mapping[str, Manifest]) -> dict[
 
 
 def _in_repository(deployment: Deployment, out: Path) -> Callable[[Path], bool]:
-    """Whether a job that checks out the repository has a file; raises FilesError where ``out`` cannot link to it."""
+    """Whether a job that checks out the repository has a file; raises FilesError if ``out`` cannot link to it."""
     root = deployment.root.resolve()
     if not out.is_relative_to(root):
         raise FilesError(f"--files repository needs an output folder in the repository '{root}', and '{out}' is none")
@@ -124,7 +125,7 @@ def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
 
 
 def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
-    """A volume that the engine cannot make for a test, as its name has to tell tests apart."""
+    """A volume that the engine cannot make for a test, because its name has to tell tests apart."""
     name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
     if not name:
         return None
@@ -154,12 +155,13 @@ def _import_paths(deployment: Deployment, folder: Path) -> tuple[str, ...]:
 def _cids(tests: Sequence[ResolvedTest], deployment: Deployment, built_in: int | None) -> list[int]:
     """A CID for each instance: its rig's, the one that is built into the application, or one of the range.
 
-    Tests may have the same one that is built in: those on networks of their own do not hear each other, and those on
+    Tests may have the same one that is built in: those on their own networks do not hear each other, and those on
     the host's wait for each other's leases.
     """
     reserved = [cid if test.rig and (cid := test.rig.cid) is not None else built_in for test in tests]
     free = [test for test, cid in zip(tests, reserved, strict=True) if cid is None]
-    given = iter(addresses.cids([isolation(test.spec, test.rig) for test in free], deployment.cids))
+    isolations = [isolation(test.spec, test.rig) for test in free]
+    given = iter(addresses.cids([test.spec.slug for test in free], isolations, deployment.cids))
     return [next(given) if cid is None else cid for cid in reserved]
 
 
@@ -177,6 +179,7 @@ class _Shared:
     folder: Path
     tree: Callable[[Path, Path], list[FileCopy]]
     rewritten: Callable[[Setting], Application]
+    subnets: addresses.Subnets
 
     @functools.cached_property
     def imports(self) -> tuple[str, ...]:
@@ -188,9 +191,9 @@ class _Shared:
 
 
 class _Builder:
-    def __init__(self, test: ResolvedTest, cid: int, index: int, shared: _Shared) -> None:
+    def __init__(self, test: ResolvedTest, cid: int, shared: _Shared) -> None:
         self.test, self.spec, self.rig = test, test.spec, test.rig
-        self.cid, self.index = cid, index
+        self.cid = cid
         self.shared = shared
         self.manifests, self.deployment, self.application = shared.manifests, shared.deployment, shared.application
         self.files: set[FileCopy] = set()
@@ -270,13 +273,14 @@ class _Builder:
             baseline=resolved_baseline(spec).values,
             import_paths=self.shared.imports,
             source_map=self.places,
+            timed=tuple(name for name, _ in self.application.timed),
         )
 
     def _subnet(self, services: Sequence[PlannedService]) -> str:
         """The test's subnet, with an address for each service, and for the container that holds the network."""
         containers = 1 + len(services) + len(self.application.services)
         try:
-            return addresses.subnet(self.index, self.deployment.subnets, containers)
+            return self.shared.subnets.give(self.spec.slug, containers)
         except addresses.OutOfAddresses as error:
             hint = "give 'subnets' in dodo.yml more, such as 10.213.0.0/16"
             span = Span(str(self.deployment.file)) if self.deployment.file else self.spec.span("name")
@@ -294,7 +298,7 @@ class _Builder:
         return tuple((name, e.value.text) for name, e in self.spec.variables.items() if isinstance(e.value, Scalar))
 
     def _messages(self) -> tuple[str, ...]:
-        """The deployment's messages, copied beside the test for its services to read."""
+        """The deployment's messages, copied next to the test for its services to read."""
         targets = [f"messages/{number}-{path.name}" for number, path in enumerate(self.deployment.messages)]
         self.files.update(
             FileCopy(t, path.resolve()) for t, path in zip(targets, self.deployment.messages, strict=True)

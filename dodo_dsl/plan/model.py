@@ -20,7 +20,7 @@ FlagKind = Literal["text", "path", "memory", "memories", "report"]
 
 
 DISPLAY_SERVER = ("xvfb-run", "-a", "-s", "-screen 0 1920x1080x24 -nolisten tcp")
-"""What starts a program with an X server of its own (xvfb-run(1))."""
+"""What starts a program with its own X server (xvfb-run(1))."""
 OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
 """The variable by which programs that draw with Qt need no display."""
 
@@ -39,7 +39,7 @@ class PlannedService:
     """A service of DoDo or of the deployment; ``judge`` marks the ones whose verdict counts.
 
     ``devices`` are the device files that it needs, ``setup_s`` the seconds that it may take to get ready beyond
-    ``READY_S``. ``port`` is the rig's, which no other service may open; empty where it moves none, or the emulated one.
+    ``READY_S``. ``port`` is the rig's, which no other service may open; empty if it moves none, or the emulated one.
     """
 
     layer: str
@@ -121,7 +121,7 @@ class Lockstep:
     """A test in lockstep: the number of processes that read each frame, and the limit of wall time in seconds.
 
     ``max_response_s`` is the longest that an answer may take, None for no limit; ``response_over`` the share of answers
-    that may take longer; ``is_copied`` tells that each has to carry the sample time of its frame.
+    that may take longer; ``is_copied`` means that each has to carry the sample time of its frame.
     """
 
     readers: int
@@ -143,13 +143,14 @@ class Pooled:
 class Plan:
     """One instance of a test. Times in seconds, ``subnet`` an IPv4 network or empty under host isolation.
 
-    ``lockstep`` is None in real time, ``rig`` empty below level hil; ``more_tags`` are those of the rig's runner beside
+    ``lockstep`` is None in real time, ``rig`` empty below level hil; ``more_tags`` are its runner's besides
     ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,
-    relative to ``files/``; ``senders`` says who alone may send a message, as ``opendlv.sim.Frame/0=pose``.
+    relative to ``files/``; ``senders`` has the only senders of a message, as ``opendlv.sim.Frame/0=pose``.
     ``goals`` score a passed test and never change its outcome; checks must not be worse than those of the ``baseline``.
     ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
+    ``timed`` are services of the application that act by their own timers.
     ``import_paths`` are folders that hold Python packages of the deployment's own services, relative to the compiled
     test's. ``shared`` are files below ``files/`` that are links, each with the name of its file in the folder of files
     that tests share.
@@ -186,10 +187,11 @@ class Plan:
     import_paths: tuple[str, ...] = ()
     shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)
+    timed: tuple[str, ...] = ()
 
     @property
     def variables(self) -> dict[str, str]:
-        """Environment variables that give the test's services their clock, their rig, and who may send what."""
+        """Environment variables that give the test's services their clock, their rig, and the senders of messages."""
         stepped = {"DODO_CLOCK": self.clock, "DODO_READERS": str(self.lockstep.readers)} if self.lockstep else {}
         rig = {"DODO_RIG": self.rig} if self.rig else {}
         lists = {
@@ -199,6 +201,13 @@ class Plan:
             "DODO_TRUTH": self.truth,
         }
         return {**stepped, **rig, **{name: " ".join(words) for name, words in lists.items() if words}}
+
+    def place_named_in(self, text: str) -> Place | None:
+        """Where the spec has the service that a message names; None when it names none."""
+        for service in sorted(self.services, key=lambda s: -len(s.name)):
+            if re.search(rf"(?<![\w-]){re.escape(service.name)}(?![\w-])", text):
+                return self.source_map.get(f"{service.layer}.{service.name}")
+        return None
 
     def layer(self, name: str) -> tuple[PlannedService, ...]:
         return tuple(s for s in self.services if s.layer == name)

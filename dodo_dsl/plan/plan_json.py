@@ -29,7 +29,7 @@ from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import LEVELS, is_goal, is_valid
 
 FORMAT = 1
-_RARE = frozenset({"lines", "baseline"})
+_RARE = frozenset({"lines", "baseline", "timed"})
 """Keys that are written where there is a value."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
@@ -53,11 +53,11 @@ def _without_nothing(value: Any) -> dict[str, Any]:
 
 
 def json_text(value: Any, option: int = 0) -> str:
-    """JSON by orjson; raises UnicodeEncodeError where a text is not UTF-8, as a path may be."""
+    """JSON by orjson; raises UnicodeEncodeError if a text is not UTF-8, as a path may be."""
     try:
         return orjson.dumps(value, option=option).decode()
     except TypeError:
-        json.dumps(value, ensure_ascii=False, default=dataclasses.asdict).encode()  # it tells which text
+        json.dumps(value, ensure_ascii=False, default=dataclasses.asdict).encode()  # it says which text
         raise
 
 

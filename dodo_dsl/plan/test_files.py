@@ -1,6 +1,6 @@
-"""The files that a test needs, to be copied beside its compiled output.
+"""The files that a test needs, to be copied next to its compiled output.
 
-Large files that several tests need stand once, in the folder ``SHARED`` beside the tests; a test has links to them.
+Large files that several tests need stand once, in the folder ``SHARED`` next to the tests; a test has links to them.
 """
 
 import functools
@@ -140,7 +140,7 @@ def file_problem(folder: Path, shared: Mapping[str, str]) -> str:
 
 def _missing(path: Path) -> str:
     if not path.is_symlink():
-        return f"'{path.parent}' belongs to the compiled tests beside it, and has to be where they are"
+        return f"'{path.parent}' belongs to the compiled tests next to it, and has to stay with them"
     return f"'{_repository_file(path)}' is not in this checkout; commit it, or compile with --files artifact"
 
 

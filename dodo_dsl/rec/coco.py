@@ -1,4 +1,4 @@
-"""Frames with detections as a labelled data set in the COCO format (pictures, and one ``annotations.json``).
+"""Frames with detections as a labelled data set in the COCO format (images, and one ``annotations.json``).
 
 A detection is a DetectionBoundingBox; its class is the DetectionProperty (without ``color:``) or else the DetectionType
 of the same sender, sample time and detection. It belongs to the frame of the same sample time. If nothing moves, the
@@ -40,7 +40,7 @@ class DetectionKey(NamedTuple):
 
 @dataclass
 class Detection:
-    """One labelled box; fractions of the picture, from its upper left."""
+    """One labelled box; fractions of the frame, from its upper left."""
 
     box: tuple[float, float, float, float] | None = None
     label: str = ""
@@ -54,7 +54,7 @@ class Detection:
 
 @dataclass
 class DataSet:
-    """The pictures and boxes written so far."""
+    """The frames and boxes written so far."""
 
     images: list[dict[str, Any]] = field(default_factory=list)
     boxes: list[tuple[int, str, list[float]]] = field(default_factory=list)
@@ -123,7 +123,7 @@ class CocoExport:
     result: DataSet = field(default_factory=DataSet)
 
     def add(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]], name: str = "") -> None:
-        """Writes the pictures of a recording, which has a ``name`` if there are several; raises OSError."""
+        """Writes the frames of a recording, which has a ``name`` if there are several; raises OSError."""
         (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
         for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
             wanted = labels.get(packet.sample_time, ())
@@ -143,7 +143,7 @@ class CocoExport:
         (self.folder / ANNOTATIONS).write_text(self.result.text(), encoding="utf-8")
 
     def write(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]]) -> DataSet:
-        """Writes pictures and annotations.json; raises LabelError if not one frame is wanted, and OSError."""
+        """Writes frames and annotations.json; raises LabelError if not one frame is wanted, and OSError."""
         self.add(recording, images, labels)
         if not self.result.images:
             raise LabelError(f"no frame of {recording.path} could be decoded at the sample time of a detection")

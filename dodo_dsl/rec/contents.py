@@ -29,7 +29,7 @@ class MessageStream:
 
 @dataclass(frozen=True)
 class Frames:
-    """Packets with camera frames, and how many of them give a picture (None if they were not decoded)."""
+    """Packets with camera frames, and how many of them give a frame (None if they were not decoded)."""
 
     packets: int
     decoded: int | None
@@ -143,7 +143,7 @@ def contents_text(found: Contents, recording: Recording) -> str:
         lines.append(f"{found.unordered} steps back in time, {found.untimed} messages without a sample time")
     lines += [f"skipped {place}" for place in recording.damage.places[:_SHOWN]]
     if recording.damage.count > _SHOWN:
-        lines.append(f"skipped {recording.damage.size} bytes at {recording.damage.count} places in all")
+        lines.append(f"skipped {recording.damage.size} bytes at {recording.damage.count} positions in all")
     return "\n".join([*lines, "", *_table([_HEAD, *map(_row, found.streams)])]) + "\n"
 
 

@@ -129,7 +129,7 @@ def write_mcap(
 ) -> McapCounts:
     """Write the known messages among ``rows`` in the order of their times; ``progress`` gets the number of rows done.
 
-    The log time is the sample time, or where that is zero when the message was received, or else sent; the publish
+    The log time is the sample time, or if that is zero when the message was received, or else sent; the publish
     time is when it was sent. Times before 1970 become 1970. Memory is bounded by what ``Recording.batches`` holds and
     the file's index. Raises OSError and RecordingError.
     """

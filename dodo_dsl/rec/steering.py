@@ -1,4 +1,4 @@
-"""Frames with the requests that answered them, for programs that learn to steer from pictures (pictures, one table).
+"""Frames with the requests that answered them, for programs that learn to steer from frames (images, one table).
 
 A frame is answered by the first GroundSteeringRequest of its sample time or later, at most ``PATIENCE`` later: an
 application of DoDo's tests copies the frame's sample time, a person at the wheel reacts after it. Recordings of a data
@@ -103,7 +103,7 @@ class SplitError(ValueError):
 
 
 def split_recordings(files: Sequence[Path], share: float, seed: int) -> dict[str, list[Path]]:
-    """The files by part, in their order; all in one part with the name "" where ``share`` is 0.
+    """The files by part, in their order; all in one part with the name "" if ``share`` is 0.
 
     Whole recordings are chosen, as frames of one drive are alike; the same ones for the same number of files and seed.
     Raises SplitError for fewer than two.

@@ -1,7 +1,7 @@
-"""True boxes of one picture: marked manually or read from COCO JSON, checked, drawn, and written as COCO JSON.
+"""True boxes of one frame: marked manually or read from COCO JSON, checked, drawn, and written as COCO JSON.
 
-Reference: cocodataset.org, "Data format", object detection; boxes are in pixels from the picture's upper left corner.
-On disk a truth is the COCO file, its picture, and the same picture with the boxes drawn.
+Reference: cocodataset.org, "Data format", object detection; boxes are in pixels from the frame's upper left corner.
+On disk a truth is the COCO file, its frame, and the same frame with the boxes drawn.
 """
 
 import json
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 MOST_BYTES, MOST_BOXES, MOST_PIXELS = 16_000_000, 10_000, 100_000
 _SLACK = 0.01
-"""px by which a rounded box may reach over the picture's edge."""
+"""px by which a rounded box may reach over the frame's edge."""
 _LEAST_SHOWN = 1000
-"""px: a narrower picture is drawn at twice its size, as its boxes are small."""
+"""px: a narrower frame is drawn at twice its size, as its boxes are small."""
 
 
 class TruthError(ValueError):
-    """Boxes that cannot be the truth of a picture; one sentence."""
+    """Boxes that cannot be the truth of a frame; one sentence."""
 
 
 class Mark(NamedTuple):
@@ -44,7 +44,7 @@ class Mark(NamedTuple):
 
 
 def mark(label: object, values: Sequence[object], place: str) -> Mark:
-    """A box of a class and its four numbers; raises TruthError, which names the place."""
+    """A box of a class and its four numbers; raises TruthError, which names the position."""
     name = str(label).strip().removeprefix("color:").strip()
     if not name or not name.isprintable():
         raise TruthError(f"{place}: the class is empty or not printable")
@@ -58,7 +58,7 @@ def mark(label: object, values: Sequence[object], place: str) -> Mark:
 
 
 def check(marks: Sequence[Mark], width: int, height: int, classes: Collection[str]) -> None:
-    """Raises TruthError for the first box that a picture of this size cannot have; without classes any is allowed."""
+    """Raises TruthError for the first box that a frame of this size cannot have; without classes any is allowed."""
     for number, each in enumerate(marks, 1):
         place = f"box {number} ({each})"
         if classes and each.label not in classes:
@@ -67,24 +67,24 @@ def check(marks: Sequence[Mark], width: int, height: int, classes: Collection[st
             raise TruthError(f"{place}: has no area, expected a width and a height above 0")
         ends = each.x + each.width, each.y + each.height
         if min(each.x, each.y) < 0 or ends[0] > width + _SLACK or ends[1] > height + _SLACK:
-            raise TruthError(f"{place}: lies outside the picture of {width} x {height} pixels")
+            raise TruthError(f"{place}: lies outside the frame of {width} x {height} pixels")
 
 
 def read(path: Path, width: int, height: int) -> list[Mark]:
-    """The boxes of a COCO file of one picture of this size; raises TruthError."""
+    """The boxes of a COCO file of one frame of this size; raises TruthError."""
     size, marks = load(path)
     if size != (width, height):
-        has = f"a picture of {size[0]} x {size[1]} pixels"
+        has = f"a frame of {size[0]} x {size[1]} pixels"
         raise TruthError(f"{path}: has boxes of {has}, expected one of {width} x {height} pixels")
     return marks
 
 
 def load(path: Path) -> tuple[tuple[int, int], list[Mark]]:
-    """Width and height of the one picture of a COCO file, and its boxes; raises TruthError."""
+    """Width and height of the one frame of a COCO file, and its boxes; raises TruthError."""
     document = _document(path)
     images = _entries(document, "images", path)
     if len(images) != 1:
-        raise TruthError(f"{path}: has {len(images)} images, expected one picture")
+        raise TruthError(f"{path}: has {len(images)} images, expected one")
     width, height = (_side(images[0].get(name), name, path) for name in ("width", "height"))
     names = {_key(entry.get("id")): entry.get("name") for entry in _entries(document, "categories", path)}
     boxes = enumerate(_entries(document, "annotations", path))
@@ -92,7 +92,7 @@ def load(path: Path) -> tuple[tuple[int, int], list[Mark]]:
 
 
 def truth_text(marks: Sequence[Mark], picture: str, width: int, height: int) -> str:
-    """COCO JSON of a picture's file name and size, and its boxes."""
+    """COCO JSON of a frame's file name and size, and its boxes."""
     from dodo_dsl.rec.coco import DataSet
 
     images = [{"id": 1, "file_name": picture, "width": width, "height": height}]
@@ -100,7 +100,7 @@ def truth_text(marks: Sequence[Mark], picture: str, width: int, height: int) -> 
 
 
 def drawn_boxes(picture: "Picture", marks: Sequence[Mark]) -> "Picture":
-    """A picture (height, width, 3; B, G, R) with the boxes and their classes; twice as large where it is small."""
+    """A frame (height, width, 3; B, G, R) with the boxes and their classes; twice as large if it is small."""
     import cv2
 
     scale = 2 if picture.shape[1] < _LEAST_SHOWN else 1
@@ -163,7 +163,7 @@ MOST_FILE_BYTES = 64_000_000
 
 @dataclass(frozen=True)
 class TruthFiles:
-    """The files of a truth: COCO, picture, and picture with boxes."""
+    """The files of a truth: COCO, frame, and frame with boxes."""
 
     truth: Path
     picture: Path
@@ -177,11 +177,11 @@ class TruthFiles:
         return cls(path, path.with_suffix(".png"), path.with_name(f"{path.stem}-boxes.png"))
 
     def wanted(self, has_boxes: bool, is_new: bool) -> list[Path]:
-        """The files that will be written, for a picture that is ``is_new``."""
+        """The files that will be written, for a frame that is ``is_new``."""
         return [*([self.truth, self.marked] if has_boxes else []), *([self.picture] if is_new else [])]
 
     def write(self, picture: "Picture", marks: Sequence[Mark], is_new: bool) -> None:
-        """Writes the pictures first, so that a reader that finds the truth finds them, too."""
+        """Writes the frames first, so that a reader that finds the truth finds them, too."""
         height, width = picture.shape[:2]
         if is_new:
             _write_picture(self.picture, picture)
@@ -191,7 +191,7 @@ class TruthFiles:
 
 
 def given(path: Path) -> bytes:
-    """The bytes of an existing picture; raises TruthError."""
+    """The bytes of an existing frame; raises TruthError."""
     try:
         return regular_file.content(path, MOST_FILE_BYTES)
     except OSError as error:
@@ -199,7 +199,7 @@ def given(path: Path) -> bytes:
 
 
 def decoded(data: bytes, name: str) -> "Picture":
-    """The bytes of a picture as blue, green, red (height, width, 3); raises TruthError, which names it."""
+    """The bytes of a frame as blue, green, red (height, width, 3); raises TruthError, which names it."""
     import cv2
     import numpy as np
 
@@ -207,7 +207,7 @@ def decoded(data: bytes, name: str) -> "Picture":
         raise TruthError(f"{name}: {problem}")
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
-        raise TruthError(f"{name}: not a picture")
+        raise TruthError(f"{name}: not an image")
     return np.asarray(picture, np.uint8)
 
 

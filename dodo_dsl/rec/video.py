@@ -1,4 +1,4 @@
-"""The frames of a camera as an MP4, each shown at its time, or as pictures, a file each.
+"""The frames of a camera as an MP4, each shown at its time, or as images, a file each.
 
 In the MP4 packets of H.264 are as they were recorded, others encoded again.
 """

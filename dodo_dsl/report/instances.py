@@ -51,11 +51,18 @@ def decisive_value(outcome: Outcome) -> str:
 
     As for a test's margin, checks that cannot be better do not count.
     """
-    check = _decisive(outcome)
+    check = decisive(outcome)
     return f"{check['name']} {comparison.value_text(check['value'], check.get('unit') or '')}" if check else ""
 
 
-def _decisive(outcome: Outcome) -> Mapping[str, Any] | None:
+def decisive_limits(outcome: Outcome) -> str:
+    """The limits of that check in words; empty without one."""
+    check = decisive(outcome)
+    return ", ".join(comparison.limits(check)) if check else ""
+
+
+def decisive(outcome: Outcome) -> Mapping[str, Any] | None:
+    """The check whose value ``decisive_value`` shows."""
     checks = outcome.checks
     failed = [check for check in checks if not check["ok"] and not only_follows(check, checks)]
     shares = (
@@ -80,9 +87,8 @@ class WorstInstance(NamedTuple):
 
     def in_words(self) -> str:
         """``dil-course: 2 of 3 passed, worst is [recording=b.rec]: share 0.5 (at least 0.55)``"""
-        check = _decisive(self.outcome)
-        limits = ", ".join(comparison.limits(check)) if check else ""
-        told = f": {decisive_value(self.outcome)}{f' ({limits})' if limits else ''}" if check else ""
+        value, limits = decisive_value(self.outcome), decisive_limits(self.outcome)
+        told = f": {value}{f' ({limits})' if limits else ''}" if value else ""
         return f"{self.test}: {self.passed} of {self.number} passed, worst is {self.choice}{told}"
 
 

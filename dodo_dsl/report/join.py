@@ -21,7 +21,7 @@ from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING, SNAPSHOT
-from dodo_dsl.report import results
+from dodo_dsl.report import results, trajectory_svg
 from dodo_dsl.report.comparison import Comparison, JoinedTest, TestChange, distinct
 from dodo_dsl.report.report_folder import ATTEMPTS, OF_MACHINE, SANDBOX_LOG, TRAJECTORY, forget
 from dodo_dsl.report.results import GivenReport
@@ -35,7 +35,7 @@ MOST_BYTES = 16 << 30
 MOST_FILES = 2000
 """In a folder; further ones are left out."""
 _PART = 1 << 20
-_FILES = {RECORDING, PICTURES_FILE, SNAPSHOT, TRAJECTORY, SANDBOX_LOG, *viewer.VIDEOS}
+_FILES = {RECORDING, PICTURES_FILE, SNAPSHOT, TRAJECTORY, trajectory_svg.FILE_NAME, SANDBOX_LOG, *viewer.VIDEOS}
 _LOG = re.compile(r"[^/\0]+\.(log|times|judged)")
 _ATTEMPT = re.compile(r"[1-9][0-9]{0,3}")
 

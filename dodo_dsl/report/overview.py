@@ -1,4 +1,4 @@
-"""``index.html``: the run at a glance, in one file, with a link to the drive of each test.
+"""``index.html``: the run at a glance, in one file: what failed comes first, and each row leads to its drive.
 
 It shows everything without its script, which searches, filters and sorts. What checks measured in the latest runs is
 kept beside the report and drawn as small curves.
@@ -20,10 +20,11 @@ from markupsafe import Markup
 
 from dodo_dsl import __version__, atomic, package_data
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import MachineLoad, Outcome, Wait, megabytes
+from dodo_dsl.outcome import MachineLoad, Outcome, Wait, megabytes, worst_margin
+from dodo_dsl.report import check_display
 from dodo_dsl.report import comparison as report_comparison
 from dodo_dsl.report.comparison import KINDS, Comparison
-from dodo_dsl.report.instances import decisive_value, grids, worst_instances
+from dodo_dsl.report.instances import MatrixGrid, decisive, decisive_value, grids, worst_instances
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
 from dodo_dsl.template_cache import compiled_templates
 
@@ -82,6 +83,19 @@ def curve(past: Past, slug: str, check: Mapping[str, Any]) -> Markup:
     return _svg(values, limits)
 
 
+def history(past: Past, slug: str, checks: Sequence[Mapping[str, Any]]) -> list[tuple[Mapping[str, Any], Markup]]:
+    """The curves of those checks of a test that have a limit and did not have the same value each time."""
+    drawn = ((check, curve(past, slug, check)) for check in checks if check.get("limit") and _varies(past, slug, check))
+    return [(check, picture) for check, picture in drawn if picture]
+
+
+def _varies(past: Past, slug: str, check: Mapping[str, Any]) -> bool:
+    try:
+        return len({run["checks"].get(check["name"]) for run in past.get(slug, ())} - {None}) > 1
+    except (TypeError, KeyError, AttributeError):
+        return False
+
+
 def _svg(values: Sequence[float], limits: Sequence[float]) -> Markup:
     low, high = min(values), max(values)
     near = [limit for limit in limits if low - (high - low) <= limit <= high + (high - low)]
@@ -119,7 +133,7 @@ class ReportPicture(NamedTuple):
 class ReportFiles:
     """The files beside the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty.
 
-    ``past`` are earlier values of checks.
+    ``past`` are earlier values of checks, ``ways`` pictures of drives to put into the page.
     """
 
     pictures: Mapping[str, Sequence[ReportPicture]]
@@ -129,23 +143,57 @@ class ReportFiles:
     drives: Mapping[str, str]
     times: str = ""
     past: Past = field(default_factory=dict)
+    ways: Mapping[str, Markup] = field(default_factory=dict)
 
 
-MEANINGS = {
-    "outside": "samples at times without a target, ignored",
-    "broken": "samples that are not finite numbers",
-    "without-truth": "frames without ground truth, ignored",
-    "late": "samples or detections that came too late to be judged, ignored",
-    "repeated": "detections with a detectionId that their frame already had, ignored",
-}
-"""Explanations of checks whose names do not explain them, as in the READMEs of the evaluators."""
+@dataclass(frozen=True)
+class Row:
+    """A test, or all instances of a matrix with its ``grid``."""
+
+    outcomes: Sequence[Outcome]
+    grid: MatrixGrid | None = None
+
+    @property
+    def urgency(self) -> int:
+        return min(map(urgency, self.outcomes))
+
+    def count(self, kind: str) -> int:
+        """How many of its tests have an outcome."""
+        return sum(o.outcome == kind for o in self.outcomes)
+
+
+_URGENCIES = ("failed", "error", "passed")
+
+
+def urgency(outcome: Outcome) -> int:
+    """0 for what is looked at first."""
+    return _URGENCIES.index(outcome.outcome)
+
+
+def rows(outcomes: Sequence[Outcome]) -> list[Row]:
+    """What did not pass first, else in the order of the outcomes; instances of a matrix are one row."""
+    found: list[Row] = []
+    taken = set[int]()
+    of = {id(o): grid for grid in grids(outcomes) for row in grid.rows for cell in row.cells for o in cell}
+    for outcome in outcomes:
+        grid = of.get(id(outcome))
+        if grid is None:
+            found.append(Row([outcome]))
+        elif id(grid) not in taken:
+            taken.add(id(grid))
+            found.append(Row(sorted((o for o in outcomes if of.get(id(o)) is grid), key=urgency), grid))
+    return sorted(found, key=lambda row: row.urgency)
 
 
 _BREAKS = re.compile(r"(?=\[)|(?<=,)")
+_INDENT = re.compile(r"\n +(?=<)")
+"""Of tags: text of others has none, and a page with many tests has thousands."""
 _UNITS = re.compile(r"(?<=\d) (?=\S)")
 _MOST_TEXT = 10_000
 """Characters of one text of others on the page."""
-_URGENCIES = ("error", "failed", "passed")
+_MOST_REPOSITORIES = 4
+_MOST_OF_A_LINE = 70
+"""Characters of the reason of a test that passed, which has one line."""
 _DIRECTIONS = ("worse", "better", "different")
 
 
@@ -154,34 +202,43 @@ def render(
     files: ReportFiles,
     comparison: Comparison | None = None,
     circumstances: Circumstances = NO_CIRCUMSTANCES,
+    branch: str = "",
 ) -> str:
-    """The page; with a comparison, what changed since the report that it names."""
+    """The page; with a comparison, what changed since the report that it names. ``branch`` is the run's, if known."""
     counts = {kind: sum(o.outcome == kind for o in outcomes) for kind in ("passed", "failed", "error")}
+    repositories = {r.commit: r for run in circumstances.runs for r in run.repositories}
     script = (package_data.templates() / "report" / "suite.js").read_text(encoding="utf-8")
-    return (
+    page = (
         environment()
         .get_template("report.html.j2")
         .render(
             outcomes=outcomes,
+            rows=rows(outcomes),
             files=files,
-            meanings=MEANINGS,
+            meaning=check_display.meaning,
+            bars=check_display.Bars(),
+            branch=branch,
+            longest=_MOST_OF_A_LINE,
+            repositories=list(repositories.values())[:_MOST_REPOSITORIES],
+            taken_s=sum((o.setup_s or 0.0) + (o.execution_s or 0.0) for o in outcomes),
             counts=counts,
             not_run=circumstances.not_run,
             runs=circumstances.runs,
             version=__version__,
             machine_line=machine_line,
             megabytes=megabytes,
-            curve=curve,
-            grids=grids(outcomes),
+            history=history,
+            explained=_explained(outcomes),
             worst={worst.test: worst for worst in worst_instances(outcomes)},
+            decisive=decisive,
             decisive_value=decisive_value,
+            margin=worst_margin,
             comparison=comparison,
             changed=comparison.by_slug() if comparison else {},
             words=report_comparison,
             check_words=report_comparison,
             kinds=KINDS,
             directions=_DIRECTIONS,
-            urgencies=_URGENCIES,
             script=script,
             style=style(),
             hash=source_hash,
@@ -189,11 +246,24 @@ def render(
             unbroken=unbroken,
         )
     )
+    return _INDENT.sub("\n", page)
+
+
+def _explained(outcomes: Sequence[Outcome]) -> dict[str, str]:
+    """What the checks of all tests mean, once each; a name that means two things is explained by the first of them."""
+    found: dict[str, str] = {}
+    for outcome in outcomes:
+        names = [check["name"] for check in outcome.checks]
+        for check in outcome.checks:
+            if check["name"] not in found and (words := check_display.meaning(check, names)):
+                found[check["name"]] = words
+    return dict(sorted(found.items()))
 
 
 def style() -> str:
-    """The style sheet of pages."""
-    return (package_data.templates() / "report" / "suite.css").read_text(encoding="utf-8")
+    """The style sheet of pages, which begins with what the drive viewer has in common with them."""
+    parts = ("viewer/tokens.css", "report/suite.css")
+    return "".join((package_data.templates() / part).read_text(encoding="utf-8") for part in parts)
 
 
 @functools.cache

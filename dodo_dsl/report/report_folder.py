@@ -6,6 +6,7 @@ import functools
 import os
 import platform
 import shutil
+import subprocess
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING, SNAPSHOT
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import comparison as report_comparison
-from dodo_dsl.report import for_gitlab, overview, results
+from dodo_dsl.report import for_gitlab, overview, results, trajectory_svg
 from dodo_dsl.report.comparison import Comparison
 from dodo_dsl.report.duration_plot import Times
 from dodo_dsl.report.duration_plot import draw as draw_times
@@ -65,7 +66,7 @@ def _forget_test(place: Path) -> None:
     for name in (viewer.LOGS, ATTEMPTS):
         with contextlib.suppress(OSError):
             (place / name).unlink() if (place / name).is_symlink() else shutil.rmtree(place / name)
-    for name in (RECORDING, PICTURES_FILE, TRAJECTORY, SNAPSHOT, SANDBOX_LOG, *viewer.FILES):
+    for name in (RECORDING, PICTURES_FILE, TRAJECTORY, trajectory_svg.FILE_NAME, SNAPSHOT, SANDBOX_LOG, *viewer.FILES):
         (place / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # there is none, or it holds what others put there
         place.rmdir()
@@ -212,8 +213,32 @@ def _write_linked(
         pages,
         times,
         overview.read_history(folder),
+        {o.slug: way for o in outcomes if (way := trajectory_svg.read(folder / o.slug / trajectory_svg.FILE_NAME))},
     )
-    atomic.write_text(folder / "index.html", overview.render(outcomes, files, comparison, circumstances))
+    page = overview.render(outcomes, files, comparison, circumstances, _branch(circumstances))
+    atomic.write_text(folder / "index.html", page)
+    if (folder / viewer.SHARED).is_dir():
+        from dodo_dsl.report.viewer import encoded
+
+        failed = [
+            [o.slug, encoded.shown(o.name), o.outcome]
+            for o in sorted(outcomes, key=overview.urgency)
+            if o.outcome != "passed" and o.slug in pages
+        ]
+        atomic.write_text(folder / viewer.SHARED / viewer.FAILED, encoded.script(failed, viewer.FAILED_VARIABLE))
+
+
+def _branch(circumstances: results.Circumstances) -> str:
+    """The branch of the commit that a run was of, as the job of GitLab or the working folder is on it; else empty."""
+    commits = {repository.commit for run in circumstances.runs for repository in run.repositories}
+    if os.environ.get("CI_COMMIT_SHA") in commits:
+        return os.environ.get("CI_COMMIT_REF_NAME", "")
+    command = ["git", "--no-optional-locks", "-c", "core.fsmonitor=false", "rev-parse", "HEAD", "--abbrev-ref", "HEAD"]
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        done = subprocess.run(command, capture_output=True, timeout=5, check=True) if commits else None
+        commit, _, branch = done.stdout.decode(errors="replace").strip().partition("\n") if done else ("", "", "")
+        return branch if commit in commits and branch != "HEAD" else ""
+    return ""
 
 
 def _pictures(folder: Path, outcome: Outcome) -> list[overview.ReportPicture]:
@@ -268,3 +293,4 @@ def _draw(folder: Path, outcome: Outcome, test: Drawable) -> None:
 
     with atomic.replacing(folder / TRAJECTORY) as part:
         draw(drive, outcome, part)
+    trajectory_svg.write(drive, outcome, folder / trajectory_svg.FILE_NAME)

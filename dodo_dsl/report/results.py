@@ -16,6 +16,7 @@ from dodo_dsl import package_data
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import NotRun, Outcome
+from dodo_dsl.report.repetitions import Repeated
 from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import is_goal
 
@@ -68,10 +69,11 @@ class ResultsError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Circumstances:
-    """What results say besides the outcomes: of which runs they are, and the tests that never began."""
+    """What results say besides the outcomes: of which runs they are, the tests that never began, and repetitions."""
 
     runs: tuple[RunRecord, ...] = ()
     not_run: tuple[NotRun, ...] = ()
+    repeated: tuple[Repeated, ...] = ()
 
 
 NO_CIRCUMSTANCES = Circumstances()
@@ -113,7 +115,12 @@ def writable_circumstances(circumstances: Circumstances) -> Circumstances:
     runs = (
         dataclasses.replace(run, host=_written(run.host), command=_written(run.command)) for run in circumstances.runs
     )
-    return Circumstances(tuple(runs), tuple(not_run))
+    return Circumstances(tuple(runs), tuple(not_run), tuple(map(_writable_repeated, circumstances.repeated)))
+
+
+def _writable_repeated(repeated: Repeated) -> Repeated:
+    differing = (dataclasses.replace(d, values=tuple(map(_written, d.values))) for d in repeated.differing)
+    return dataclasses.replace(repeated, differing=tuple(differing))
 
 
 def joined(each: Sequence[Results]) -> Circumstances:
@@ -121,7 +128,9 @@ def joined(each: Sequence[Results]) -> Circumstances:
     ran = {outcome.slug for one in each for outcome in one.outcomes}
     left = {test.slug: test for one in each for test in one.circumstances.not_run if test.slug not in ran}
     runs = dict.fromkeys(run for one in each for run in one.circumstances.runs)
-    return Circumstances(tuple(runs), tuple(left.values()))
+    return Circumstances(
+        tuple(runs), tuple(left.values()), tuple(known for one in each for known in one.circumstances.repeated)
+    )
 
 
 def _written(text: str) -> str:

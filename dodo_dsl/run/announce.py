@@ -46,12 +46,12 @@ def frame_of(
 
 
 def that_hear(plan: Plan) -> list[str]:
-    """The services that say where they hear the begin; those of the deployment need not."""
+    """The services that say where they hear the start; those of the deployment need not."""
     return [CLOCK] if plan.lockstep else [word for word in plan.world if "?=" not in word]
 
 
 def hearers(plan: Plan, cid: int, addresses: Mapping[str, Address]) -> list[Address]:
-    """Where to announce the begin: to the services that take it, by the ``addresses`` that they said.
+    """Where to announce the start: to the services that take it, by the ``addresses`` that they said.
 
     Where one has not said any, or the application declares to take it, on the bus as well.
     """

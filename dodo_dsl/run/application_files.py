@@ -1,4 +1,4 @@
-"""Files beside a compiled test: those that the application reads, its secrets, and what it never sees.
+"""Files next to a compiled test: those that the application reads, its secrets, and what it never sees.
 
 Files of tests among an application's own are known by what they are, as their users choose the names: specs and what
 they name, maps, recordings, compiled tests and reports.
@@ -104,7 +104,7 @@ _WORD = re.compile(r"""[^\s'"\[\]{},:#]+""")
 
 @dataclass(frozen=True)
 class Found:
-    """Files and folders of tests; ``problem`` tells that there may be more of them, and is empty else."""
+    """Files and folders of tests; ``problem`` says that there may be more of them, and is empty else."""
 
     paths: tuple[Path, ...]
     problem: str = ""
@@ -148,7 +148,7 @@ def _files_of_tests(folder: Path, own: Path, passed: frozenset[Path]) -> Found:
 
 
 def forget() -> None:
-    """Folders are searched anew, as by another run."""
+    """Folders are searched again, as by another run."""
     _files_of_tests.cache_clear()
 
 

@@ -61,7 +61,7 @@ class Attempts:
         try:
             set_aside(job.report, self._made[job.plan.slug])
         except OSError as error:
-            return f"as its report cannot be moved: {system_error(error)}"
+            return f"because its report cannot be moved: {system_error(error)}"
         return ""
 
     async def _attempt(self, job: Job, begun: Callable[[], None]) -> Outcome:
@@ -102,7 +102,7 @@ class Attempts:
 
 
 def _silent(job: Job) -> str:
-    """Which program of the application is to blame that it did not answer; empty where that is not known."""
+    """Which program of the application is to blame that it did not answer; empty if that is not known."""
     from dodo_dsl.opendlv.odvd import OdvdError
     from dodo_dsl.run.test_recording import silent_consumer
 

@@ -55,7 +55,7 @@ class Backends(Protocol):
 
 
 class Processes:
-    """Local processes, each test in namespaces of its own, or on the host in a leased slot, as on a real rig."""
+    """Local processes, each test in its own namespaces, or on the host in a leased slot, as on a real rig."""
 
     name = "process"
     _fork_server: ForkServer | None = None
@@ -107,7 +107,7 @@ class Processes:
                 note(f"what an application starts may outlive its test on the host: {why}")
 
     def _start_fork_server(self, plans: Sequence[Plan]) -> None:
-        """One for the services of these tests, none where there are none."""
+        """One for the services of these tests, none if there are none."""
         self._fork_server = serving(self._loaded(), own_modules(plans) if plans else None, self._descriptors)
 
     def close(self) -> None:

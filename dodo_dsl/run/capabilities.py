@@ -53,7 +53,7 @@ _SEGMENT_BYTES = 64 << 20
 
 
 def namespaces() -> Iterator[Capability]:
-    """Whether tests can have namespaces of their own."""
+    """Whether tests can have their own namespaces."""
     if refusal := host_isolation.isolation_refusal():
         remedy = f"{refusal.remedy}; " if refusal.remedy else ""
         way = f"{remedy}for applications you trust, --isolation host"
@@ -94,7 +94,7 @@ def receive_buffer() -> Iterator[Capability]:
     """Whether sockets may buffer as much as OpenDLV requests."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        limit = receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # the kernel tells what it reserves
+        limit = receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # the kernel shows what it reserves
     if limit < RECEIVE_BUFFER:
         text = f"sockets may hold {limit:,} bytes, OpenDLV requests {RECEIVE_BUFFER:,}: bursts of messages may be lost"
         yield Capability("receive buffer", "warning", text, _sysctl(f"net.core.rmem_max={RECEIVE_BUFFER}"))
@@ -196,7 +196,7 @@ def _output(*command: str) -> str:
 
 
 def emulator_folder() -> Path | None:
-    """Where the emulated rig is built; None where it is not."""
+    """Where the emulated rig is built; None if it is not."""
     return next((p for p in _places() if all((p / name).is_file() for name in ("rig-emulator", "gantry.elf"))), None)
 
 

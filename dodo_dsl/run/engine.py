@@ -234,7 +234,7 @@ class Engine:
         self._begin_sent = self._now()
 
     def _next_begin(self) -> float:
-        """When to announce the begin of the test again: until the clock of a lockstep test reports a time."""
+        """When to announce the start of the test again: until the clock of a lockstep test reports a time."""
         waits = self.plan.lockstep is not None and self.state.time is None
         return self._begin_sent + BEGIN_PATIENCE_S if waits else math.inf
 

@@ -39,9 +39,11 @@ class PastRun:
     setup_s: float
     execution_s: float
     cores: float | None = None
-    """Processor seconds a second of execution, of application and services; None where it was not measured."""
+    """Processor seconds a second of execution, of application and services; None if it was not measured."""
     checks: Mapping[str, float] = field(default_factory=dict)
     """Values by name, of names that one check has."""
+    timed: bool = False
+    """Whether the application acted by its own clock in lockstep."""
 
 
 def default_path() -> Path:
@@ -63,7 +65,7 @@ class History:
         self._saved = len(self.runs)
 
     def seconds(self, spec: str, test: str, backend: str, clock: str) -> float | None:
-        """The median time of the latest runs, from the begin of set-up to the end; None when the test never ran."""
+        """The median time of the latest runs, from the start of set-up to the end; None when the test never ran."""
         key = (spec, test, backend, clock)
         took = [r.setup_s + r.execution_s for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key]
         return statistics.median(took[-_RECENT:]) if took else None
@@ -90,12 +92,17 @@ class History:
         runs = [r for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key and r.checks]
         return [{"when": r.when, "outcome": r.outcome, "checks": dict(r.checks)} for r in runs[-_SHOWN:]]
 
+    def is_timed(self, spec: str, test: str) -> bool:
+        """Whether the application acted by its own clock in the latest run of a test in lockstep."""
+        seen = [r.timed for r in self.runs if (r.spec, r.test, r.clock) == (spec, test, "lockstep")]
+        return bool(seen and seen[-1])
+
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
-        """Adds pairs of a test's name and its outcome; errors are left out, as they say nothing about its time."""
+        """Adds pairs of a test's name and its outcome; errors are left out, because they say nothing about its time."""
         self.runs += [
             PastRun(
                 int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s,
-                _cores_used(o.machine), _values(o.checks),
+                _cores_used(o.machine), _values(o.checks), bool(o.response and o.response.unasked),
             )
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None

@@ -37,9 +37,9 @@ _NO_TICKET = (OSError, ValueError, KeyError, TypeError, AttributeError, Recursio
 
 @dataclass(frozen=True)
 class Ticket:
-    """Somebody who waits since a time in ns for any of some leases; a ``shared`` one excludes only exclusive use.
+    """A process that waits since a time in ns for any of some leases; ``shared`` excludes only exclusive use.
 
-    Who has the ``turn`` has chosen a rig and is about to take all of its leases: those who choose later take another.
+    The holder of the ``turn`` has chosen a rig and is about to take all of its leases: later ones choose another.
     """
 
     since: int
@@ -48,12 +48,12 @@ class Ticket:
     turn: bool
 
     def precedes(self, since: int, names: Collection[str], shared: bool) -> bool:
-        """Whether one who came at a time may take none of the names before this one."""
+        """Whether a process that came at a time may take none of the names before this one."""
         return self.since < since and not (self.shared and shared) and not self.names.isdisjoint(names)
 
 
 def arrival_time() -> int:
-    """The time of arrival of who comes now: in ns, of a clock that all processes of a machine share.
+    """The time of arrival of a process that comes now: in ns, of a clock that all processes of a machine share.
 
     Within ``arrived`` it is the time at which its block was entered.
     """
@@ -74,7 +74,7 @@ def arrived() -> Iterator[None]:
 def ticket(
     folder: Path, names: Sequence[str], since: int, *, shared: bool = False, turn: bool = False
 ) -> Iterator[None]:
-    """Waits in the queue within the block; raises OSError where the folder cannot be written."""
+    """Waits in the queue within the block; raises OSError if the folder cannot be written."""
     path = folder / f"{PREFIX}{since:020d}.{os.getpid()}.{next(_NUMBERS)}"
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
     try:
@@ -89,7 +89,7 @@ def ticket(
 
 
 def ahead_in_line(folder: Path, names: Collection[str], since: int, *, shared: bool = False) -> list[Ticket]:
-    """Who waits for one of the names and came before ``since``; tickets of dead processes are removed."""
+    """The processes that wait for one of the names and came before ``since``; tickets of dead processes are removed."""
     return [one for one in _waiting(folder) if one.precedes(since, names, shared)]
 
 
@@ -111,7 +111,7 @@ def _waiting(folder: Path) -> Iterator[Ticket]:
 
 
 def _is_dead(path: Path) -> bool:
-    """Whether nobody holds a ticket any more, and it is not being written; raises OSError where it cannot be opened."""
+    """Whether nobody holds a ticket any more, and it is not being written; raises OSError if it cannot be opened."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -144,7 +144,7 @@ class LeaseTimeout(Exception):
 
 
 def lease_folder() -> Path:
-    """This user's lease folder, into which no other user can write; raises OSError where one can.
+    """This user's lease folder, into which no other user can write; raises OSError if one can.
 
     It is the one that the machine's operator named for its rigs, else the one in ``DODO_LEASES``.
     """
@@ -174,7 +174,7 @@ class Lease:
         os.close(self.descriptor)
 
     def leave(self) -> None:
-        """Gives up this process's hold and leaves record and lock to those who inherited it."""
+        """Gives up this process's hold and leaves record and lock to those that inherited it."""
         os.close(self.descriptor)
 
 
@@ -237,7 +237,7 @@ def _write_new(record: Path, text: str) -> None:
 
 
 def holder(name: str) -> str:
-    """Who holds a lease, for a message; its record may be another user's."""
+    """The holder of a lease, for a message; its record may be another user's."""
     for record in sorted(lease_folder().glob(f"{name}.*.json")):
         with contextlib.suppress(OSError, *_NO_RECORD):
             about = json.loads(regular_file.text(record))
@@ -264,7 +264,7 @@ async def lease_any(
     patience_s: float = DEFAULT_PATIENCE_S,
     attempt: Callable[[str, dict[str, Any], bool], Lease | None] = try_lease,
 ) -> Lease:
-    """The first of the leases that is free, in turn: nobody gets one before those who came earlier.
+    """The first of the leases that is free, in turn: nobody gets one before those that came earlier.
 
     ``attempt`` takes one. ``waiting`` is called with a sentence whenever fewer are ahead. Raises LeaseTimeout when the
     queue has not moved for ``patience_s``. Times are of the event loop's clock, in s.
@@ -272,7 +272,7 @@ async def lease_any(
     place, since = lease_folder(), arrival_time()
 
     def may_take(name: str) -> bool:
-        """Who is about to take all leases of a rig holds up nobody here, who may hold what that one still needs."""
+        """A process about to take all leases of a rig holds up nobody here: others may hold what it still needs."""
         return all(one.turn for one in ahead_in_line(place, (name,), since, shared=shared))
 
     def take() -> Lease | None:

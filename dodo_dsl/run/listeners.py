@@ -18,7 +18,7 @@ _BUSES, _HEX_DIGITS = bytes((225, 0, 0)), 8
 def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | None:
     """The services that have a socket at the bus's port; ``services`` are pids and names.
 
-    The CID does not count: on a wrong one they hear nothing, however long somebody waits. None where the kernel shows
+    The CID does not count: on a wrong one they hear nothing, however long somebody waits. None if the kernel shows
     the sockets of no process of a service.
     """
     found, seen, hidden = set(), set(), set()
@@ -35,7 +35,7 @@ def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | Non
 
 
 def members(cid: int, process: Path = _PROC / "self") -> int | None:
-    """How many sockets have joined a bus in the network of a process; None where the kernel does not say."""
+    """How many sockets have joined a bus in the network of a process; None if the kernel does not say."""
     wanted = f"{int.from_bytes(socket.inet_aton(group(cid)[0]), sys.byteorder):08X}"
     try:
         rows = [line.split() for line in (process / "net" / "igmp").read_text().splitlines()]

@@ -121,7 +121,7 @@ class ApplicationCompose(Compose):
 def covers(shown: Iterable[Path]) -> list[dict[str, Any]]:
     """Empty folders over those that processes of DoDo mount in the test's ``/tmp`` and shared memory, as mounts.
 
-    The kernel removes and renames no folder on which something is mounted in the namespace of who tries it, at whatever
+    The kernel removes and renames no folder on which something is mounted in the namespace of the caller, at any
     path. So each service of the application needs them, as one without ``/tmp`` may reach another's; at a path that no
     image knows, so that no symbolic link of an image leads them elsewhere.
     """
@@ -140,7 +140,7 @@ _OWN_MEMORY = "a folder below /dev/shm: remove that mount, or keep the repositor
 
 
 def uncovered(attributes: Mapping[str, Any]) -> str:
-    """What a container mounts in the place of shared memory, so that covers are none there; empty where they are."""
+    """What a container mounts in the place of shared memory, so that covers are none there; empty if they are."""
     folders = {mount["Destination"] for mount in attributes.get("Mounts") or ()}
     folders |= set(attributes["HostConfig"].get("Tmpfs") or ())
     memory = namespaces.SHARED[1]
@@ -167,11 +167,11 @@ class ApplicationContainers(DockerBackend):
     process = 0
 
     async def _connect(self) -> None:
-        """Does nothing: the processes beside them do."""
+        """Does nothing: the processes do."""
 
     @property
     def events(self) -> asyncio.Queue[Event]:
-        """What has happened, for a backend beside this one to add to."""
+        """What has happened, for another backend to add to."""
         return self._events
 
     async def open(self) -> None:
@@ -239,7 +239,7 @@ class MixedBackend:
         await self._processes.begin()
 
     async def load(self) -> Snapshot | None:
-        """What both have used; None where one of them cannot tell."""
+        """What both have used; None if one of them does not know."""
         own, application = await asyncio.gather(self._processes.load(), self._containers.load())
         if own is None or application is None:
             return None

@@ -44,7 +44,7 @@ class Finding:
 
 @dataclass
 class Facts:
-    """What the engine saw: findings of its own, and the verdicts of each evaluator."""
+    """What the engine saw: its own findings, and the verdicts of each evaluator."""
 
     evaluators: tuple[str, ...]
     findings: list[Finding] = field(default_factory=list)
@@ -176,7 +176,7 @@ def lost_messages(service: PlannedService, messages: int) -> str:
     elif service.judge:
         meaning = "its verdict does not consider them"
     count = f"{messages} message{'s' * (messages != 1)}"
-    return f"service '{service.name}' lost {count}, as its receive buffer was full: {meaning}"
+    return f"service '{service.name}' lost {count}, because its receive buffer was full: {meaning}"
 
 
 def deaf(services: Sequence[str], patience_s: float) -> str:

@@ -84,7 +84,7 @@ def _float(type_: str, text: bytes) -> float:
 
 
 class Printed(NamedTuple):
-    """A message that a line makes; ``sample_time`` in us is None where the line has none."""
+    """A message that a line makes; ``sample_time`` in us is None if the line has none."""
 
     message: Any
     sender: int
@@ -103,7 +103,7 @@ class LinePattern:
         self._groups = [(name, number, types.get(name, "uint64")) for name, number in groups.items()]
 
     def printed(self, line: bytes) -> Printed | None:
-        """The message of a line, None where the pattern is not in it; raises NoValue."""
+        """The message of a line, None if the pattern is not in it; raises NoValue."""
         match = self._regexp.search(line)
         if match is None:
             return None
@@ -119,7 +119,7 @@ class LinePattern:
         if SAMPLE_TIME in values:
             sampled = values.pop(SAMPLE_TIME)
             if sampled >= _END_OF_TIME:
-                raise NoValue(f"{SAMPLE_TIME} '{sampled}' is no time in microseconds")
+                raise NoValue(f"{SAMPLE_TIME} '{sampled}' is not a time in microseconds")
         return Printed(self._type(**values), self.line.sender, sampled)
 
 
@@ -144,7 +144,7 @@ class ServiceLines:
                 key = f"{pattern.line.message} {str(error).partition(' ')[0]}"
                 if key not in self.said:
                     self.said.add(key)
-                    note(f"a line of '{self.service}' is no {pattern.line.message}: {error}: '{_shown(line)}'")
+                    note(f"a line of '{self.service}' is not a valid {pattern.line.message}: {error}: '{_shown(line)}'")
                 continue
             if printed is not None:
                 found.append(printed)
@@ -178,7 +178,7 @@ class ServiceLines:
 class PrintedLines:
     """The lines of a test's application; ``note`` is called with a sentence about one that makes no message.
 
-    Before the application starts, ``connect`` tells who sends.
+    Before the application starts, ``connect`` sets the sender.
     """
 
     def __init__(self, plan: Plan, folder: Path, note: Callable[[str], None]) -> None:

@@ -12,7 +12,7 @@ from dodo_dsl.run.machine_load.snapshot import Snapshot
 
 @dataclass(frozen=True)
 class Ready:
-    """A service is ready; ``address`` is where it hears what the bus must not carry, None where it did not say."""
+    """A service is ready; ``address`` is where it hears what the bus must not carry, None if it did not say."""
 
     service: str
     address: Address | None = None
@@ -62,7 +62,7 @@ class Exited:
 
 @dataclass(frozen=True)
 class Overrun:
-    """A service has lost ``messages`` of the bus up to now, as its receive buffer was full."""
+    """A service has lost ``messages`` of the bus up to now, because its receive buffer was full."""
 
     service: str
     messages: int
@@ -111,7 +111,7 @@ class MemoryTaken:
 
 @dataclass(frozen=True)
 class Noted:
-    """A note on the test beside its outcome."""
+    """A note on the test besides its outcome."""
 
     text: str
 
@@ -168,7 +168,7 @@ class Stopped:
 
 @dataclass(frozen=True)
 class Unmatched:
-    """What a service printed since a line of its own matched the last time, in words; ``never`` if none did."""
+    """What a service printed since one of its lines last matched, in words; ``never`` if none did."""
 
     service: str
     words: str
@@ -219,7 +219,7 @@ class Backend(Protocol):
     async def next_event(self) -> Event: ...
 
     async def listeners(self) -> Collection[str] | None:
-        """The services of the application that listen on an OpenDLV bus already; None where that cannot be seen."""
+        """The services of the application that listen on an OpenDLV bus already; None if that cannot be seen."""
         ...
 
     async def begin(self) -> None:
@@ -227,15 +227,15 @@ class Backend(Protocol):
         ...
 
     async def load(self) -> Snapshot | None:
-        """What the test's services have used so far; None where that cannot be measured."""
+        """What the test's services have used so far; None if that cannot be measured."""
         ...
 
     async def use(self) -> Mapping[str, Used] | None:
-        """What each service of the application used so far; None where that cannot be measured."""
+        """What each service of the application used so far; None if that cannot be measured."""
         ...
 
     async def application(self) -> Collection[int] | None:
-        """Processes of this machine of which the application's are, or descend; None where they are not known."""
+        """Processes of this machine of which the application's are, or descend; None if they are not known."""
         ...
 
     async def close(self, keep: bool) -> list[str]:

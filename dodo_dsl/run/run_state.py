@@ -241,7 +241,7 @@ class RunState:
     def _explained(self, finding: Finding) -> Finding:
         """An error in place of a failure that may be due to what others used up.
 
-        What the application itself may have used up is told in a note, see ``_shortage_notes``.
+        What the application itself may have used up is in a note, see ``_shortage_notes``.
         """
         shortage = self.shortage
         if shortage.is_of_others and self._is_of_conditions(finding):
@@ -278,7 +278,7 @@ class RunState:
         return next((s.name for s in self.plan.application.services), "")
 
     def keep_tails(self, backend: Backend) -> None:
-        """The test is decided: what services write from now on, as they are ended, explains nothing."""
+        """The test is decided: what services write from now on, because they are being ended, explains nothing."""
         names = {*self.layer_of, *self.facts.evaluators, *(finding.service for finding in self.facts.findings)}
         self._tails = {name: tuple(backend.tail(name)) for name in names}
         self._unmatched = backend.unmatched()
@@ -286,13 +286,16 @@ class RunState:
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
-        answers = judgement.judged_response(self.response, plan.lockstep, [s.name for s in plan.application.services])
+        timed = () if plan.clock == VIRTUAL else plan.timed
+        answers = judgement.judged_response(
+            self.response, plan.lockstep, [s.name for s in plan.application.services], timed
+        )
         use = judgement.judged_use(self.resources, plan.resources)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
         base = tuple(against_baseline(judged, plan.baseline))
         findings = (*answers.findings, *use.findings, *worse(base))
-        considered = consider(decide(self.facts, findings), self._load())
+        considered = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
         found = self._explained(self._elsewhere(self._timed(considered.finding)))
         finding = self._without_display(self._with_told(self._with_printed(found)))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
@@ -329,7 +332,7 @@ class RunState:
         return () if self.is_unanswered or finding.result == "error" else tuple(never)
 
     def _with_told(self, finding: Finding) -> Finding:
-        """A verdict on an application that is told what none is on a road says so."""
+        """A verdict on an application that hears what none hears on a road says so."""
         words = told_in_words(self.plan.told)
         if not words or finding.result == "error":
             return finding
@@ -373,8 +376,8 @@ def pictured_by(plan: Plan) -> list[str]:
 class Standing:
     """The ``seconds`` of its own time that a test has reached, and the check nearest to its limit, in words.
 
-    In real time its time goes on by itself, and this is that of its begin, 0. Checks are known when their evaluator has
-    judged, so that ``nearest`` is empty where there is only one.
+    In real time its time goes on by itself, and this is that of its start, 0. Checks are known when their evaluator has
+    judged, so that ``nearest`` is empty if there is only one.
     """
 
     seconds: float

@@ -1,4 +1,4 @@
-"""Runs several tests at once, each on a backend of its own, and leaves a clean machine whatever happens."""
+"""Runs several tests at once, each on its own backend, and leaves a clean machine whatever happens."""
 
 import asyncio
 import contextlib
@@ -147,7 +147,7 @@ class Runner:
         if is_undecided(outcome) and not self.interrupted and not self.keep:
             self._began.pop(job.plan.slug)
             self._undecided[job.plan.slug] = (job, outcome)
-            self.progress.phase(job.plan.slug, "waiting to be tried again alone, as the machine was too busy")
+            self.progress.phase(job.plan.slug, "waiting for another attempt alone, because the machine was too busy")
             return outcome
         return self._finish(job, outcome)
 
@@ -159,7 +159,7 @@ class Runner:
         self._began[job.plan.slug] = (job, _now())
         if problem := self._attempts.set_aside(job):
             return self._finish(job, replace(first, notes=(*first.notes, f"not tried again alone, {problem}")))
-        note = f"tried again alone, as the machine was too busy: {first.reason}"
+        note = f"tried again alone, because the machine was too busy: {first.reason}"
         try:
             self.progress.phase(job.plan.slug, "trying again alone")
             outcome = await self._attempts.outcome(job, alone=True)

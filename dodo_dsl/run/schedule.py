@@ -26,7 +26,7 @@ _RIG = 2.0
 def cores_needed(plan: Plan, used: float | None = None) -> float:
     """The cores that keep a test in real time; one in lockstep, which runs at full speed.
 
-    They are what earlier runs of it ``used`` with a margin, as it needs them in bursts, else by the size of its
+    They are what earlier runs of it ``used`` with a margin, because it needs them in bursts, else by the size of its
     pictures. A rig gets more: an emulated one that is late spoils its test.
     """
     if plan.rig:

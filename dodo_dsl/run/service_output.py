@@ -1,6 +1,6 @@
 """A service's output: raw into its log with times, the last lines in memory, lines of the protocol to a callback.
 
-What an evaluator recorded goes into a file of its own beside the log.
+What an evaluator recorded goes into its own file next to the log.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ class ServiceOutput:
     ) -> None:
         """With ``terminal`` it is that of a terminal, to which programs write each line at once; raises OSError.
 
-        ``is_cooked`` tells that another terminal has put a carriage return to the end of each line.
+        ``is_cooked`` means that another terminal has put a carriage return to the end of each line.
         """
         self._log, self._record_file = atomic.appended(log), log.with_suffix(JUDGED_SUFFIX)
         self._times, self._begin = LogTimes(log), os.fstat(self._log.fileno()).st_size
@@ -57,7 +57,7 @@ class ServiceOutput:
 
     @property
     def unfinished(self) -> bytes:
-        """The begin of a line whose end has not come."""
+        """The start of a line whose end has not come."""
         return self._rest
 
     def tail(self) -> list[str]:

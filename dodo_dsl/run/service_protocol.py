@@ -35,6 +35,8 @@ _MAX_TEXT = 2000
 _CHECK_KEYS = {"name", "value", "limit", "unit", "ok"}
 _OPTIONAL_CHECK_KEYS = {"exclusive"}
 _ADDRESS = re.compile(r"(?P<host>[0-9]{1,3}(\.[0-9]{1,3}){3}):(?P<port>[0-9]{1,5})", re.ASCII)
+_UNASKED = ("surplus", "surplus_frames", "differing", "pauses", "unasked")
+"""Counts of what no frame asked for."""
 _EVIDENCE_KEY = re.compile(r"[a-z][a-z0-9-]{0,39}")
 _MOST_EVIDENCE, _MAX_EVIDENCE_TEXT = 20, 200
 
@@ -74,7 +76,7 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
 
 
 def _address(text: object) -> Address | None:
-    """An IPv4 address with a port, None where it is none."""
+    """An IPv4 address with a port, None if it is none."""
     found = _ADDRESS.fullmatch(text) if isinstance(text, str) else None
     return (found["host"], int(found["port"])) if found and 0 < int(found["port"]) < 1 << 16 else None
 
@@ -91,7 +93,7 @@ def _told(service: str, message: dict[str, Any]) -> Event | None:
 
 
 def _flood(service: str, message: dict[str, Any]) -> Flooded | None:
-    """Who fills the recording, where the values can be."""
+    """The service that fills the recording, where the values can be."""
     what, name, sender, share = (message.get(key) for key in ("what", "message", "sender", "share"))
     if not (_is_text(what) and _is_text(name) and type(sender) is int and _is_number(share)):
         return None
@@ -126,10 +128,12 @@ def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
 def _response(message: dict[str, Any]) -> Responded | None:
     """How long the application took, where all of the numbers can be."""
     facts: dict[str, Any] = {field.name: message.get(field.name) for field in dataclasses.fields(Response)}
-    facts |= {name: message.get(name, 0) for name in ("uncopied", "worst_frame")}
+    facts |= {name: message.get(name, 0) for name in ("uncopied", "worst_frame", *_UNASKED)}
     counts = [facts["answers"], facts["slow"], facts["over"] or 0, facts["uncopied"]]
     times = [value for name, value in facts.items() if name.endswith("_s")]
     if not all(type(count) is int and 0 <= count <= counts[0] for count in counts) or counts[0] == 0:
+        return None
+    if not all(type(facts[name]) is int and 0 <= facts[name] < 1 << 63 for name in _UNASKED):
         return None
     if type(facts["worst_frame"]) is not int or not 0 <= facts["worst_frame"] <= counts[0] + 1:
         return None

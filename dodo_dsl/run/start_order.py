@@ -16,7 +16,7 @@ _UNHEALTHY = "is unhealthy"
 class Conditions:
     """What became of an application's services, for those that wait for it; belongs to one event loop.
 
-    ``has_health`` tells that there are health checks; without, a service that has started counts as healthy.
+    ``has_health`` means that there are health checks; without, a service that has started counts as healthy.
     """
 
     def __init__(self, services: Iterable[ApplicationService], has_health: bool = True) -> None:
@@ -97,7 +97,7 @@ class Conditions:
         return "its healthcheck failed" if why == _UNHEALTHY else ""
 
     def _fact(self, name: str, condition: str) -> "asyncio.Future[str]":
-        """Resolves to why the condition will not come true, empty when it has; not to be cancelled by one who waits."""
+        """Resolves to why the condition will not come true, empty when it has; not to be cancelled by waiters."""
         return asyncio.shield(self._future(name, condition))
 
     def _future(self, name: str, condition: str) -> "asyncio.Future[str]":
@@ -113,7 +113,7 @@ class Conditions:
 
 
 def in_turn(start: Coroutine[Any, Any, None], failed: Callable[[str], None]) -> "asyncio.Task[None]":
-    """Starts a service in a task of its own; ``failed`` gets what its exception says, as nobody awaits the task."""
+    """Starts a service in its own task; ``failed`` gets what its exception says, because nobody awaits the task."""
 
     def ended(task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (error := task.exception()) is not None:
@@ -125,7 +125,7 @@ def in_turn(start: Coroutine[Any, Any, None], failed: Callable[[str], None]) -> 
 
 
 def waits(services: Iterable[ApplicationService], name: str) -> str:
-    """Who waits for a service and for what, as half a sentence; empty where nobody does."""
+    """The services that wait for a service and for what, as half a sentence; empty where nobody does."""
     found = ((s.name, s.after[name]) for s in services if name in s.after)
     told = [f"'{other}' waits for it to {_ASKED[condition]}" for other, condition in found if condition != STARTED]
     return told[0] if told else ""
@@ -137,7 +137,7 @@ def one_off(services: Iterable[ApplicationService]) -> set[str]:
 
 
 def may_end(services: Iterable[ApplicationService], name: str, code: int) -> bool:
-    """Whether the end of a service is no failure of the application."""
+    """Whether the end of a service is not a failure of the application."""
     services = tuple(services)
     return name in one_off(services) and (code == 0 or name in optional(services))
 

@@ -37,7 +37,7 @@ class NoTestRecording(RecordingError):
 class TestRecording:
     """A recording of a test: its clock, and the test time in s that it lasts.
 
-    ``fault`` says why nothing can be judged by it, empty where it is as recorders write it.
+    ``fault`` says why nothing can be judged by it, empty if it is as recorders write it.
     """
 
     __test__ = False
@@ -68,7 +68,7 @@ def inspect(path: Path) -> TestRecording:
             return TestRecording(path, "lockstep", _seconds(max(times) - start), fault)
         if not begin.received:
             raise NoTestRecording(
-                f"{path}: has no {STEP} ({messages.id(STEP)}), which tells the steps of a test in lockstep apart; it "
+                f"{path}: has no {STEP} ({messages.id(STEP)}), which separates the steps of a test in lockstep; it "
                 "was made by an earlier version of DoDo, so run the test again"
             )
         last = end.sample_time if end else recording.envelope(len(recording) - 1).received
@@ -93,7 +93,7 @@ class Marks:
         return cls(recording, steps, (id_, messages.id(END), messages.id(BEGIN)))
 
     def fault(self, begins: Numbers) -> str:
-        """Steps that do not follow each other, and marks or a begin that lie elsewhere."""
+        """Steps that do not follow each other, and marks or a start that lie elsewhere."""
         for (_, number, time), (row, next_number, next_time) in pairwise(self.steps):
             where = recording_times.place(self.recording, row)
             if next_number < number or (next_number == number) != (next_time == time) or next_time < time:
@@ -113,7 +113,7 @@ class Marks:
 
 
 def _damage(recording: Recording) -> str:
-    """What is no message, but at the end of a file: the run was killed there."""
+    """What is not a message, but at the end of a file: the run was killed there."""
     places = [place for place in recording.damage.places if place.offset + place.size < recording.size]
     return f"{recording.damage}" if places else ""
 
@@ -121,7 +121,7 @@ def _damage(recording: Recording) -> str:
 def _own_fault(recording: Recording, marks: Marks) -> str:
     """What is wrong with messages of the test's services, which have no time of receipt; others may send anything.
 
-    A player may begin its recording anew, and then goes back to the times in it: steps alone give the order.
+    A player may begin its recording again, and then goes back to the times in it: steps alone give the order.
     """
     received = _received(recording)
     own = np.flatnonzero((received == 0) & ~np.isin(recording.index["data_type"], list(marks.ids)))
@@ -184,7 +184,7 @@ _LEAST_MESSAGES = 10
 
 
 def long_pause(plan: Plan, folder: Path, recording: Path) -> str:
-    """A sentence on the longest pause of a message that a service declares; empty where none is long.
+    """A sentence on the longest pause of a message that a service declares; empty if none is long.
 
     Long is more than ten periods of the frames, or of the message where that comes less often. ``folder`` is the
     compiled test's. Raises OSError and OdvdError.
@@ -226,7 +226,7 @@ def _came(recording: Path) -> Numbers:
 
 
 def _period_s(plan: Plan) -> float:
-    """The longest period of the test's cameras; 0 where none tells its own, as a recording that is played."""
+    """The longest period of the test's cameras; 0 if none has its own, as a recording that is played."""
     cameras = pictured_by(plan)
     rates = [float(f.value) for s in plan.services if s.name in cameras for f in s.flags if f.name == "freq"]
     return 1 / min(rates) if rates and min(rates) > 0 else 0.0
@@ -239,7 +239,7 @@ Came = set[tuple[int, int]]
 def silent_consumer(plan: Plan, folder: Path, recording: Path) -> str:
     """The first program that got messages and sent none, in half a sentence, or empty; ``folder`` is the test's.
 
-    Raises OSError, also for what is no recording, and OdvdError.
+    Raises OSError, also for what is not a recording, and OdvdError.
     """
     messages = MessageSet.load(*(folder / FILES / path for path in plan.messages))
     with Recording(recording) as recorded:

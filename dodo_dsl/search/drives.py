@@ -294,7 +294,7 @@ class Drives:
 
 
 def _way(outcome: Outcome) -> float:
-    """What a rig drove at most in a test and to its start, in m; by the time where no check says it."""
+    """What a rig drove at most in a test and to its start, in m; by the time if no check says it."""
     said = [check["value"] for check in outcome.checks if (check["name"], check["unit"]) == _DISTANCE]
     driven = [float(value) for value in said if value is not None]
     return _TO_START + (max(driven) if driven else _FASTEST * (outcome.execution_s or 0.0))

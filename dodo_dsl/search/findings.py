@@ -58,7 +58,7 @@ class Findings:
 
     ``proposed`` are the judged drives of the optimiser, which looks for failures, so that they count in no rate.
     ``errors`` are drives without an answer, which are left out, and ``left_out`` has their reasons. ``worst`` is None
-    where no drive was judged.
+    if no drive was judged.
     """
 
     test: str

@@ -51,7 +51,7 @@ _HAS_LATER = (
 
 
 def masked(text: str) -> str:
-    """The text with ``***`` for each password of an address in it, also where it is written with wrong characters."""
+    """The text with ``***`` for each password of an address in it, also if it is written with wrong characters."""
     return _PARAMETER.sub(r"\1***", _PASSWORD.sub(r"\1:***@", text))
 
 
@@ -66,7 +66,7 @@ class AddressProblem(Exception):
 
 
 class SharedStore:
-    """The drives of the study ``name`` of a test. Raises OtherSearch where its ``key`` is another one."""
+    """The drives of the study ``name`` of a test. Raises OtherSearch if its ``key`` is another one."""
 
     is_shared = True
 
@@ -85,7 +85,7 @@ class SharedStore:
             raise
 
     def _set_up(self, name: str, test: str, key: str) -> int:
-        """The number of the study, which is made where it is new."""
+        """The number of the study, which is made if it is new."""
         with self._connection.transaction():
             self._ask("select pg_advisory_xact_lock(%s)", _SETUP)
             if self._one("select to_regclass('dodo_study')") is None:

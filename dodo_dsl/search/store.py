@@ -30,7 +30,7 @@ class OtherSearch(Exception):
 class Drive:
     """What became of a test at some values; ``number`` counts drives in the order in which they were asked for.
 
-    ``margin`` is the least of its checks, from -1 to 1, negative where it failed; None for an error. ``checks`` are the
+    ``margin`` is the least of its checks, from -1 to 1, negative if it failed; None for an error. ``checks`` are the
     names of those that failed, with commas.
     """
 

@@ -66,7 +66,7 @@ def refuse_search(word: str, tests: Sequence[ResolvedTest]) -> None:
 def tune_study(checked: Checked, made: Compilation, work: Path, samples: int) -> Study:
     """The study of an application's parameters in some tests, at ``samples`` of their ranges.
 
-    Raises NotSearchable where the application or a test cannot be tuned.
+    Raises NotSearchable if the application or a test cannot be tuned.
     """
     space = Space(tunables(checked.application) if checked.application else ())
     _refuse_tuning(space, checked.specs, samples)

@@ -111,7 +111,7 @@ DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 @dataclass(frozen=True)
 class Declarations:
-    """What ``dodo.yml`` says of an application beside its compose ``files``, at its place there.
+    """What ``dodo.yml`` states about an application in addition to its compose ``files``, at its position there.
 
     ``without`` names services that no test starts. ``services`` have the keys of ``x-dodo``, and ``process``, by name.
     ``own`` are the keys of ``x-dodo`` of the whole application.
@@ -168,7 +168,7 @@ class Deployment:
 
 
 def build_command(prefix: str, tag: str, *names: str) -> str:
-    """What builds images of DoDo's with this prefix and tag, also where ``dodo.yml`` shows nothing about them."""
+    """What builds images of DoDo's with this prefix and tag, also if ``dodo.yml`` does not name them."""
     flags = [*(["--prefix", prefix] if prefix != Deployment.image_prefix else [])]
     flags += ["--tag", tag] if tag != Deployment.image_tag else []
     return shlex.join(["dodo", "images", "build", *names, *flags])

@@ -83,7 +83,7 @@ def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -
 
 
 def _near(written: str, path: Path, file: Path, root: Path) -> str:
-    """A hint for a path that does not exist: a file beside it, or the test of its name in a folder beside the own."""
+    """A hint for a path that does not exist: a file next to it, or the test of its name in a folder next to it."""
     if written.startswith(SHIPPED):
         return "'dodo new NAME --extends TEST' copies a test that ships with DoDo"
     beside = [p.name for p in path.parent.iterdir() if p != file] if path.parent.is_dir() else []

@@ -47,7 +47,7 @@ class PermittedRig:
 
 @dataclass(frozen=True)
 class Machine:
-    """The operator's file; a place is None if it names none."""
+    """The operator's file; a path is None if it names none."""
 
     rigs: tuple[PermittedRig, ...] = ()
     leases: Path | None = None
@@ -84,7 +84,7 @@ def _read(path: Path, _changed: int) -> Machine:
 
 
 def _first(problems: Sequence[Diagnostic], path: Path) -> tuple[str, str]:
-    """The first problem of a file in its order, with its hint, and its place."""
+    """The first problem of a file in its order, with its hint, and its position."""
     if not problems:
         return "is empty, expected 'dodo: 1'", str(path)
     first = min(problems, key=lambda d: (d.span.line, d.span.column))

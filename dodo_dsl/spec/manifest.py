@@ -69,7 +69,7 @@ def _conditions(node: Node | None, types: dict[str, str]) -> Iterator[Diagnostic
 
 
 def name_inconsistencies(name: str, path: Path) -> Iterator[Diagnostic]:
-    """A warning where the service of a manifest has another name than its folder; ``my-name`` may be in ``my_name``."""
+    """A warning if the service of a manifest has another name than its folder; ``my-name`` may be in ``my_name``."""
     folder = path.parent.name
     if folder.replace("_", "-") != name.replace("_", "-"):
         message = f"the service is named '{name}', and its folder '{folder}'"
@@ -184,9 +184,9 @@ class Parameter:
     and so are ``words``; ``within_timeout`` marks a duration that must be shorter than the test's timeout; one with
     ``setup_times`` may pass that many times before the service is ready; ``not_empty`` names lists of a JSON file that
     must not be empty; ``format`` shows what is in the file that a path names, which is checked as the service reads it;
-    an amount with ``or_share`` may be ``25 %``. Items of a list are strings, or numbers where ``of`` says so; it has as
-    many of them as the list that ``per`` names, or one. It has an effect only ``when`` others are so. The messages that
-    drive the vehicle take the place of the default of one that is ``driving``.
+    an amount with ``or_share`` may be ``25 %``. Items of a list are strings, or numbers if ``of`` asks for them; it
+    has as many of them as the list that ``per`` names, or one. It has an effect only ``when`` others are so. The
+    messages that drive the vehicle take the place of the default of one that is ``driving``.
     """
 
     name: str

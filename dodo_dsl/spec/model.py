@@ -94,7 +94,7 @@ LEVEL_WORDS = {
 LEVELS = tuple(LEVEL_WORDS)
 KINDS = ("perception", "open-loop", "closed-loop")
 FRAMES = (ALWAYS, ON_FAILURE, NEVER) = ("always", "on-failure", "never")
-"""When the pictures of a test's cameras are kept."""
+"""When the frames of a test's cameras are kept."""
 _MAPPINGS = (
     *LAYERS,
     matrix.KEY,
@@ -226,7 +226,7 @@ def _part(node: Node | None, key: str) -> Node | None:
 
 
 def _frames(node: Node | None) -> tuple[str, float | None, list[Diagnostic]]:
-    """When pictures are kept, their rate in Hz, and problems; a rate in place of the word means always."""
+    """When frames are kept, their rate in Hz, and problems; a rate in place of the word means always."""
     frames = _part(node, "frames")
     written = frames.value if isinstance(frames, Scalar) else ON_FAILURE
     word = written if isinstance(written, str) and written in FRAMES else ALWAYS

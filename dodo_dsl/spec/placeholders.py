@@ -33,7 +33,7 @@ class Placeholders:
     """Those of one ``key`` of specs.
 
     ``lacks`` is the message about a name that the key does not have, with ``{}`` for the name, and ``advice`` the hint
-    if it has no names at all. With ``points_at_value`` a value that replaces a whole scalar keeps its own place, so
+    if it has no names at all. With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so
     that problems are shown there and not at the placeholder.
     """
 

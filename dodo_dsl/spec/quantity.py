@@ -112,7 +112,7 @@ def convert(value: object, unit: str) -> Decimal:
 def in_base_unit(text: str) -> Decimal:
     """A bare number, or a quantity in the base unit of its dimension: ``3 deg`` in rad. Raises QuantityError.
 
-    For what carries no unit that is known here, such as the field of any message; a share is no such quantity.
+    For what carries no unit that is known here, such as the field of any message; a share is not such a quantity.
     """
     unit = written_unit(text)
     dimension = _DIMENSION[unit or SHARE]

@@ -96,7 +96,7 @@ def is_valid(document: object, schema: str) -> bool:
     """Whether a document certainly fits ``schemas/<schema>.schema.json``; not so for one that JSON cannot express.
 
     For JSON Schema 1.0 is a whole number, and for compose: with fractions in place of such numbers, those at a wrong
-    place show.
+    position show.
     """
     try:
         validator = _validator(schema)

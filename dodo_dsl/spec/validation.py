@@ -149,7 +149,7 @@ class _Place:
         self.fits: Callable[[object], bool] = lambda _: True
         """Whether another value would comply with what is wrong here."""
         self.extended: dict[str, Entry] = {}
-        """What stands beside it in a file that its own extends."""
+        """What is next to it in a file that its own extends."""
 
     @property
     def entries(self) -> dict[str, Entry]:
@@ -198,7 +198,7 @@ def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
                 hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
             yield Diagnostic(place.key(name), "unknown-key", message, hint, fix=fix)
         elif name == next(key for key in beside if beside[key] == beside[name]):
-            message = f"{_shown(name)} stands beside '{beside[name]}', which is empty"
+            message = f"{_shown(name)} is next to '{beside[name]}', which is empty"
             hint = f"indent what belongs to '{beside[name]}'"
             yield Diagnostic(place.key(name), "unknown-key", message, hint)
 

@@ -45,7 +45,7 @@ REQUESTS = ("opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionR
 
 
 class Point(NamedTuple):
-    """A place on the ground, seen from below the camera: `ahead` and `left` in m."""
+    """A position on the ground, seen from below the camera: `ahead` and `left` in m."""
 
     ahead: float
     left: float

@@ -1,4 +1,4 @@
-"""Drive by what train.py has learned: one GroundSteeringRequest and one PedalPositionRequest for each picture.
+"""Drive by what train.py has learned: one GroundSteeringRequest and one PedalPositionRequest for each frame.
 
 python driver.py --cid=111 --name=video0.argb --width=640 --height=480 --model=model.npz
 """
@@ -23,7 +23,7 @@ PATIENCE = 0.02  # seconds between looks for the camera
 
 
 def drive(memory: SharedMemory, session: Session, weights: NDArray[np.float64], shape: tuple[int, int]) -> None:
-    """Answers each picture; raises SharedMemoryError when the camera is gone."""
+    """Answers each frame; raises SharedMemoryError when the camera is gone."""
     steer = session.messages.type("opendlv.proxy.GroundSteeringRequest")
     press = session.messages.type("opendlv.proxy.PedalPositionRequest")
     pixels = np.frombuffer(memory.buffer, np.uint8).reshape(*shape, 4)

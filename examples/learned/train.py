@@ -1,4 +1,4 @@
-"""Learn to steer from pairs of pictures and steering: a linear function of what view.py sees (ridge regression).
+"""Learn to steer from pairs of frames and steering: a linear function of what view.py sees (ridge regression).
 
 dodo rec export dodo-report/*/test.rec --steering -o pairs --validation 20%
 python train.py pairs model.npz
@@ -45,7 +45,7 @@ def error(views: Numbers, angles: Numbers, weights: Numbers) -> float:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="Learn to steer from pictures.")
+    parser = argparse.ArgumentParser(description="Learn to steer from frames.")
     parser.add_argument("pairs", type=Path, help="folder of dodo rec export --steering --validation")
     parser.add_argument("model", type=Path, help="file to be written, such as model.npz")
     flags = parser.parse_args()

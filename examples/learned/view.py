@@ -1,4 +1,4 @@
-"""What the learned driver sees of a picture: where yellow and blue are, coarsely."""
+"""What the learned driver sees of a frame: where yellow and blue are, coarsely."""
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ SEEN = 0.05  # share of a cell that a colour takes, beyond which more of it chan
 
 
 def view(picture: MatLike) -> NDArray[np.float64]:
-    """The picture (blue, green, red, perhaps alpha) as 2 x ROWS x COLUMNS numbers from 0 to 1, and a 1.
+    """The frame (blue, green, red, perhaps alpha) as 2 x ROWS x COLUMNS numbers from 0 to 1, and a 1.
 
     A cell of the lower half has how yellow it is, and how blue.
     """

@@ -2,7 +2,7 @@
 
     python driver.py --cid=111 --name=video0.argb --width=320 --height=240
 
-Answers each picture by two requests with its sample time. `--swap` gives each wheel the other one's pedal, for those
+Answers each frame by two requests with its sample time. `--swap` gives each wheel the other one's pedal, for those
 who want to see a test fail.
 """
 
@@ -19,14 +19,14 @@ from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
 WHITE = 200
-ROWS = (0.62, 0.75)  # of the picture's height, in which it looks for the lines
+ROWS = (0.62, 0.75)  # of the frame's height, in which it looks for the lines
 PEDAL = 0.5
-GAIN = 0.4  # of pedal, where the lane's middle is at the picture's edge
+GAIN = 0.4  # of pedal, where the lane's middle is at the frame's edge
 PATIENCE = 0.02  # seconds between looks for the camera
 
 
 def middle(picture: NDArray[np.uint8]) -> float:
-    """Where the middle between the lines is: 1 at the left edge of the picture, -1 at the right one."""
+    """Where the middle between the lines is: 1 at the left edge of the frame, -1 at the right one."""
     height, width, _ = picture.shape
     rows = picture[int(ROWS[0] * height) : int(ROWS[1] * height)]
     columns = np.nonzero(rows[..., :3].min(axis=2) > WHITE)[1]
@@ -37,7 +37,7 @@ def middle(picture: NDArray[np.uint8]) -> float:
 
 
 def drive(memory: SharedMemory, session: Session, shape: tuple[int, int], sign: int) -> None:
-    """Answers each picture; raises SharedMemoryError when the camera is gone."""
+    """Answers each frame; raises SharedMemoryError when the camera is gone."""
     press = session.messages.type("opendlv.proxy.PedalPositionRequest")
     pixels = np.frombuffer(memory.buffer, np.uint8).reshape(*shape, 4)
     while True:

@@ -1,6 +1,6 @@
 """A service's link to the clock: steps that come once, and answers that are repeated on demand.
 
-It is a socket beside the bus, between the clock of a lockstep test and one service, which wakes no others. What they
+It is a socket apart from the bus, between the clock of a lockstep test and one service, that wakes no others. What they
 exchange is split into datagrams and reassembled.
 """
 
@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 class ClockChannel:
     """Sends messages in OpenDLV's frames to one address, or to all on the bus, and receives the replies.
 
-    All of them prove that their sender has the key of the test; what does not is no reply.
+    All of them prove that their sender has the key of the test; what does not is not a reply.
     """
 
     def __init__(self, cid: int, messages: MessageSet, key: bytes = b"") -> None:
@@ -64,7 +64,7 @@ class ClockChannel:
         return Envelope(id_, with_proof(self._key, id_, self._messages.encode(message)), now, 0, now, 0)
 
     def believes(self, envelope: Envelope) -> bool:
-        """Whether a message comes from one who has the key."""
+        """Whether a message comes from a sender that has the key."""
         return is_proven(self._key, envelope.data_type, envelope.payload)
 
     def receive(self) -> tuple[Envelope, Address] | None:
@@ -163,7 +163,7 @@ class Step(NamedTuple):
 
 
 class ClockClient:
-    """Receives steps: on the bus at first, and from then on over a channel of its own.
+    """Receives steps: on the bus at first, and from then on over its own channel.
 
     A service that does not observe the bus leaves it then, so that messages for others do not wake it.
     """
@@ -262,7 +262,7 @@ class ClockClient:
             step: Any = self._session.messages.decode(envelope.data_type, envelope.payload)
             if envelope.data_type != self._step_id or step.service != self._name or step.number < self._number:
                 return None
-            self._clock = self._clock or address  # who repeats a step is not the clock
+            self._clock = self._clock or address  # a repeated step is not the clock's
             if step.number == self._number:
                 self._acknowledged = not step.parts
                 if step.parts and not step.part:

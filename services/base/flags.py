@@ -51,7 +51,7 @@ def load_manifest(folder: Path) -> dict[str, Any]:
 
 
 def parameters(manifest: Mapping[str, Any]) -> dict[str, About]:
-    """All flags of a service, the common ones last; a parameter of its own replaces a common one of its name."""
+    """All flags of a service, the common ones last; its own parameter replaces a common one of its name."""
     own: dict[str, About] = manifest.get("parameters") or {}
     return {**own, **{name: about for name, about in COMMON.items() if name not in own}}
 

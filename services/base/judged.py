@@ -1,7 +1,7 @@
-"""What an evaluator judged over time, for the report to draw: values with limits and targets, boxes, and the way.
+"""What an evaluator judged over time, for the report to draw: values with limits and targets, boxes, and the path.
 
 It decides nothing. In a test that DoDo runs it goes to standard output as lines of JSON, each below 64 KiB, before the
-verdict; DoDo keeps them beside the service's log. A service that is started by hand prints none.
+verdict; DoDo keeps them next to the service's log. A service that is started by hand prints none.
 """
 
 import base64
@@ -31,7 +31,7 @@ ScoredArea = tuple[str, float, float, float, float, float]
 
 @dataclass
 class Series:
-    """One quantity over time, in ``unit``; its name is the plot's title. Limits are None where there are none.
+    """One quantity over time, in ``unit``; its name is the plot's title. Limits are None if there are none.
 
     ``low`` and ``high`` are limits of the value, which fails at one only where they are ``exclusive``. ``distance`` is
     the largest one from the target, ``band`` a smaller one beyond which samples only stand out.
@@ -207,7 +207,7 @@ class Judged:
 
 
 def finite(value: float | None) -> float | None:
-    """The number, None where it is none."""
+    """The number, None if it is none."""
     return None if value is None or not math.isfinite(value) else float(value)
 
 

@@ -121,7 +121,7 @@ class Observer:
 
     Messages of services may be on the bus, too, early or late: those from the clock count. Messages of the application
     count as they are on the bus, not as the clock passes them on. ``marked`` adds to a step (its time in us, and all
-    messages that the clock passes on) what tells a recording how it went.
+    messages that the clock passes on) what shows in a recording how it went.
     """
 
     def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:

@@ -23,7 +23,7 @@ from services.base.members import Members, World
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 SHORTEST = 10_000
-"""Microseconds; less is no harm to a test, and usual on any machine."""
+"""Microseconds; less harms no test, and usual on any machine."""
 
 
 class Lateness:
@@ -201,7 +201,7 @@ class Loop:
     def handle(self, envelope: Envelope) -> None:
         """For the clock: let the service handle an envelope; one that cannot be decoded is logged and ignored.
 
-        Who observes gets one that does not count, too, as if it had never been received, as when it is judged again.
+        An observer gets one that does not count, too, as if it had never been received, as when it is judged again.
         """
         counts = self.members is None or self.members.admits(envelope)
         if not self.clock.relays and self.service.observe is not None:
@@ -229,7 +229,7 @@ class Loop:
                 handler(message, envelope.sample_time)
 
     def _tell_strangers(self) -> None:
-        """In the reason of a failed verdict, as they may explain it, else as notes."""
+        """In the reason of a failed verdict, because they may explain it, else as notes."""
         strangers, verdict = self._stamps.strangers(), self.service.verdict
         if strangers and verdict is not None and verdict.outcome == "failed":
             self.service.verdict = replace(verdict, reason=with_strangers(verdict.reason, strangers), silent=False)
@@ -265,6 +265,6 @@ class Loop:
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:
         message, stamp, sampled = output if isinstance(output, Output) else Output(output, self.sender_stamp)
-        messages, sent = self.session.messages, time.time_ns() // 1000
+        messages, sent = self.session.messages, now if self.clock.is_virtual else time.time_ns() // 1000
         sample_time = now if sampled is None else sampled
         return Envelope(messages.id(message), messages.encode(message), sent, 0, sample_time, stamp)

@@ -194,14 +194,14 @@ SENDER = "dodo.Sender"
 _AGAIN_S = 0.1
 _MISSING_S = 0.5
 _UNATTENDED_S = 10.0
-"""After which services count as ready where no runner tells of it."""
+"""After which services count as ready where no runner reports it."""
 
 
 class Members:
-    """Learns the addresses of the test's services, and tells their messages from the application's.
+    """Learns the addresses of the test's services, and separates their messages from the application's.
 
     A service says its address before it is ready, and again when another asks. The application starts when all are
-    ready, so that it comes too late to be taken for one of them, even where there is no key, as without a runner.
+    ready, so that it comes too late to be taken for one of them, even if there is no key, as without a runner.
     """
 
     def __init__(self, session: Session, name: str, table: SenderTable, world: World | None = None) -> None:
@@ -210,7 +210,7 @@ class Members:
         self._overheard: set[int] = set()
         """Messages of the world that had to come to the bus."""
         self._silent_from: float | None = None if table.key else time.monotonic() + _UNATTENDED_S
-        """When services that have not said their address are known to be others than DoDo's; None before the begin."""
+        """When services that have not said their address are known to be others than DoDo's; None before the start."""
         self._id, self._type = session.messages.id(SENDER), session.messages.type(SENDER)
         self._ids = table.ids | {self._id}
         self._addresses: dict[str, Address | None] = {}
@@ -229,7 +229,7 @@ class Members:
         self._say(self._others, leaves=True)
 
     def admits(self, envelope: Envelope) -> bool:
-        """Whether the message that the session received last counts; tells the runner of one that must not be."""
+        """Whether the message that the session received last counts; reports one that must not be to the runner."""
         is_stranger = self._session.was_direct and self._session.source not in self._known
         if envelope.data_type not in self._ids:
             return not is_stranger
@@ -249,7 +249,7 @@ class Members:
     def send(self, envelope: Envelope) -> bytes:
         """Send a message of the world to the test's services alone, and return its frame.
 
-        From the begin of the test on, what a service of the deployment consumes that does not say where it listens
+        From the start of the test on, what a service of the deployment consumes that does not say where it listens
         comes to the bus.
         """
         silent = [name for name in self._world.awaited_by(envelope) if name not in self._addresses]
@@ -322,7 +322,7 @@ class Members:
 
 
 def take_key() -> bytes:
-    """The key that the runner gave this process, empty where there is none; raises ValueError for one that is none.
+    """The key that the runner gave this process, empty if there is none; raises ValueError for one that is none.
 
     Afterwards neither the processes that this one starts find it nor those that read ``/proc/PID/environ``.
     """

@@ -1,7 +1,7 @@
 """A service as a process: flags, log, signals, readiness, and its exit code.
 
 Its log is also sent on the bus, as LogMessages. An error that ends it says what is wrong, where in the service's own
-code, and the way there. Signals also end a service that is being built, which may wait for hardware.
+code, and the call chain. Signals also end a service that is being built, which may wait for hardware.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ _BASE = Path(__file__).resolve().parent
 
 
 def tell_crash(error: Exception, folder: Path, *, expected: bool, verbose: bool) -> None:
-    """Logs the error; the last line is one sentence. ``expected`` tells that its own text is one for users."""
+    """Logs the error; the last line is one sentence. ``expected`` means that its own text is one for users."""
     if verbose:
         logging.error("the whole traceback", exc_info=error)
     elif not expected and (steps := short_traceback(error, folder)):
@@ -54,7 +54,7 @@ def sentence(error: Exception, folder: Path) -> str:
 
 
 def short_traceback(error: Exception, folder: Path) -> str:
-    """The frames but those of libraries, as Python prints them; empty where there are none."""
+    """The frames but those of libraries, as Python prints them; empty if there are none."""
     lines = [f'  File "{file}", line {f.lineno}, in {f.name}\n    {f.line}' for file, f in _frames(error, folder)]
     return "\n".join(["Traceback without libraries (most recent call last):", *lines]) if lines else ""
 
@@ -191,7 +191,7 @@ def _serve(
             if world and (service.drive or not os.environ.get("DODO_CLOCK")):
                 session.hear_directly()
             members = resources.enter_context(_membership(session, role, key, world))
-            stamp = flags["id"] if isinstance(flags["id"], int) else 0  # a list of its own gives each message one
+            stamp = flags["id"] if isinstance(flags["id"], int) else 0  # its own list gives each message one
             loop = Loop(role, service, session, clock, stamp, members)
             resources.enter_context(_readiness(ready, session))
             try:

@@ -75,7 +75,7 @@ class RecordedSteps:
 
 
 def read_steps(path: Path, messages: MessageSet) -> Iterator[RecordedStep]:
-    """The steps of a recording; raises UnjudgeableError where some are missing, and OSError."""
+    """The steps of a recording; raises UnjudgeableError if some are missing, and OSError."""
     step_id, end_id = messages.id(RECORDED_STEP), messages.id(RECORDING_END)
     step, number = RecordedStep(0, []), 0
     for envelope in read_envelopes(path):
@@ -107,11 +107,12 @@ def _key(envelope: Envelope) -> Envelope:
 class RecordingClock:
     """Test time goes from message to message of a recording; nothing waits. Raises OSError.
 
-    Instants begin with the first message, not with the start of the service, which no recording tells. They end where
+    Instants begin with the first message, not with the start of the service, which is in no recording. They end where
     recording ended.
     """
 
     relays = False
+    is_virtual = False
     has_new_picture = False
 
     def __init__(self, path: Path, messages: MessageSet) -> None:

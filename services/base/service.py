@@ -84,7 +84,7 @@ class Verdict:
 
 
 def undeclared_checks(verdict: Verdict, declared: Mapping[str, str] | None) -> str:
-    """What is wrong where the manifest's ``checks`` lack some of a verdict's; empty where they lack none, or are none.
+    """What is wrong where the manifest's ``checks`` lack some of a verdict's; empty if they lack none, or are none.
 
     The verdict counts all the same: only goals of tests cannot name such a check.
     """
@@ -110,7 +110,7 @@ Handler = Callable[[Any, int], None]
 
 
 class Output(NamedTuple):
-    """A message to send with a sender stamp of its own, and a sample time (us) where it is not that of the update."""
+    """A message to send with its own sender stamp, and a sample time (us) where it is not that of the update."""
 
     message: Message
     sender_stamp: int
@@ -168,7 +168,7 @@ class Context:
     session: Session | None = None
     """The bus itself; only for a service with ``drive``."""
     key: bytes = field(default=b"", repr=False)
-    """The key of the test; empty where there is no runner."""
+    """The key of the test; empty if there is no runner."""
     on_rig: bool = False
     """Whether the test runs on a rig, where a service that vanishes may have been unplugged."""
 

@@ -95,7 +95,7 @@ def filmed(path: Path) -> Iterator[Image]:
 
 
 def recorded(path: Path) -> Iterator[Image]:
-    """The pictures of an OpenDLV recording's first camera, as B, G, R; raises ValueError where none can be decoded."""
+    """The pictures of an OpenDLV recording's first camera, as B, G, R; raises ValueError if none can be decoded."""
     try:
         video = importlib.import_module("dodo_dsl.opendlv.video")
         reader = importlib.import_module("dodo_dsl.opendlv.recording")
@@ -118,7 +118,7 @@ def recorded(path: Path) -> Iterator[Image]:
 SILENCE = 1.5
 """s without a picture after which a camera that gave some counts as lost."""
 FIRST = 5.0
-"""s within which a camera has to give its first picture, as it has to be set up."""
+"""s within which a camera has to give its first picture, because it has to be set up."""
 
 
 def longest_silence(freq: float, exposure: float) -> float:
@@ -201,7 +201,7 @@ PATIENCE = 2.0
 
 
 class V4l2Camera:
-    """``read`` waits for a picture; ``notes`` tell of a rate other than asked for."""
+    """``read`` waits for a picture; ``notes`` name a rate other than asked for."""
 
     def __init__(self, device: Path, width: int, height: int, freq: float, exposure: float) -> None:
         """``freq`` in Hz, ``exposure`` in s.
@@ -252,7 +252,7 @@ class V4l2Camera:
             self._busy.release()
 
     def _compare(self, exposure: float) -> None:
-        """Reads back what was set; raises ValueError with the way out where the device has something else."""
+        """Reads back what was set; raises ValueError with a hint if the device has something else."""
         get, device = self._capture.get, self._device
         size = int(get(cv2.CAP_PROP_FRAME_WIDTH)), int(get(cv2.CAP_PROP_FRAME_HEIGHT))
         if size != (self._width, self._height):
@@ -277,7 +277,7 @@ class RpiCamera:
     def __init__(self, width: int, height: int, freq: float, exposure: float) -> None:
         """``freq`` in Hz, ``exposure`` in s.
 
-        Raises ValueError for a width that the pipe pads, OSError where there is no program.
+        Raises ValueError for a width that the pipe pads, OSError if there is no program.
         """
         if width % ALIGNED or height % 2:
             raise ValueError(

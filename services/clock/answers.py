@@ -30,17 +30,22 @@ class Answers:
 
     ``required`` have to come once each, unless ``done`` comes; ``relayed`` are others that services of the test
     consume, all of which are passed on; so are those under other sender stamps, which services only count. ``surplus``
-    counts answers beyond the one that counts.
+    counts answers beyond the one that counts, ``surplus_frames`` the frames with any, ``differing`` those that say
+    something else than the one that counts for the same frame, and ``heard`` all messages that matter.
     """
 
     required: tuple[MessageFilter, ...]
     relayed: tuple[MessageFilter, ...] = ()
     done: MessageFilter | None = None
     surplus: int = 0
+    surplus_frames: int = 0
+    differing: int = 0
+    heard: int = 0
     _strangers: Counter[tuple[int, int]] = field(default_factory=Counter)
     _times: set[int] = field(default_factory=set)
     _all_times: set[int] = field(default_factory=set)
     _chosen: dict[MessageFilter, Envelope] = field(default_factory=dict)
+    _chosen_before: dict[MessageFilter, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
     _surplus_now: Counter[str] = field(default_factory=Counter)
     is_silent: bool = True
@@ -55,6 +60,7 @@ class Answers:
         """A frame will be shown, with these sample times (us): answers that copy one of them count at once."""
         self._times = set(times)
         self._all_times |= self._times
+        self._chosen_before = self._chosen
         self._chosen, self._is_seen, self._is_done, self._is_collected = {}, False, False, False
         self._surplus_now.clear()
         self.is_copied = True
@@ -78,12 +84,12 @@ class Answers:
             self._is_done = True
         if any(each.matches(envelope) for each in self.filters):
             self.is_silent = False
+            self.heard += 1
             self.is_copied &= copies
         for each in self.required:
             if each.matches(envelope):
                 if stale or each in self._chosen or self._is_collected:
-                    self.surplus += 1
-                    self._surplus_now[each.name] += 1
+                    self._add_surplus(each, envelope, (self._chosen_before if stale else self._chosen).get(each))
                 else:
                     self._chosen[each] = known
                 return
@@ -93,6 +99,12 @@ class Answers:
         consumed = (*self.required, *self.relayed)
         if any(each.data_type == envelope.data_type if is_stranger else each.matches(envelope) for each in consumed):
             self._others.append(known)
+
+    def _add_surplus(self, each: MessageFilter, envelope: Envelope, chosen: Envelope | None) -> None:
+        self.surplus += 1
+        self.surplus_frames += not self._surplus_now
+        self.differing += chosen is not None and chosen.payload != envelope.payload
+        self._surplus_now[each.name] += 1
 
     @property
     def filters(self) -> tuple[MessageFilter, ...]:

@@ -1,6 +1,7 @@
 """The application under test as the clock sees it: it gets pictures and answers them.
 
-How long it takes for an answer is measured: lockstep hides that, as the world waits for it.
+How long it takes for an answer is measured: lockstep hides that, as the world waits for it. So is whether it goes on
+by its own clock while the world waits.
 """
 
 import statistics
@@ -47,7 +48,7 @@ class ResponseTimes:
     _processor: list[float] = field(default_factory=list)
 
     def add(self, wall_s: float, spent: Spent | None, is_copied: bool = True) -> None:
-        """One more answer; ``spent`` is None where the application's processes cannot be seen."""
+        """One more answer; ``spent`` is None if the application's processes cannot be seen."""
         self.uncopied += not is_copied
         if spent is None:
             self._taken.append(wall_s)
@@ -83,7 +84,7 @@ def _percentile(values: Sequence[float], share: float) -> float:
 
 
 def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
-    """The processor as Linux names it, with its clock where it says one; empty where it says nothing."""
+    """The processor as Linux names it, with its clock where it says one; empty if it says nothing."""
     try:
         lines = cpuinfo.read_text(errors="replace").splitlines()
     except OSError:
@@ -95,6 +96,9 @@ def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
 
 
 _AGAIN_S = 0.5
+_FIRST_PAUSE, _NEXT_PAUSE = 3, 8
+"""The frame after whose answer the first pause is, and how many times as late each next one."""
+_LEAST_PAUSE_S, _MOST_PAUSE_S = 0.025, 1.0
 MOST_CONTENTION_S = 20.0
 """Most seconds for which an application has longer as the machine is busy, where its processes cannot be seen."""
 
@@ -127,6 +131,11 @@ class SteppedApplication:
         self._shown, self._own_wait = 0.0, 0.0
         """When all pictures were there, and how long the clock itself had waited for a processor until then."""
         self._cid = cid
+        self.pauses, self.unasked = 0, 0
+        """Pauses in which nothing was shown, and those in which the application sent on all the same."""
+        self._pause_after, self._answered = _FIRST_PAUSE, 0.0
+        self._gaps: list[float] = []
+        """Times in s from one answer to the next."""
         self._first: list[EncodedEnvelope] = []
         self._reading: set[str] = set()
         """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
@@ -170,10 +179,6 @@ class SteppedApplication:
             self._link.send([StepCommand(camera.service, now, (), show=True) for camera in shown])
         self._shown, self._own_wait = time.monotonic(), own_wait_s()
 
-    def facts(self) -> dict[str, Any]:
-        """What the clock reports of the answers at the end."""
-        return self.response.facts()
-
     def await_answer(self, until: int = 0) -> None:
         """Wait for the answer to what was shown, whenever (``until``) the next step is.
 
@@ -185,7 +190,10 @@ class SteppedApplication:
                 raise ApplicationSilent(f"{self._sentence(self._missing)}{where}")
             self._link.pump(self._left)
             self._check_flood()
-        spent = time.monotonic() - self._began
+        before, self._answered = self._answered, time.monotonic()
+        spent = self._answered - self._began
+        if before:
+            self._gaps.append(self._answered - before)
         if self.frames == 1:
             self.waited_first += spent
         else:
@@ -196,6 +204,34 @@ class SteppedApplication:
                 own = now.by_others(self._before, own)
                 ran = now.since(self._before, own)
             self.response.add(max(taken - own, 0.0), ran, self.answers.is_copied)
+
+    def pause(self) -> None:
+        """Show nothing for a while, now and then: what the application sends by timers, it sends all the same.
+
+        No timer by which it sends is slower than its answers follow each other, so that it comes to pass within that
+        time. Messages that follow an answer at once are of that answer, and late ones do not come in two such times.
+        """
+        if self.frames != self._pause_after:
+            return
+        self._pause_after *= _NEXT_PAUSE
+        length = min(max(statistics.median(self._gaps), _LEAST_PAUSE_S), _MOST_PAUSE_S)
+        self._listen(self._answered + length / 2)
+        self.pauses += 1
+        self.unasked += all(self._listen(time.monotonic() + length) for _ in range(2))
+
+    def _listen(self, until: float) -> bool:
+        """Whether any message that matters comes until then."""
+        before = self.answers.heard
+        while not self._stopped() and (left := until - time.monotonic()) > 0:
+            self._link.pump(left)
+        self._link.drain()
+        return self.answers.heard > before
+
+    def facts(self) -> dict[str, Any]:
+        """What the clock reports of the answers, as ``ResponseTimes.facts``."""
+        facts, answers = self.response.facts(), self.answers
+        counts = {name: getattr(answers, name) for name in ("surplus", "surplus_frames", "differing")}
+        return facts and {**facts, **counts, "pauses": self.pauses, "unasked": self.unasked}
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services."""

@@ -1,6 +1,6 @@
 """Commands of the clock to the services of a test: repeated until each is answered; and how a test can end.
 
-Commands and results go over the bus and beside it.
+Commands and results go over the bus and past it.
 """
 
 import select
@@ -168,7 +168,7 @@ class Exchange:
         return [self._step(part=part, parts=len(parts), frames=data, **facts) for part, data in enumerate(parts)]
 
     def _take(self, envelope: Envelope, address: Address | None) -> None:
-        """Part of a result; those of a service that ends are acknowledged, as it waits for that."""
+        """Part of a result; those of a service that ends are acknowledged, because it waits for that."""
         if envelope.data_type != self._done_id:
             return
         try:
@@ -179,7 +179,7 @@ class Exchange:
             if pending is None or pending.number != done.number:
                 return
             if address is not None:
-                self._addresses.setdefault(done.service, address)  # who repeats an answer is not the service
+                self._addresses.setdefault(done.service, address)  # a repeated answer is not the service's
                 self._own.add((address[0], done.port))
             data = self._reassembly.setdefault(done.service, Reassembly()).take(
                 done.number, done.part, done.parts, done.frames
@@ -244,7 +244,7 @@ IsStopped = Callable[[], bool]
 
 @dataclass(frozen=True)
 class Roles:
-    """The services of a test: ``advance`` and ``sense`` step in order, ``judge`` and ``watch`` beside them."""
+    """The services of a test: ``advance`` and ``sense`` step in order, ``judge`` and ``watch`` alongside."""
 
     advance: tuple[str, ...]
     sense: tuple[str, ...]

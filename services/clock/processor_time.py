@@ -54,7 +54,7 @@ class ProcessorTimes(NamedTuple):
     ran_s: Mapping[int, float]
     threads: Mapping[int, Mapping[str, ThreadSpent]]
     account: Account | None = None
-    """None where there was none to be made: then all that is waited is excused."""
+    """None if there was none to be made: then all that is waited is excused."""
 
     def since(self, before: "ProcessorTimes", excused_s: float = 0.0) -> Spent:
         """What was spent since another snapshot. A process waits as long as the one of its threads that ran the most.
@@ -146,7 +146,7 @@ class ApplicationProcesses:
         return None
 
     def _used_by_groups(self) -> float | None:
-        """None where a service has no group of its own."""
+        """None if a service has no group of its own."""
         for root, group in self._groups.items():
             if group is None:
                 return None
@@ -166,7 +166,7 @@ def busy_s(text: str, cores: Collection[int]) -> float:
 
 
 def _group_of(pid: int, proc: Path) -> Path | None:
-    """The file by which a service's own control group tells its processor time (cgroups(7), version 1 or 2)."""
+    """The file by which a service's own control group gives its processor time (cgroups(7), version 1 or 2)."""
     with contextlib.suppress(OSError, ValueError, IndexError):
         mounts = [line.split() for line in (proc / "self" / "mountinfo").read_text().splitlines()]
         for line in (proc / str(pid) / "cgroup").read_text().splitlines():
@@ -193,7 +193,7 @@ def _used_s(group: Path) -> float:
 
 
 def own_wait_s(schedstat: Path = Path("/proc/thread-self/schedstat")) -> float:
-    """How long this thread has been ready to run without a processor, in s; 0 where the kernel does not say."""
+    """How long this thread has been ready to run without a processor, in s; 0 if the kernel does not say."""
     with contextlib.suppress(OSError, ValueError):
         _, waited, *_ = schedstat.read_bytes().split()
         return int(waited) / 1e9
@@ -201,7 +201,7 @@ def own_wait_s(schedstat: Path = Path("/proc/thread-self/schedstat")) -> float:
 
 
 def contention_s(pressure: Path = Path("/proc/pressure/cpu")) -> float:
-    """For how long any process of this machine has been ready to run without a processor; 0 where it is not counted.
+    """For how long any process of this machine has been ready to run without a processor; 0 if it is not counted.
 
     The kernel's pressure stall information (its Documentation/accounting/psi.rst), also inside a container: the total
     of the line "some", in us.
@@ -246,7 +246,7 @@ def _threads(tasks: str) -> Iterator[tuple[str, ThreadSpent]]:
 
 
 def _busiest(now: Mapping[str, ThreadSpent], before: Mapping[str, ThreadSpent]) -> ThreadSpent:
-    """What the thread ran and waited that ran the most in between; nothing where none ran."""
+    """What the thread ran and waited that ran the most in between; nothing if none ran."""
     spent = [
         ThreadSpent(times.ran_s - then.ran_s, times.waited_s - then.waited_s) for times, then in _both(now, before)
     ]

@@ -26,12 +26,12 @@ from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
 _FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
 """Seconds between reports at first and later, and their share of the time that passed.
 
-A short test needs them closer, as what was measured by the wall clock is put to its time by them.
+A short test needs them closer, because what was measured by the wall clock is put to its time by them.
 """
 _SLICE = 0.05
 _MOST_EARLY = 1000
 CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone", SENDER)
-"""What the clock consumes beside the application's answers."""
+"""What the clock consumes besides the application's answers."""
 
 _log = logging.getLogger(__name__)
 
@@ -124,7 +124,7 @@ class ClockService(Service):
         return self._stopped()
 
     def _await_begin(self) -> Envelope | None:
-        """The begin that the runner announces; one of its own where DODO_RUNNER says that there is none."""
+        """The start that the runner announces; one of its own where DODO_RUNNER says that there is none."""
         if os.environ.get("DODO_RUNNER") == "":
             self._stepper.waits_for_start = True
             begin = self._session.messages.type("dodo.TestBegin")()

@@ -286,6 +286,9 @@ class VirtualApplication:
         self._run(now)
         self.answers.begin()
 
+    def pause(self) -> None:
+        """It acts by the test's time: there is no other one to look for."""
+
     def expect_at(self, now: int) -> None:
         """Without cameras, nothing is to be expected."""
 

@@ -63,7 +63,7 @@ class DriveMeasures:
 
     @staticmethod
     def rest_check(rest: float) -> Check:
-        """The way left to the goal in m; it says how far a drive that failed came, and decides nothing."""
+        """The distance left to the goal in m; it says how far a drive that failed came, and decides nothing."""
         return Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0, parameters=("goal", "gates"))
 
     def wall_check(self, limit: float) -> Check:
@@ -310,7 +310,7 @@ class TrackEvaluator(Evaluator):
         return near or (math.inf, "")
 
     def _reached(self, start: VehiclePose, end: VehiclePose, area: shapely.Geometry) -> str | None:
-        """That the goal was reached after all gates, or the last gate where there is no goal; None when it was not."""
+        """That the goal was reached after all gates, or the last gate if there is no goal; None when it was not."""
         share = self._gates.move(start, end)
         if share is None:
             self._early = self._early or touched(self.track.goal, area) is not None

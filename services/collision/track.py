@@ -162,7 +162,7 @@ def nearest(obstacles: Obstacles, area: shapely.Geometry) -> tuple[float, str] |
 
 
 def length_through(area: shapely.Geometry, lines: Sequence[shapely.Geometry]) -> float:
-    """The least way (m) from an area to the first line, from there to the next, and so on, each taken by itself."""
+    """The shortest distance (m) from an area to the first line, from there to the next, and so on, each by itself."""
     return sum(float(shapely.distance(start, end)) for start, end in pairwise([area, *lines]))
 
 
@@ -234,7 +234,7 @@ def pick(known: Mapping[str, Shape], names: Sequence[str], parameter: str, path:
 
 
 EVERY, BLOCKS = "*", "blocks"
-"""As a wall: all obstacles that are neither goal nor gate, and all blocks in the vehicle's way."""
+"""As a wall: all obstacles that are neither goal nor gate, and all blocks in the vehicle's path."""
 
 
 def pick_walls(
@@ -242,7 +242,7 @@ def pick_walls(
 ) -> dict[str, shapely.Geometry]:
     """Obstacles, and blocks by their names, that a vehicle of ``height`` m must not touch; ``others`` are no walls.
 
-    Raises ObstaclesError for a name that is neither, and where nothing stands in the vehicle's way.
+    Raises ObstaclesError for a name that is neither, and if nothing stands in the vehicle's path.
     """
     blocks = {} if all(name in known or name == EVERY for name in names) else load_blocks(path, height)
     standing = {name: area for name, area in blocks.items() if not area.is_empty}
@@ -253,7 +253,7 @@ def pick_walls(
             what = (
                 "obstacle" if name == EVERY else f"block between {map_file.LOWEST:g} and {height:g} m above the ground"
             )
-            raise ObstaclesError(f"--walls: {name!r} is no {what} in the map {path}")
+            raise ObstaclesError(f"--walls: {name!r} is not a {what} in the map {path}")
     found = [each for name in names for each in ([name] if name in shapes else groups.get(name, [name]))]
     return pick(shapes, found, "walls", path)
 

@@ -63,7 +63,7 @@ FEWEST = 10
 
 
 def lag(target: Target, times: Times, values: Values) -> float:
-    """The time in s by which the signal follows its target late; 0 where no lag explains its distance."""
+    """The time in s by which the signal follows its target late; 0 if no lag explains its distance."""
     plain = _mean_distance(target, times, values)
     lags = range(LAG_STEP, LONGEST_LAG + 1, LAG_STEP)
     best, late = min(((_mean_distance(target, times - late, values), late) for late in lags), default=(plain, 0))
@@ -91,7 +91,7 @@ def longest_run(times: Times, values: Values) -> RepeatedValue:
 
 
 def likeness(target: Target, times: Times, values: Values) -> str:
-    """How the signal is like its target, such as ``about -1 times its target``; empty where neither a factor nor an
+    """How the signal is like its target, such as ``about -1 times its target``; empty if neither a factor nor an
     offset explains half of the distance. Samples are finite and inside the target.
     """
     expected = target.at(times)
@@ -313,7 +313,7 @@ def _share(right: NDArray[np.bool_], others: int) -> float:
 
 
 def judged_time(target: Target, limits: SignalLimits) -> tuple[int, int]:
-    """The part of the target's time that is in the window, in microseconds; empty where it ends before it begins."""
+    """The part of the target's time that is in the window, in microseconds; empty if it ends before it begins."""
     begin, end = int(target.times[0]), int(target.times[-1])
     return max(begin, limits.start), end if limits.until is None else min(end, limits.until)
 

@@ -28,7 +28,7 @@ _NAMES = {
 }
 _KEPT = ("mean", "std", "distance", "share", "frame-share", "sign-share")
 _AT_ONCE = {"mean-over-time": "mean", "std-over-time": "std"}
-"""Not told when the same over samples broke the limit, too."""
+"""Left out when the same over samples broke the limit, too."""
 
 
 def verdict(
@@ -172,7 +172,7 @@ class Samples:
 class SignalEvaluator(Evaluator):
     """Consumes a signal, and the target where that is ``None``.
 
-    Samples count from the begin of the test, or else from the target's own start. They may come in any order, but not
+    Samples count from the start of the test, or else from the target's own start. They may come in any order, but not
     late, and are kept until the verdict, which comes at MOST_IN_MEMORY of them at the latest.
     """
 
@@ -185,7 +185,7 @@ class SignalEvaluator(Evaluator):
         from_begin: bool,
         frames: Times | None = None,
     ) -> None:
-        """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the begin.
+        """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the start.
 
         ``frames`` are the times of the pictures that samples answer, on the target's own scale.
         """
@@ -229,7 +229,7 @@ class SignalEvaluator(Evaluator):
         return replace(said, evidence=measures.evidence())
 
     def record(self) -> None:
-        """All samples with the target, which a live one may tell afterwards; of very many those that are farthest."""
+        """All samples with the target, which a live one may send afterwards; of very many those that are farthest."""
         target = self._target or in_order(*self._targets.since(self.zero))
         start = self.zero if self._from_begin else target.start
         times, values = self._samples.since(start)
@@ -239,7 +239,7 @@ class SignalEvaluator(Evaluator):
                            away > limits.band_at(expected)], [FAILED, WARNED])  # fmt: skip
         marks[~np.isfinite(values)] = FAILED
         marks[(times < limits.start) | (times > (np.inf if limits.until is None else limits.until))] = 0
-        if abs(start - self.zero) > _DAY:  # of another day: from the begin of the test on
+        if abs(start - self.zero) > _DAY:  # of another day: from the start of the test on
             start = self.zero
         for chosen in farthest_of(np.argsort(times, kind="stable"), np.nan_to_num(away, nan=-1.0)):
             self.plot.add(start + int(times[chosen]), float(values[chosen]), mark=int(marks[chosen]))
@@ -258,7 +258,7 @@ class SignalEvaluator(Evaluator):
             until = "" if self._limits.until is None else f" until {self._limits.until / MICROSECONDS:.2f} s"
             window = f"judged is from {self._limits.start / MICROSECONDS:.2f} s{until}"
             ended = f", and the test ended after {observed / MICROSECONDS:.2f} s" if observed < end else ""
-            raise UnjudgeableError(f"there is no time to judge: {spans}, {window}{ended}")
+            raise UnjudgeableError(f"no time to judge: {spans}, {window}{ended}")
         return first, min(end, observed)
 
     def _observed(self, target: Target, is_complete: bool) -> int:

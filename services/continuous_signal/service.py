@@ -32,10 +32,10 @@ class ContinuousSignal(SignalEvaluator):
         other = _target_signal(flags, signal)
         target = _target(flags, other, context.messages)
         if target is None and str(other) == str(signal):
-            raise ValueError("there is no target: give --target, or --target-sender of one that comes live")
+            raise ValueError("no target: give --target, or --target-sender for a live one")
         name, from_begin = f"{signal.field} of {signal}", flags["align"] == "begin"
         if target is not None and from_begin and target.span[0] >= flags["max-time"]:
-            first = f"{flags['target']}: the target begins {target.span[0]:,.1f} s after the begin"
+            first = f"{flags['target']}: the target begins {target.span[0]:,.1f} s after the start"
             raise ValueError(f"{first}, when --max-time={flags['max-time']:g} is over: nothing could be judged")
         frames = None if target is None or from_begin else _frames(flags, target)
         super().__init__(name, target, _limits(flags), flags["max-time"], from_begin, frames)
@@ -87,7 +87,7 @@ def _frames(flags: Flags, target: Target) -> Times | None:
 
 def _limits(flags: Flags) -> SignalLimits:
     if all(flags[name] is None for name in REQUIRED):
-        raise ValueError(f"there is no limit: give one or more of --{', --'.join(REQUIRED)}")
+        raise ValueError(f"no limit: give one or more of --{', --'.join(REQUIRED)}")
     for name in ("min-share", "min-frame-share"):
         if flags[name] is not None and flags["band"] is None:
             raise ValueError(f"--{name} needs --band, the distance that counts as inside")

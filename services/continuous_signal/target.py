@@ -37,7 +37,7 @@ class Target:
     start: int = 0
 
     def at(self, times: Times) -> Values:
-        """The target at any times by linear interpolation (thesis 4.3.2); NaN before its begin and after its end."""
+        """The target at any times by linear interpolation (thesis 4.3.2); NaN before its start and after its end."""
         if not len(self.times):
             return np.full(len(times), np.nan)
         first = self.times[0]
@@ -128,7 +128,7 @@ def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
 
 
 def picture_times(path: Path, sender: int, start: int) -> Times | None:
-    """When the pictures of a camera in a ``.rec`` file were taken, in us from ``start``; None where it has none."""
+    """When the pictures of a camera in a ``.rec`` file were taken, in us from ``start``; None if it has none."""
     with Recording(path) as recording:
         times: Times = np.unique(
             recording.index["time"][recording.rows([recording_times.IMAGE], sender_stamps=[sender])]

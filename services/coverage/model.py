@@ -16,7 +16,7 @@ from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdic
 
 MOST_CELLS = 4_000_000
 _STEPS = 100_000
-"""Of a way between two frames, at most: a vehicle that jumps farther covers less of it."""
+"""Of a path between two frames, at most: a vehicle that jumps farther covers less of it."""
 
 
 class Pose(NamedTuple):
@@ -159,7 +159,7 @@ class CoverageEvaluator(Evaluator):
         return self._verdict("failed", reason)
 
     def checks(self) -> tuple[Check, ...]:
-        """The share covered, the time to as much as is asked for, and the way driven in m."""
+        """The share covered, the time to as much as is asked for, and the distance driven in m."""
         covered, reached = self._grid.share, self._reached
         return (
             Check("covered", covered, {"min": self._least}, "", covered >= self._least, parameters=("min-share",)),

@@ -43,7 +43,7 @@ def build(context: Context) -> Coverage:
 
 
 def _area(flags: Flags) -> shapely.Geometry:
-    """The loop of the map, or the rectangle; raises MapError, and ValueError for what is no area."""
+    """The loop of the map, or the rectangle; raises MapError, and ValueError for what is not an area."""
     name, path, sides = flags["area"], flags["map-path"], [flags[side] for side in _SIDES]
     if (name is None) == (sides == [None] * len(_SIDES)):
         raise ValueError("give the area either as a loop of the map, --area, or as a rectangle, --x-min and so on")
@@ -61,5 +61,7 @@ def _area(flags: Flags) -> shapely.Geometry:
         raise ValueError(f"the map {path} has no obstacle '{name}'; it has {', '.join(sorted(obstacles)) or 'none'}")
     found = enclosed(obstacles[name])
     if found is None:
-        raise ValueError(f"the lines of obstacle '{name}' of the map {path} enclose nothing: end where they begin")
+        raise ValueError(
+            f"the lines of obstacle '{name}' of the map {path} enclose nothing: they must end where they begin"
+        )
     return found

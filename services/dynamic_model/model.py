@@ -92,7 +92,7 @@ class Drive(Protocol):
         """The motion `dt` seconds later, with the actuators asked for the same all the time."""
 
     def reset(self) -> None:
-        """Forget all that moves beside the body."""
+        """Forget all that moves except the body."""
 
     def odometry(self, motion: BodyMotion, asked: Mapping[str, float]) -> tuple["Reading", ...]:
         """What its own sensors read."""

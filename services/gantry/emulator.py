@@ -26,7 +26,7 @@ MOST_PAUSED, MOST_PAUSED_SHARE = 0.25, 0.05
 """s for which it may stand still, as the machine keeps it waiting, and the share of a longer test; no real rig does.
 
 The firmware brakes 500 ms after the last RUN, the gantry halts it 300 ms after the last position: less than both is as
-if the serial line had been held up. What fails with any pause at all is no verdict: see dodo_dsl.run.machine_load.
+if the serial line had been held up. What fails with any pause at all is not a verdict: see dodo_dsl.run.machine_load.
 """
 
 _START_PATIENCE = 10.0

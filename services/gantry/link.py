@@ -104,7 +104,7 @@ def _as_os_errors() -> Iterator[None]:
 
 
 def _refusal(device: os.stat_result) -> str:
-    """Why a device is not opened, and how this user gets into the group that may, where there is one beside root's."""
+    """Why a device is not opened, and how this user gets into the group that may, if there is one besides root's."""
     said = "this user may not open it"
     if device.st_mode & 0o060 != 0o060 or device.st_gid == 0:
         return said
@@ -113,8 +113,8 @@ def _refusal(device: os.stat_result) -> str:
     except KeyError:
         return said
     if user in group.gr_mem:
-        return f"{said}, as its session is older than its place in the group '{group.gr_name}': log in anew"
-    return f"{said}: sudo {shlex.join(['usermod', '--append', '--groups', group.gr_name, user])}, and log in anew"
+        return f"{said}, because its session is older than its place in the group '{group.gr_name}': log in again"
+    return f"{said}: sudo {shlex.join(['usermod', '--append', '--groups', group.gr_name, user])}, and log in again"
 
 
 def _keep(target: str, port: serial.SerialBase) -> None:

@@ -99,7 +99,7 @@ HOME = Position(*(BOUNDS[axis][0] for axis in ("x", "y", "yaw")))
 FARTHEST = Position(*(BOUNDS[axis][1] for axis in ("x", "y", "yaw")))
 """The other end of the workspace of 1.9 m by 1.4 m, and of the turn; both are as long to the other side of 0."""
 LATENCY = 0.1
-"""s from a measurement to the motion decided upon it, beside four steps, with which braking that comes a step late does
+"""s from a measurement to the motion decided upon it, plus four steps, with which braking that comes a step late does
 not swing over the edge."""
 
 

@@ -57,7 +57,7 @@ class Word(StrEnum):
 
 SENTENCES = {
     Status.LIMIT: "touched a limit switch and stopped",
-    Status.STALL: "lost steps, as a motor stalled",
+    Status.STALL: "lost steps because a motor stalled",
     Status.HOT: "has a motor driver that is too hot",
     Status.NOT_CALIBRATED: "is not calibrated and does not know its position",
     Status.WATCHDOG: "got no command for 500 ms and braked by itself",

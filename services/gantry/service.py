@@ -34,7 +34,7 @@ class LinkTelemetry:
         self._began, self._took = array("d"), array("d")
 
     def note(self, began: float, answered: float | None) -> None:
-        """A turn: when its commands were sent, and when all answers were there (s); None where they were not."""
+        """A turn: when its commands were sent, and when all answers were there (s); None if they were not."""
         if len(self._began) < MOST:
             self._began.append(began)
             if answered is not None:

@@ -93,7 +93,7 @@ def calibrate(link: Link, patience: float, poll: float = POLL) -> float:
 def go(link: Link, goal: Position, patience: float, word: Word = Word.GOTO) -> None:
     """Drive the rig to a true place; raises RigError when it is not there after ``patience`` s.
 
-    ``word`` is GOTOLEFT or GOTORIGHT for the way round that a circle takes.
+    ``word`` is GOTOLEFT or GOTORIGHT for the direction that a circle turns.
     """
     told = link.conversion.to_firmware(goal)
     give(link, word, told.x, told.y, told.yaw)

@@ -27,7 +27,7 @@ class Box(NamedTuple):
 
 
 class LabelledBox(NamedTuple):
-    """A box with its class; the empty string is no class."""
+    """A box with its class; the empty string is not a class."""
 
     label: str
     box: Box
@@ -72,7 +72,7 @@ Pair = tuple[int, int]
 def best_pairs(scores: Scores, threshold: float) -> list[Pair]:
     """Pairs (row, column) of scores above a threshold: as many as can be, and of those the largest sum.
 
-    Each row and column is in one pair at most. `scores` are from 0 to 1; a score equal to the threshold is no pair.
+    Each row and column is in one pair at most. `scores` are from 0 to 1; a score equal to the threshold is not a pair.
     """
     allowed = scores > threshold
     rows, columns = np.flatnonzero(allowed.any(1)), np.flatnonzero(allowed.any(0))
@@ -213,7 +213,7 @@ class Truth:
         return {"one": 0, "sample-time": key.time, "number": key.number}[self.frames]
 
     def of(self, key: FrameKey) -> tuple[LabelledBox, ...] | None:
-        """The true boxes of a frame; None where the file does not have it."""
+        """The true boxes of a frame; None if the file does not have it."""
         return self.pictures.get(self.picture_of(key))
 
     def labels(self) -> list[str]:

@@ -75,7 +75,7 @@ def _fault(check: Check, score: Score) -> str:
     measure, _, label = check.name.partition("-")
     name = f"{'F1' if measure == 'f1' else measure}{f' of {label}' if label else ''}"
     if check.value is None:
-        return f"{name} has no value ({bound}), as {_nothing(measure)}"
+        return f"{name} has no value ({bound}), because {_nothing(measure)}"
     counts = {class_name(each): of for each, of in score.counts}[label] if label else score.counts.total()
     wrong = {"precision": _count(counts.false, "false detection"), "recall": f"{counts.missed} missed"}
     both = f"{wrong['precision']} and {wrong['recall']}"

@@ -103,17 +103,17 @@ class Counts:
 
     @property
     def precision(self) -> float | None:
-        """Equation 4.3, TP / (TP + FP); None where nothing was detected."""
+        """Equation 4.3, TP / (TP + FP); None if nothing was detected."""
         return _ratio(self.hits, self.hits + self.false)
 
     @property
     def recall(self) -> float | None:
-        """Equation 4.4, TP / (TP + FN); None where there was nothing to detect."""
+        """Equation 4.4, TP / (TP + FN); None if there was nothing to detect."""
         return _ratio(self.hits, self.hits + self.missed)
 
     @property
     def f1(self) -> float | None:
-        """Equation 4.5, 2 TP / (2 TP + FP + FN); None where there was neither."""
+        """Equation 4.5, 2 TP / (2 TP + FP + FN); None if there was neither."""
         return _ratio(2 * self.hits, 2 * self.hits + self.false + self.missed)
 
     @property
@@ -207,7 +207,7 @@ class Unanswered(NamedTuple):
 
     @property
     def share(self) -> float | None:
-        """Of all frames that expect an answer; None where none does."""
+        """Of all frames that expect an answer; None if none does."""
         return self.silent / self.frames if self.frames else None
 
 
@@ -395,7 +395,7 @@ def _check(name: str, value: float | None, least: float | None, parameters: tupl
 
 
 def _at_most(name: str, value: float | None, most: float | None, unit: str = "") -> Check:
-    """A share of no frames keeps its limit, as no answer was expected."""
+    """A share of no frames keeps its limit, because no answer was expected."""
     if most is None:
         return Check(name, value, {}, unit)
     return Check(name, value, {"max": most}, unit, value is None or value <= most)

@@ -81,6 +81,6 @@ def _rules(flags: Flags) -> Rules:
 def _limits(flags: Flags) -> DetectionLimits:
     precision, recall, f1 = (flags[f"min-{name}"] for name in MEASURES)
     if precision is recall is f1 is None:
-        raise ValueError("there is no limit: give one or more of --min-precision, --min-recall, --min-f1")
+        raise ValueError("no limit: give one or more of --min-precision, --min-recall, --min-f1")
     silence = flags["max-unanswered"], flags["max-gap"]
     return DetectionLimits(precision, recall, f1, flags["min-frames"], flags["each-class"], *silence)

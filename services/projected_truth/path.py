@@ -38,7 +38,7 @@ class MeasuredPath:
         return bool(self._poses) and self._poses[-1][0] >= time
 
     def at(self, time: int) -> CameraPose | None:
-        """The pose between those measured around ``time``, or as the last two moved on; None where none is near.
+        """The pose between those measured around ``time``, or as the last two moved on; None if none is near.
 
         A pose is near within a second, after which a vehicle may be anywhere.
         """
@@ -73,7 +73,7 @@ _RETRY = 100_000
 class FollowedMemory:
     """Polls a shared memory and never waits for a notification, so that a camera that counts readers sees none.
 
-    What is in it at first is skipped, as it may not be a picture yet.
+    What is in it at first is skipped, because it may not be a picture yet.
     """
 
     def __init__(self, name: str) -> None:
@@ -83,7 +83,7 @@ class FollowedMemory:
         self._retry = 0
 
     def new(self, now: int) -> int | None:
-        """The sample time of the picture in it, in us, if that was not told yet."""
+        """The sample time of the picture in it, in us, if that was not passed on yet."""
         try:
             if self._memory is None:
                 self._attach(now)

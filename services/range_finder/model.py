@@ -37,7 +37,7 @@ class Curve:
             points = [tuple(float(number) for number in point.split(",")) for point in text.split(";") if point.strip()]
             volts, metres = zip(*((v, m) for v, m in points), strict=True)
         except ValueError:
-            raise CurveError(f"--curve={text} is no list of points V,m;V,m") from None
+            raise CurveError(f"--curve={text} is not a list of points V,m;V,m") from None
         if len(points) < 2 or not all(map(math.isfinite, (*volts, *metres))) or min(*volts, *metres) <= 0.0:
             raise CurveError(f"--curve={text} needs two points V,m or more, of numbers above 0")
         if list(volts) != sorted(set(volts), reverse=True) or list(metres) != sorted(set(metres)):

@@ -62,7 +62,7 @@ def sensors_of(flags: Flags) -> list[Sensor]:
     """The sensors; raises ValueError for flags that do not fit together."""
     stamps = flags["id"]
     if len(set(stamps)) < len(stamps) or not stamps:
-        raise ValueError("--id needs a sender stamp of its own for each sensor")
+        raise ValueError("--id needs a different sender stamp for each sensor")
     columns = {name: flags[name] for name in ("x", "y", "z", "yaw")}
     for name, values in columns.items():
         if len(values) not in (1, len(stamps)):

@@ -203,7 +203,7 @@ class NewestPictures:
 
     @property
     def is_wanted(self) -> bool:
-        """Whether the file is still there: who runs a test removes it as soon as the test has passed."""
+        """Whether the file is still there: the runner removes it as soon as the test has passed."""
         return self.is_on and self._path.exists()
 
     def close(self) -> None:

@@ -105,7 +105,7 @@ def _looks_hz(context: Context) -> float:
 
 
 def _end(recorder: Recorder, recording: RecordingFile, context: Context) -> None:
-    """Record when the test ended, which nothing else tells where no more messages came."""
+    """Record when the test ended, which nothing else shows if no more messages came."""
     if recorder.has_begun:
         now = context.clock.now()
         recording.write(Envelope(context.messages.id(RECORDING_END), b"", now, 0, now, 0))
@@ -138,7 +138,7 @@ def _cameras(context: Context, sources: list[PictureSource], recording: Recordin
 
 
 def _pictures_alone(context: Context, cameras: "list[RecordedCamera]", recording: RecordingFile) -> "Cameras":
-    """Pictures in a recording of their own, of which the newest stay."""
+    """Pictures in their own recording, of which the newest stay."""
     from services.rec_recorder.model import NewestPictures
     from services.rec_recorder.pictures import Cameras, Later
 

@@ -66,7 +66,7 @@ class PictureSource:
     """The newest picture of a memory, at most one each `period` microseconds of its own sample times.
 
     It polls the memory and never waits for a notification, so that a camera that counts its readers does not see it.
-    What was in the memory at first is skipped, as it may not be a picture yet; in lockstep (``is_stepped``) it is one
+    What is in the memory at first is skipped: it may not be a picture yet; in lockstep (``is_stepped``) it is one
     if it has a sample time of the test.
     """
 
@@ -135,7 +135,7 @@ class PictureSource:
         return True
 
     def _is_due(self, time: int) -> bool:
-        """Pictures are taken on a grid of times, a tenth of the period early at most; it starts anew after a jump."""
+        """Pictures are taken on a grid of times, a tenth of the period early at most; it starts again after a jump."""
         if time == self._last:
             return False
         jumped = self._due is None or time < self._last or time - self._due > 10 * self._period

@@ -112,7 +112,7 @@ _log = logging.getLogger(__name__)
 class Player:
     """Computes which entries are due. ``due`` holds the time of each in microseconds from the start, ascending.
 
-    It waits for `play` before anything is due. With `rewinds` it begins anew at its end; else it is `ended` then.
+    It waits for `play` before anything is due. With `rewinds` it begins again at its end; else it is `ended` then.
     """
 
     def __init__(self, due: Numbers, rewinds: bool = False) -> None:

@@ -143,7 +143,7 @@ def build(context: Context) -> Service:
 
 
 def _half_period(part: Part) -> float | None:
-    """Half of the mean time between pictures in microseconds; None where there are no two."""
+    """Half of the mean time between pictures in microseconds; None if there are no two."""
     due = part.due[part.shown]
     return float(due[-1] - due[0]) / (len(due) - 1) / 2 if len(due) > 1 else None
 
@@ -168,7 +168,7 @@ def _part(context: Context, recording: Recording) -> Part:
 
 
 def _memories(context: Context, recording: Recording, part: Part) -> PictureMemories | None:
-    """Memories for the pictures; None where there are none to show."""
+    """Memories for the pictures; None if there are none to show."""
     flags = context.flags
     if not flags["video"]:
         return None

@@ -79,7 +79,7 @@ def pixels(frame: DecodedFrame) -> RecordedPicture:
 
 
 def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
-    """The first picture of the rows that can be decoded; raises VideoError where none can."""
+    """The first picture of the rows that can be decoded; raises VideoError if none can."""
     decoder = Decoder()
     for envelope in recording.envelopes(rows):
         frame = decoder.frame(envelope)

@@ -22,7 +22,7 @@ _SAME = 1_500
 
 @dataclass(frozen=True)
 class Frames:
-    """The frames of a test, ascending: when each is ``due``, in us from its begin, and its sample time in ``stamps``.
+    """The frames of a test, ascending: when each is ``due``, in us from its start, and its sample time in ``stamps``.
 
     Without ``stamps`` these are times of the test.
     """
@@ -64,7 +64,7 @@ class PlayedPart:
 
 
 def of_recording(path: Path, part: PlayedPart) -> Frames:
-    """The frames as the player shows them; raises ValueError where there are none."""
+    """The frames as the player shows them; raises ValueError if there are none."""
     with Recording(path) as recording:
         index = recording.index
         times = index["time"]

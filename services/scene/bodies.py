@@ -108,7 +108,7 @@ def pierced(faces: Sequence[Face], corners: Corners, middles: Array, radii: Arra
 
 
 def _near(face: Face, place: Array, radius: float) -> bool:
-    """Whether a sphere may touch a face, as far as the planes through its edges tell."""
+    """Whether a sphere may touch a face, as far as the planes through its edges show."""
     edges = np.roll(face.points, -1, axis=0) - face.points
     sides = np.cross(face.normal, edges)
     sides /= np.linalg.norm(sides, axis=1, keepdims=True)

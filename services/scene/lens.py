@@ -50,7 +50,7 @@ class Distortion:
         return np.asarray(ideal * factor[..., None] + offset, np.float64)
 
     def backward(self, shown: Array) -> Array:
-        """Which points (..., 2) the lens shows at these; NaN where it shows nothing."""
+        """Which points (..., 2) the lens shows at these; NaN if it shows nothing."""
         ideal = shown
         with np.errstate(all="ignore"):
             for _ in range(_STEPS):
@@ -79,7 +79,7 @@ class Alignment:
 
 
 def lens_of(camera: Pinhole, distortion: Distortion, alignment: Alignment) -> "Lens | None":
-    """None where the camera is ideal; raises ValueError as Lens does."""
+    """None if the camera is ideal; raises ValueError as Lens does."""
     return Lens(camera, distortion, alignment) if distortion or alignment != Alignment() else None
 
 

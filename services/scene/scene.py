@@ -1,7 +1,7 @@
 """A map loaded for drawing: shapes and where they stand, flat faces, colours of sky and ground.
 
 Lines of its obstacles may be tape on the ground, background clutter may be boxes of all colours that stand around what
-it holds, and models may stand beside their places, as people put them down; clutter and places are the same ones for
+it holds, and models may stand next to their places, as people put them down; clutter and places are the same ones for
 the same seed.
 """
 
@@ -84,7 +84,7 @@ def _extent(models: tuple[Copies, ...]) -> tuple[Array, Array]:
 
 
 def _places(random: np.random.RandomState, count: int, low: Array, high: Array) -> Array:
-    """Points (count, 3) on z = 0, spread along the rectangle around low and high, some way off it."""
+    """Points (count, 3) on z = 0, spread along the rectangle around low and high, some distance from it."""
     reach = random.uniform(NEAREST, FARTHEST, count)
     size = high - low
     along = random.uniform(0, 1, count) * 2 * (size.sum() + 4 * FARTHEST)

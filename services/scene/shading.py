@@ -27,7 +27,7 @@ def direction_of(azimuth: float, elevation: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """``direction`` (3,) points towards the light; ``on_blocks`` tells whether it shades blocks and the ground too.
+    """``direction`` (3,) points towards the light; ``on_blocks`` says whether it shades blocks and the ground too.
 
     Without a chosen light a map's blocks are shown in their own colours.
     """

@@ -27,7 +27,7 @@ def triangle_normals(vertices: Array, triangles: Indices) -> Array:
 
 
 def _convex(vertices: Array, loop: Loop, normal: Array) -> Loop | None:
-    """The loop without corners on straight edges; None when it is not convex. In plain numbers, as it has few."""
+    """The loop without corners on straight edges; None when it is not convex. In plain numbers, because it has few."""
     points, (nx, ny, nz) = vertices[loop].tolist(), normal.tolist()
     kept = []
     for corner, last, point, following in zip(

@@ -146,7 +146,7 @@ class Patch:
     level: int = 0
 
     def cover(self, covered: Image) -> bool:
-        """Marks the pixels (height, width) that are drawn; False where all of them were marked before."""
+        """Marks the pixels (height, width) that are drawn; False if all of them were marked before."""
         left, right, top, bottom = self.window
         window = covered[top:bottom, left:right]
         if cv2.countNonZero(window) == window.size:
@@ -185,7 +185,7 @@ _NEARLY = 1e-9
 
 
 class FaceTable:
-    """Faces as one array, to tell which of them are not hidden by others, and so have to be drawn."""
+    """Faces as one array, to find which of them are not hidden by others, and so have to be drawn."""
 
     def __init__(self, faces: Sequence[Face]) -> None:
         most = max((len(face.points) for face in faces), default=0)
@@ -245,7 +245,7 @@ def _texture_to_picture(view: View, paint: TextureMap) -> Array:
 def _band_limits(inverse: Array, texels: int, levels: int) -> list[float]:
     """Depths in m between which each level of the pyramid, the finest first, is the right one.
 
-    A pixel at depth d covers |det inverse| d^3 square tiles, as its third component is 1 / d.
+    A pixel at depth d covers |det inverse| d^3 square tiles, because its third component is 1 / d.
     """
     finest = 1.0 / (abs(float(np.linalg.det(inverse))) * texels)
     inner = [(finest * 4.0 ** (level + 0.5 + _SHARPER)) ** (1 / 3) for level in range(levels - 1)]

@@ -162,7 +162,7 @@ def open_truth(flags: Flags, renderer: Renderer, lens: Lens | None) -> tuple[Sce
 
 
 def truth_sender(context: Context, renderer: Renderer, lens: Lens | None) -> TruthSender | None:
-    """The sender of the flags, None where they name no stamp."""
+    """The sender of the flags, None if they name no stamp."""
     stamp = context.flags["truth-sender"]
     if stamp is None:
         return None

@@ -1,21 +1,22 @@
 "use strict";
-// Search, filters and sorting of the table of tests. Without this script the page shows all of them in their order.
+// Search, filters and order of the tests. Without this script the page shows all of them, what did not pass first.
 (function () {
   const form = document.getElementById("_filters");
-  const table = document.getElementById("_tests");
   const count = document.getElementById("_count");
-  const body = table.tBodies[0];
-  const tests = Array.from(body.rows, (row) => ({ row, section: document.getElementById(row.dataset.test), text: null }));
+  const list = document.getElementById("_tests");
+  const matrices = Array.from(list.querySelectorAll(".matrix"), (element) => ({ element, isOpen: element.open }));
+  const tests = Array.from(list.querySelectorAll(".test"), (element) => ({ element, text: null }));
+  const orders = [list, ...list.querySelectorAll(".instances")].map((parent) => ({ parent, children: Array.from(parent.children) }));
 
   function text(test) {
-    if (test.text === null) test.text = (test.row.textContent + " " + (test.section ? test.section.textContent : "")).toLowerCase();
+    if (test.text === null) test.text = test.element.textContent.toLowerCase();
     return test.text;
   }
 
   function isWanted(test, words) {
     for (const name of ["outcome", "level", "change"]) {
       const wanted = form.elements[name] ? form.elements[name].value : "";
-      if (wanted && !wanted.split(",").includes(test.row.dataset[name])) return false;
+      if (wanted && wanted !== "all" && test.element.dataset[name] !== wanted) return false;
     }
     return words.every((word) => text(test).includes(word));
   }
@@ -24,58 +25,61 @@
     const words = form.elements.search.value.toLowerCase().split(/\s+/).filter(Boolean);
     let shown = 0;
     for (const test of tests) {
-      const isShown = isWanted(test, words);
-      test.row.hidden = !isShown;
-      if (test.section) test.section.hidden = !isShown;
-      if (isShown) shown += 1;
+      test.element.hidden = !isWanted(test, words);
+      if (!test.element.hidden) shown += 1;
+    }
+    for (const { element, isOpen } of matrices) {
+      element.hidden = !element.querySelector(".test:not([hidden])");
+      element.open = shown < tests.length || isOpen;
     }
     const all = tests.length === 1 ? "1 test" : `${tests.length} tests`;
     count.textContent = shown === tests.length ? all : `${shown} of ${all}`;
   }
 
-  function key(row, column) {
-    const cell = row.cells[column];
-    return cell.dataset.value === undefined ? cell.textContent.trim() : cell.dataset.value;
+  // By name, or by a number, of which that of a test without one comes last; a matrix is where its first test is.
+  function key(element, name) {
+    if (name === "name") return element.querySelector("h3").textContent;
+    const found = [element, ...element.querySelectorAll(".test")].map((each) => each.dataset[name]).filter(Boolean).map(Number);
+    if (!found.length) return Infinity;
+    return name === "margin" ? Math.min(...found) : -found[0];
   }
 
-  function compare(a, b, isNumber) {
-    if (!isNumber) return a.localeCompare(b, "en", { numeric: true });
-    if (a === "" || b === "") return (a === "") - (b === "");
-    return Number(a) - Number(b);
-  }
-
-  function sort(header, column) {
-    const isDown = header.getAttribute("aria-sort") === "ascending";
-    const isNumber = header.dataset.sort === "number";
-    for (const other of header.parentNode.cells) other.removeAttribute("aria-sort");
-    header.setAttribute("aria-sort", isDown ? "descending" : "ascending");
-    const rows = tests.map(({ row }) => ({ row, key: key(row, column) }));
-    rows.sort((a, b) => {
-      const order = compare(a.key, b.key, isNumber);
-      return isDown && a.key !== "" && b.key !== "" ? -order : order;
-    });
-    body.append(...rows.map(({ row }) => row));
-  }
-
-  // Whoever follows a link to a test that the filters hide wants to see it.
-  function reveal() {
-    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
-    if (target && target.hidden) {
-      form.reset();
-      filter();
-      target.scrollIntoView();
+  function sort() {
+    const name = form.elements.sort.value;
+    for (const { parent, children } of orders) {
+      const keyed = children.map((element) => ({ element, key: name ? key(element, name) : 0 }));
+      keyed.sort((a, b) => (name === "name" ? a.key.localeCompare(b.key, "en", { numeric: true }) : a.key === b.key ? 0 : a.key - b.key));
+      parent.append(...keyed.map(({ element }) => element));
     }
   }
 
-  Array.from(table.tHead.rows[0].cells).forEach((header, column) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.append(...header.childNodes);
-    header.append(button);
-    button.addEventListener("click", () => sort(header, column));
-  });
-  form.addEventListener("input", filter);
-  form.addEventListener("reset", () => setTimeout(filter));
+  // A link to a test shows it, also where filters hide it, with its details.
+  function reveal() {
+    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (!target || !target.classList.contains("test")) return;
+    if (target.hidden) {
+      form.reset();
+      filter();
+    }
+    const matrix = target.closest(".matrix");
+    if (matrix) matrix.open = true;
+    target.querySelector("details").open = true;
+    target.scrollIntoView();
+  }
+
+  // What its checks mean stands beside them when a test's details open; the page has each explanation once.
+  const meanings = new Map(Array.from(document.querySelectorAll("#_meanings dt"), (each) => [each.textContent, each.nextSibling.textContent]));
+  function explain(details) {
+    for (const cell of details.querySelectorAll(".checks td:first-child, .counted b")) {
+      const meaning = meanings.get(cell.textContent);
+      if (!meaning) continue;
+      if (cell.localName === "b") cell.title = meaning;
+      else cell.append(Object.assign(document.createElement("small"), { textContent: meaning }));
+    }
+  }
+  for (const { element } of tests) element.querySelector("details").addEventListener("toggle", (event) => explain(event.target), { once: true });
+
+  form.addEventListener("input", (event) => (event.target.name === "sort" ? sort() : filter()));
   form.addEventListener("submit", (event) => event.preventDefault());
   window.addEventListener("hashchange", reveal);
   form.hidden = false;

@@ -21,11 +21,25 @@ dodo.checks = (function () {
     );
   }
 
+  // From the nearest limit to the value, on the scale of the report's first page: 100 wide, values grow to the right.
+  function bar([first, last, left, width, isOk]) {
+    const part = (kind, from, wide) => {
+      const element = make("i", { class: kind });
+      element.style.left = `${from}%`;
+      element.style.width = `${wide}%`;
+      return element;
+    };
+    const edges = [first, last].filter((at) => at > 0 && at < 100).map((at) => part("edge", at, 1));
+    return make("span", { class: "bar", "aria-hidden": "true" }, part("room", first, last - first), part(isOk ? "ok" : "no", left, width), ...edges);
+  }
+
   function row(check) {
-    if (check.follows) return make("li", {}, make("b", {}, `– ${check.name}`), ` ${withUnit(check.value, check.unit)}, when the drive ended`);
+    const meaning = check.meaning ? make("small", {}, check.meaning) : "";
+    if (check.follows) return make("li", {}, make("span", {}, make("b", {}, `– ${check.name}`), ` ${withUnit(check.value, check.unit)}, when the drive ended`), meaning);
     const state = check.ok ? "passed" : "failed";
     const measured = [withUnit(check.value, check.unit), check.limits.join(", ")].filter(Boolean).join(", expected ");
-    return make("li", { class: state }, make("b", {}, `${check.ok ? "✓" : "✗"} ${check.name}`), ` ${measured}`, ...(check.ok ? [] : places(check)));
+    const name = make("b", {}, `${check.ok ? "✓" : "✗"} ${check.name}`);
+    return make("li", { class: state }, make("span", {}, name, ` ${measured}`), check.bar ? bar(check.bar) : "", meaning, ...(check.ok ? [] : places(check)));
   }
 
   function show(parent) {

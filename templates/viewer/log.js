@@ -4,7 +4,7 @@
 dodo.log = (function () {
   const { make } = dodo.dom;
   const { services, lines, left } = dodo.data.test.log;
-  const shown = { text: "", service: "", errors: false };
+  const shown = { text: "", service: "", errors: false, ready: false };
   const times = lines.map(([time]) => time);
   const timed = times.filter((time) => time !== null);
   let rows = [];
@@ -19,6 +19,7 @@ dodo.log = (function () {
 
   function isShown([, service, level, text]) {
     const isFound = !shown.text || text.toLowerCase().includes(shown.text);
+    if (level === "ready" && !shown.ready) return false;
     return isFound && (!shown.service || services[service] === shown.service) && (!shown.errors || level === "error");
   }
 
@@ -48,7 +49,11 @@ dodo.log = (function () {
     const errors = make("input", { type: "checkbox" });
     errors.addEventListener("change", () => ((shown.errors = errors.checked), filter(list)));
     const count = lines.filter(([, , level]) => level === "error").length;
-    return [search, choice, make("label", {}, errors, ` Errors (${count})`)];
+    const quiet = make("input", { type: "checkbox" });
+    quiet.addEventListener("change", () => ((shown.ready = quiet.checked), filter(list)));
+    const hidden = lines.filter(([, , level]) => level === "ready").length;
+    const ready = hidden ? make("label", { title: "What services of DoDo say before the test begins" }, quiet, ` Ready (${hidden})`) : "";
+    return [search, choice, make("label", {}, errors, ` Errors (${count})`), ready];
   }
 
   function show(parent) {
@@ -57,6 +62,7 @@ dodo.log = (function () {
     if (!lines.length) list.append(make("p", { class: "nothing" }, "No service wrote a line."));
     rows = lines.map(row);
     list.append(...rows);
+    filter(list);
     if (left) list.append(make("p", {}, `${left} lines of the middle are left out; the files in logs/ have all.`));
     dodo.cursor.follow((time) => follow(list, time));
   }

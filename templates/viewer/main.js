@@ -2,15 +2,9 @@
 "use strict";
 
 (function () {
-  const { test, moment } = dodo.data.test;
+  const { moment } = dodo.data.test;
   const part = (id) => document.getElementById(id);
-  document.title = `${test.name}: ${test.outcome}`;
-  part("name").textContent = test.name;
-  part("name").title = test.description;
-  part("facts").textContent = [test.level, test.kind, `${test.clock} clock`, `${test.backend} backend`, `seed ${test.seed}`].join(" · ");
-  part("outcome").textContent = test.outcome;
-  part("outcome").className = test.outcome;
-  part("reason").textContent = test.reason;
+  dodo.header.show(part);
   if (dodo.data.test.duration > 0) dodo.transport.show(part("transport"));
   dodo.camera.show(part("scene"));
   dodo.map.show(part("scene"));

@@ -6,7 +6,9 @@ dodo.map = (function () {
   const way = dodo.way;
   const PAD = 14;
   const CLOSE = 1.4;
+  const FONT = "11px system-ui, sans-serif";
   let view = null;
+  let labels = [];
 
   function around(x, y, scale, width, height) {
     return {
@@ -61,17 +63,53 @@ dodo.map = (function () {
         context.stroke();
       }
       context.setLineDash([]);
-      if (each.role !== "other" && each.role !== "wall" && each.lines.length) name(context, each);
+      if (each.role !== "other" && each.role !== "wall" && each.lines.length) name(each);
     }
   }
 
-  function name(context, each) {
+  // The name of a line stands beyond one of its ends, or beside its middle.
+  function name(each) {
     const [a, b, c, d] = each.lines[0];
-    const [x, y] = view.to((a + c) / 2, (b + d) / 2);
-    context.fillStyle = dodo.canvas.colour(each.role);
-    context.font = "11px system-ui, sans-serif";
+    const [[x1, y1], [x2, y2]] = [view.to(a, b), view.to(c, d)];
+    const size = Math.hypot(x2 - x1, y2 - y1) || 1;
+    const [dx, dy] = [(x2 - x1) / size, (y2 - y1) / size];
+    const middle = [(x1 + x2) / 2, (y1 + y2) / 2];
+    const places = [[x1 - 9 * dx, y1 - 9 * dy, -dx, -dy], [x2 + 9 * dx, y2 + 9 * dy, dx, dy], [middle[0] + 6, middle[1], 1, 0], [middle[0] - 6, middle[1], -1, 0]];
+    labels.push({ text: each.name, colour: each.role, places });
+  }
+
+  // Each label where it hides neither vehicle nor another one, and else nowhere: what it names is still drawn.
+  function write(context, width, height, taken) {
+    context.font = FONT;
     context.textAlign = "center";
-    context.fillText(each.name, x, y - 6);
+    context.textBaseline = "middle";
+    for (const { text, colour, places } of labels) {
+      const wide = context.measureText(text).width + 4;
+      const boxes = places.map(([x, y, dx, dy]) => ({ x: x + (dx * wide) / 2, y: y + dy * 7, wide, high: 14 }));
+      const isFree = (box) => taken.every((other) => Math.abs(box.x - other.x) > (box.wide + other.wide) / 2 || Math.abs(box.y - other.y) > (box.high + other.high) / 2);
+      const isInside = (box) => box.x > wide / 2 && box.x < width - wide / 2 && box.y > 7 && box.y < height - 7;
+      const box = boxes.find((each) => isInside(each) && isFree(each));
+      if (!box) continue;
+      taken.push(box);
+      context.lineWidth = 3;
+      context.strokeStyle = dodo.canvas.colour("paper");
+      context.strokeText(text, box.x, box.y);
+      context.fillStyle = dodo.canvas.colour(colour);
+      context.fillText(text, box.x, box.y);
+    }
+    context.textBaseline = "alphabetic";
+  }
+
+  // What no label may hide: the vehicle, the place of failure, and the scale.
+  function occupied(time, height) {
+    const [x, y] = view.to(way.pose(time).x, way.pose(time).y);
+    const size = Math.max((way.length || 0.36) * 1.6 * view.scale, 16);
+    const found = [{ x, y, wide: size, high: size }, { x: 55, y: height - 14, wide: 110, high: 28 }];
+    if (test.test.outcome !== "passed") {
+      const at = failed();
+      found.push({ x: at[0], y: at[1], wide: 24, high: 24 });
+    }
+    return found;
   }
 
   function driven(context, poses, colour, thick) {
@@ -135,21 +173,24 @@ dodo.map = (function () {
       context.strokeStyle = context.fillStyle = dodo.canvas.colour("ink");
       context.lineWidth = 1.2;
       context.stroke();
-      context.font = "11px system-ui, sans-serif";
-      context.textAlign = "left";
       const [front, reach] = [Math.max(...body.outline.map(([x]) => x)), Math.max(...body.outline.map(([x, y]) => Math.hypot(x, y)))];
       trace(context, [view.to(pose.x, pose.y), view.to(pose.x + front * cos, pose.y + front * sin)]);
       context.stroke();
-      const [x, y] = view.to(pose.x + reach, pose.y);
-      context.fillText(body.name, x + 4, y + 4);
+      const [x, y] = view.to(pose.x, pose.y);
+      const beside = reach * view.scale + 4;
+      labels.push({ text: body.name, colour: "ink", places: [[x + beside, y, 1, 0], [x - beside, y, -1, 0], [x, y - beside, 0, -1], [x, y + beside, 0, 1]] });
     }
   }
 
   // Where the test failed: a ring and a cross that print well, too.
-  function failure(context) {
+  function failed() {
     const { time, x, y } = test.moment;
     const place = x === null ? way.pose(time) : { x, y };
-    const [sx, sy] = view.to(place.x, place.y);
+    return view.to(place.x, place.y);
+  }
+
+  function failure(context) {
+    const [sx, sy] = failed();
     context.strokeStyle = dodo.canvas.colour("failed");
     context.lineWidth = 2;
     context.beginPath();
@@ -176,6 +217,7 @@ dodo.map = (function () {
   function draw(context, width, height, look) {
     const time = dodo.cursor.time();
     view = look(width, height);
+    labels = [];
     ground(context);
     earlier(context, time);
     driven(context, way.poses, "faint", 2);
@@ -184,6 +226,7 @@ dodo.map = (function () {
     if (test.test.outcome !== "passed") failure(context);
     vehicle(context, way.pose(time), "vehicle");
     scaleBar(context, height);
+    write(context, width, height, occupied(time, height));
   }
 
   function apart(time) {

@@ -65,6 +65,7 @@ dodo.plot = (function () {
     context.textBaseline = "alphabetic";
     const scale = (width - LEFT - RIGHT) / dodo.cursor.last;
     for (const time of dodo.canvas.steps(0, dodo.cursor.last, Math.max(2, width / 90))) {
+      context.textAlign = time ? "center" : "left";
       context.fillText(`${dodo.dom.number(time)} s`, Math.min(LEFT + time * scale, width - RIGHT - 6), height - 3);
     }
   }

@@ -12,8 +12,14 @@ dodo.transport = (function () {
     return make("button", { title, "aria-label": title, onclick: action }, text);
   }
 
+  function jump() {
+    const title = `${seconds(moment.time)}: ${moment.what} (D)`;
+    const text = test.outcome === "passed" ? "Jump to verdict" : "Jump to failure";
+    return make("button", { class: "jump", title, onclick: () => cursor.move(moment.time) }, text);
+  }
+
   function keys(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, input[type=search]")) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, input[type=search], dialog")) return;
     const size = event.shiftKey ? LONG : STEP;
     const actions = {
       ArrowLeft: () => cursor.move(cursor.time() - size),
@@ -22,6 +28,9 @@ dodo.transport = (function () {
       End: () => cursor.move(cursor.last),
       " ": () => cursor.toggle(),
       d: () => cursor.move(moment.time),
+      n: () => dodo.header.step(1),
+      p: () => dodo.header.step(-1),
+      "?": () => dodo.header.help(),
     };
     if (event.key === " " && event.target.closest("button, summary")) return;
     if (!Object.hasOwn(actions, event.key)) return;
@@ -49,7 +58,7 @@ dodo.transport = (function () {
       timeline,
       time,
       speed,
-      button("What decided", `${seconds(moment.time)}: ${moment.what} (D)`, () => cursor.move(moment.time)),
+      jump(),
     );
     cursor.follow((now) => {
       slider.value = now;

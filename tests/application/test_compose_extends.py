@@ -46,7 +46,7 @@ def test_a_service_of_the_same_file(tmp_path: Path) -> None:
         ("{file: sub/common.yml}", "'extends' does not name a service"),
         ("{file: [a], service: base}", "'extends' does not name a service"),
         ("{file: none.yml, service: base}", "there is no file 'none.yml'"),
-        ("{file: sub/common.yml, service: bas}", "there is no service 'bas' to extend"),
+        ("{file: sub/common.yml, service: bas}", "unknown service 'bas' to extend"),
         ("a", "a service extends itself: 'a' extends 'a'"),
     ],
 )

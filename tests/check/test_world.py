@@ -37,9 +37,9 @@ def test_it_is_told_what_it_declares_of_what_only_a_simulation_has(tmp_path: Pat
 
 def test_in_words() -> None:
     assert told_in_words(()) == ""
-    pose = "the application is told its true pose (opendlv.sim.KinematicState/0)"
+    pose = "the application gets its true pose (opendlv.sim.KinematicState/0)"
     assert told_in_words(("opendlv.sim.KinematicState/0",)) == pose
-    assert told_in_words(("dodo.EndOfInput",)) == "the application is told dodo.EndOfInput"
+    assert told_in_words(("dodo.EndOfInput",)) == "the application gets dodo.EndOfInput"
 
 
 def test_services_of_the_deployment_need_not_say_where_they_listen(tmp_path: Path) -> None:

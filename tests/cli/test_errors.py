@@ -113,8 +113,8 @@ def test_commands_that_end_in_errors_name_themselves(tmp_path: Path, monkeypatch
         (["rec", "info", "none.rec"], 2, "dodo rec: none.rec: No such file or directory\n"),
         (["report", "none"], 2, "dodo report: there is no none/results.json\n"),
         (["compile", "none/"], 2, f"dodo compile: there is no test at '{tmp_path / 'none'}'; specs end in .dodo.yml\n"),
-        (["explain", "no-such"], 2, "dodo explain: there is no test 'no-such'"),
-        (["list", "--services", "beakon"], 2, "dodo list: there is no service 'beakon'; did you mean 'beacon'?\n"),
+        (["explain", "no-such"], 2, "dodo explain: unknown test 'no-such'"),
+        (["list", "--services", "beakon"], 2, "dodo list: unknown service 'beakon'; did you mean 'beacon'?\n"),
     ):
         stderr = StringIO()
         assert main(words, StringIO(), stderr) == code, words

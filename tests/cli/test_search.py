@@ -332,7 +332,7 @@ def test_a_missing_driver_of_databases_is_said(search: Search, monkeypatch: pyte
     ("more", "words", "said"),
     [
         ("", ("base",), "base has no ranges to search"),
-        ("", ("nothing",), "there is no test 'nothing'"),
+        ("", ("nothing",), "unknown test 'nothing'"),
         ("matrix: {rate: [1 Hz, 2 Hz]}\nrecord: {frames: '${matrix.rate}'}\n", ("example",), "means 2 tests"),
         ("", ("example", "--runs", "0"), "'0' is not a whole number of at least 1"),
         ("", ("example", "--minutes", "-1"), "'-1' is not a time in minutes"),

@@ -37,7 +37,7 @@ def test_a_shipped_test_that_the_deployment_leaves_out(repository: Path, word: s
     deployment(repository, "tests")
     with pytest.raises(NoSuchTest) as problem:
         select([word], (), ())
-    assert str(problem.value) == f"there is no test '{word}'; {said}: add \"dodo:\" to 'registry' in dodo.yml"
+    assert str(problem.value) == f"unknown test '{word}'; {said}: add \"dodo:\" to 'registry' in dodo.yml"
 
 
 @pytest.mark.thorough
@@ -50,7 +50,7 @@ def test_problems_of_the_deployment_come_before_names_that_it_may_have(repositor
 @pytest.mark.thorough
 def test_who_has_the_shipped_tests_is_not_told_to_add_them(repository: Path) -> None:
     deployment(repository, 'tests, "dodo:"')
-    with pytest.raises(NoSuchTest, match=r"^there is no test 'sil-percept'; did you mean 'sil-perception'"):
+    with pytest.raises(NoSuchTest, match=r"^unknown test 'sil-percept'; did you mean 'sil-perception'"):
         select(["sil-percept"], (), ())
 
 
@@ -87,7 +87,7 @@ def test_parameters_select_the_instances_that_have_them(repository: Path, word: 
         ("sil-perception[light=2]", "no instance of 'sil-perception' has light=2; known: 0.45, 1, 1.8"),
         ("sil-perception[light=0.4]", "no instance of 'sil-perception' has light=0.4; did you mean '0.45'?"),
         ("sil-closed-straight[a=1]", "'sil-closed-straight' has no parameters, because it has no matrix"),
-        ("sil-percept[light=1]", "there is no test 'sil-percept[light=1]'; did you mean 'sil-perception'"),
+        ("sil-percept[light=1]", "unknown test 'sil-percept[light=1]'; did you mean 'sil-perception'"),
         ("sil-closed-left-curve[{}=1]", "'{}' of 'sil-closed-left-curve' is a range of 'vary' and no parameter"),
     ],
 )

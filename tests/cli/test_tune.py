@@ -197,7 +197,7 @@ def test_the_mean_counts_more_than_the_worst(tune: Tune) -> None:
         ("tune: {KP", "# {KP", ("example",), "no parameters to tune"),
         ("action:", "application: {env: {KP: 1}}\naction:", ("example",), "sets 'KP' itself"),
         ("from: 0.2, to: 3", "from: 4, to: 3", ("example",), "'from' is 4, expected less than 'to', 3"),
-        ("", "", ("nothing",), "there is no test 'nothing'"),
+        ("", "", ("nothing",), "unknown test 'nothing'"),
         ("", "", ("base", "--samples", "2"), "'--samples' needs a test with ranges"),
         ("    x-dodo-process: [python, driver.py]\n", "", ("example",), "'x-dodo-process'"),
     ],
@@ -214,7 +214,7 @@ def test_a_rig_drives_no_further_than_it_may(tune: Tune) -> None:
     examples.write(RIG, Path())
     code, out = tune("example", "--runs", "9", "--metres", "18")
     assert (code, len(tune.driven)) == (0, 4), "2.5 m a drive, 2.4 m to its start; what began is ended"
-    assert "on rig emulated: at most 30 min, and 18 m of way" in out
+    assert "on rig emulated: at most 30 min, and 18 m of driving" in out
     assert len(result()["progress"]) == 4
     assert (tune("example", "--runs", "6")[0], len(tune.driven)) == (0, 3), "it goes on"
 

@@ -1,4 +1,4 @@
-"""``docs/explanation/security.md`` says what the tests show."""
+"""``docs/reference/hostile-tests.md`` says what the tests show."""
 
 import runpy
 
@@ -10,4 +10,4 @@ from tests.run.desk import ROOT
 @pytest.mark.slow
 def test_its_table_is_that_of_the_tests() -> None:
     made = runpy.run_path(str(ROOT / "scripts" / "make-security"), run_name="security")
-    assert (ROOT / "docs" / "explanation" / "security.md").read_text() == made["page"](), "run scripts/make-security"
+    assert (ROOT / "docs" / "reference" / "hostile-tests.md").read_text() == made["page"](), "run scripts/make-security"

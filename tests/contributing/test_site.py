@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.contributing import commands_page
+from tests.contributing import commands_page, reference_pages
 
 ROOT = Path(__file__).parents[2]
 
@@ -20,6 +20,11 @@ ROOT = Path(__file__).parents[2]
 )
 def test_the_page_of_commands_is_up_to_date() -> None:
     assert commands_page.PAGE.read_text() == commands_page.text(), "run scripts/make-commands"
+
+
+@pytest.mark.parametrize("page", reference_pages.PAGES, ids=lambda page: page.stem)
+def test_the_reference_of_files_and_variables_is_up_to_date(page: Path) -> None:
+    assert page.read_text() == reference_pages.PAGES[page](), "run scripts/make-reference"
 
 
 class Addresses(HTMLParser):

@@ -26,7 +26,7 @@ def told(process: "subprocess.Popen[str]", result: str) -> str:
         out = stream.read()
     process.wait(timeout=600)
     assert "Traceback" not in out
-    (reason,) = re.findall(rf"^{result} +\S+  (.*?)(?: \(set-up .*\))?$", out, re.MULTILINE)
+    (reason,) = re.findall(rf"^{result} +\S+  (?:.* s  )?(.*?)(?: \(set-up .*\))?$", out, re.MULTILINE)
     return str(reason)
 
 
@@ -59,7 +59,7 @@ def test_disk_with_the_report_is_full(crate: Crate, small_disk: Path, book: Book
     run = crate.start(job)
     out, _ = run.communicate(timeout=600)
     assert run.returncode == 0, out
-    (reason,) = re.findall(r"^PASSED +\S+  (.*?) \(set-up", out, re.MULTILINE)
+    (reason,) = re.findall(r"^PASSED +\S+  .* s  (.*)$", out, re.MULTILINE)
     (note,) = re.findall(r"^ +note: (the report misses files of camera: .*)$", out, re.MULTILINE)
     assert {p.name for p in job.report.iterdir()} == {"logs"}
     book.record("The disk with the report is full", "docker", "passed", f"{reason}; {note}")

@@ -10,11 +10,13 @@ leaks         keeps 20 MB of each picture
 restarts      replaces itself with a new process every twentieth picture
 stops         answers no more after ten pictures, and goes on looking
 silent        waits for nothing and says nothing
+timer         answers 100 times a second, or each --period s, whatever it saw last
 """
 
 import hashlib
 import os
 import sys
+import threading
 import time
 
 from dodo_dsl.opendlv.session import Session
@@ -23,6 +25,7 @@ from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 FLAGS = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
 MANNERS = FLAGS["manner"].split(",")
 KEPT: list[bytearray] = []
+SEEN: list[tuple[int, float]] = []
 REQUESTS = ("opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest")
 
 
@@ -53,11 +56,21 @@ def answer(session: Session, memory: SharedMemory, number: int) -> None:
     if "stops" in MANNERS and number >= 10:
         return
     share = picture[2_000_000 % len(picture) :: 4001].count(picture[-4]) / max(1, len(picture) // 4001)
+    if "timer" in MANNERS:
+        SEEN[:] = [(sampled, share)]
+        return
     say(session, sampled, share)
     if "twice" in MANNERS:
         say(session, sampled, share, 0.05)
     if "restarts" in MANNERS and number % 20 == 19:
         os.execv(sys.executable, [sys.executable, *sys.argv])
+
+
+def tick(session: Session) -> None:
+    while True:
+        time.sleep(float(FLAGS.get("period", "0.01")))
+        for sampled, share in SEEN:
+            say(session, sampled, share)
 
 
 def main() -> None:
@@ -66,6 +79,8 @@ def main() -> None:
             time.sleep(600)
         with attached() as memory:
             number = 0
+            if "timer" in MANNERS:
+                threading.Thread(target=tick, args=(session,), daemon=True).start()
             while memory.wait():
                 answer(session, memory, number)
                 number += 1

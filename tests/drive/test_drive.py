@@ -96,7 +96,7 @@ def test_libcluon_sees_the_camera_and_steers_the_car(tmp_path: Path) -> None:
     hit = re.match(r"hit wall right after (\d+\.\d\d) s ", str(test["reason"]))
     assert hit, test["reason"]
     assert test["execution_s"] > float(hit[1]) - 0.005, "from the begin, when the application listens, to the verdict"
-    assert "the application is told its true pose" in test["reason"]
+    assert "the application gets its true pose" in test["reason"]
     log = (report / "told" / "logs" / "application.cluon.log").read_text()
     seen = [json.loads(line) for line in log.splitlines() if line.startswith("{")]
     if not seen[-1]["valid"]:

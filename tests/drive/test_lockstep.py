@@ -74,6 +74,18 @@ def test_manners_and_the_host_s_bus_change_neither_values_nor_pictures(
     assert surplus(tmp_path) >= 2 * (known - 2)
 
 
+def own_clock(test: dict[str, Any]) -> list[str]:
+    return [note for note in test["notes"] if note.startswith("the application acts by its own clock: ")]
+
+
+def test_a_timer_of_its_own_is_noted(plain: tuple[dict[str, Any], list[str]], tmp_path: Path) -> None:
+    """And that of a program that only waits for frames is not."""
+    test, _ = run(tmp_path, "timer --period=0.005", 1)
+    assert own_clock(test) and test["response"]["unasked"] == test["response"]["pauses"] > 0
+    assert own_clock(plain[0]) == [] and plain[0]["response"]["pauses"] > 0
+    assert plain[0]["response"]["surplus"] == 0
+
+
 def test_no_answer_is_the_application_s_fault(tmp_path: Path) -> None:
     """An answer that is missing, and the memory of the few pictures that it kept."""
     test, _ = run(tmp_path, "stops,leaks", 1)
@@ -127,7 +139,7 @@ def test_libcluon_in_lockstep(tmp_path: Path) -> None:
         report, spec = folder / "report", variant(registry(folder), CURVE, "told", pose="declared")
         dodo("run", str(spec), "--application", str(path), "--report", str(report), code=1)
         test = results(report)["told"]
-        assert re.fullmatch("hit wall left .*; the application is told its true pose .*", test["reason"])
+        assert re.fullmatch("hit wall left .*; the application gets its true pose .*", test["reason"])
         log = (report / "told" / "logs" / "application.app.log").read_text()
         stamps = [json.loads(line)["stamp"] for line in log.splitlines() if line.startswith("{")]
         assert stamps[:3] == [1_700_000_000.0, 1_700_000_000.1, 1_700_000_000.2]
@@ -160,6 +172,19 @@ def test_the_judge_counts_test_time(tmp_path: Path) -> None:
     test = results(report)["sil-short"]
     assert test["outcome"] == "failed"
     assert test["sim_s"] <= 1.0
+
+
+@pytest.mark.proof
+def test_a_timer_on_libcluon_is_noted_each_time(tmp_path: Path) -> None:
+    """And the same program without it never is, nor one that says everything twice."""
+    pytest.importorskip("pycluon")
+    spec = variant(registry(tmp_path), CURVE, "told", pose="declared")
+    for flag, is_noted in (("--period=0.01", True), ("--period=0.1", True), ("", False)):
+        path = application(tmp_path, "cluon_app.py", f"--steering=0.12 {flag}", **{"x-dodo": TOLD})
+        for _ in range(3):
+            dodo("run", str(spec), "--application", str(path), "--report", str(tmp_path / "report"), code=1)
+            assert bool(own_clock(results(tmp_path / "report")["told"])) is is_noted
+    assert own_clock(run(tmp_path / "twice", "own-times,twice", 1)[0]) == []
 
 
 @pytest.mark.proof

@@ -37,5 +37,5 @@ def test_an_application_that_sees_no_car_fails(tmp_path: Path) -> None:
     found = results(report)
     assert found[CLOSED]["reason"].startswith("came within 0.097 m of body kiwi after 2.67 s at x = ")
     assert found[PERCEPTION]["reason"].startswith(
-        "precision of car has no value (at least 0.7), as nothing was detected"
+        "precision of car has no value (at least 0.7), because nothing was detected"
     )

@@ -6,8 +6,10 @@ import subprocess
 import sys
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
 from dodo_dsl.cli import main
 
@@ -25,6 +27,13 @@ def run(*words: str) -> tuple[int, str, str]:
         patch.setattr(main, "parser", _parser)
         code = main.main(words, stdout, stderr)
     return code, stdout.getvalue(), stderr.getvalue()
+
+
+def pipeline(text: str) -> dict[str, Any]:
+    """A child pipeline as GitLab sees it: each job with what it extends, and no hidden one."""
+    read = yaml.safe_load(text)
+    made = {k: {**read[v["extends"]], **v} if isinstance(v, dict) and "extends" in v else v for k, v in read.items()}
+    return {key: value for key, value in made.items() if not key.startswith(".")}
 
 
 def tree(folder: Path) -> dict[str, bytes]:

@@ -16,12 +16,14 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.pipeline_rules import KINDS
+from tests.emit.readers import pipeline
 from tests.gitlab.inputs import TEMPLATES, Refused, included, jobs, listed, merged, specified
 
 APPLICATION, DEPLOYMENT, RUN = TEMPLATES
 TRIGGERS = {"allow_failure", "extends", "inherit", "interruptible", "needs", "rules", "stage", "trigger", "variables"}
 """Keywords of a job that triggers a pipeline, of those that GitLab allows: no image, tags, script or artifacts."""
 PAGE = Path(__file__).parents[2] / "docs/how-to/gitlab.md"
+PAGES = [PAGE, *PAGE.parent.glob("gitlab-*.md")]
 SHIPPED_TEST = str(package_data.registry() / "sil-closed-straight")
 DIGEST = "sha256:" + "0123456789abcdef" * 4
 
@@ -134,7 +136,7 @@ def test_what_the_child_s_jobs_have_reaches_the_compiler(template: Path, tmp_pat
     assert all(variables[name]["expand"] is False for name in options), "the child's jobs have these variables"
     result = run_script(jobs(config)["compile"], tmp_path, {**given, "DODO_COMPILE_OPTIONS": SHIPPED_TEST})
     assert result.returncode == 0, result.stderr + result.stdout
-    child = yaml.safe_load((tmp_path / "generated/child.gitlab-ci.yml").read_text())
+    child = pipeline((tmp_path / "generated/child.gitlab-ci.yml").read_text())
     (job,) = [job for job in child.values() if "script" in job]
     assert (job["services"], job["tags"], job["image"]) == (services, ["a b"], "dodo:1")
     assert job["artifacts"]["access"] == "developer"
@@ -473,7 +475,7 @@ def test_an_application_without_a_build_has_no_images(tmp_path: Path, accepted: 
 
 
 def test_the_page_s_variables_are_those_of_the_templates() -> None:
-    page = PAGE.read_text()
+    page = "".join(page.read_text() for page in PAGES)
     templates = "".join(template.read_text() for template in TEMPLATES)
     for variable in set(re.findall(r"DODO_[A-Z_]+[A-Z]", page)) - {
         "DODO_IMAGE",
@@ -488,10 +490,14 @@ def test_the_page_s_variables_are_those_of_the_templates() -> None:
 
 
 def test_the_page_s_inputs_are_those_of_the_templates() -> None:
-    blocks = [yaml.safe_load(b) for b in re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)]
+    blocks = [
+        yaml.safe_load(b) for b in re.findall(r"```yaml\n(.*?)```", "".join(map(Path.read_text, PAGES)), re.DOTALL)
+    ]
     includes = [entry for block in blocks for entry in block.get("include", [])]
     assert len(includes) >= len(TEMPLATES)
-    assert "`compile`" in PAGE.read_text().partition("## One job")[0], "the one name that others may have"
+    assert "`compile`" in PAGE.read_text().partition("## A deployment repository")[0], (
+        "the one name that others may have"
+    )
     for entry in includes:
         assert entry["inputs"]["stage"] == "test", "who has stages of their own has to see where one goes"
         name = re.search(r"(\w+)(\.gitlab-ci\.yml|@[\d.]+)$", entry.get("local", entry.get("component")))

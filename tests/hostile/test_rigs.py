@@ -221,7 +221,7 @@ def test_only_permitted_repositories_use_a_rig(
     rig(repository)
     rules(rigs=permitted(repository / "other"))
     code, output = dodo("rig", *words)
-    assert (code, "may not use rig 'ours' of" in output) == (2, True), output
+    assert (code, "may not use rig 'ours': it is not in" in output) == (2, True), output
     rules(rigs=permitted(repository))
     assert "may not use" not in dodo("rig", *words)[1]
 
@@ -233,7 +233,7 @@ def test_only_the_operator_s_devices_are_used(
     rig(repository, port="/dev/zero")
     rules(rigs=permitted(repository))
     code, output = dodo("rig", *words)
-    assert (code, "'/dev/zero' is not a rig's device in" in output) == (2, True), output
+    assert (code, "'/dev/zero' is not a device of a rig in" in output) == (2, True), output
 
 
 @pytest.mark.parametrize("words", MOTIONS, ids=lambda words: words[0])

@@ -70,7 +70,7 @@ def jpeg(width: int, height: int) -> bytes:
 
 
 BOMBS = {"png": png(SIDE, SIDE), "jpg": jpeg(SIDE, SIDE)}
-TOO_LARGE = f"a picture of {SIDE} x {SIDE} pixels, expected at most {MAX_PIXELS} in all"
+TOO_LARGE = f"an image of {SIDE} x {SIDE} pixels, expected at most {MAX_PIXELS} in all"
 
 
 @pytest.mark.parametrize("kind", BOMBS)
@@ -92,7 +92,7 @@ def test_a_truth_of_such_a_picture_is_refused() -> None:
 )
 def test_a_picture_whose_size_cannot_be_read_is_not_decoded(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.png").write_bytes(content)
-    with pytest.raises(MapError, match="not a readable picture, expected PNG or JPEG"):
+    with pytest.raises(MapError, match="not a readable image, expected PNG or JPEG"):
         load_picture(tmp_path / "a.png")
 
 
@@ -162,7 +162,7 @@ def test_frames_that_a_message_calls_too_large_are_not_decoded(record: Callable[
         found = [frame for _, frame in decoded(recording, recording.rows(messages=[IMAGE]), told.append)]
     assert [frame and (frame.width, frame.height) for frame in found] == [None, None, (WIDTH, HEIGHT)]
     (sentence,) = told
-    assert sentence.startswith("frames cannot be decoded: a picture of 16000 x 16000 pixels, expected at most")
+    assert sentence.startswith("frames cannot be decoded: an image of 16000 x 16000 pixels, expected at most")
 
 
 def test_frames_that_lie_about_their_size_are_not_decoded_either(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -183,7 +183,7 @@ def test_what_was_built_for_another_platform_is_not_pushed(docker: Path) -> None
 
 def test_a_wrong_platform_says_how_to_write_them(docker: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("build", "--platform", "arm64")[0] == Exit.USAGE
-    assert "there is no platform 'arm64'; write them as linux/amd64,linux/arm64" in capsys.readouterr().err
+    assert "unknown platform 'arm64'; write platforms as linux/amd64,linux/arm64" in capsys.readouterr().err
 
 
 def test_builds_have_contexts_of_their_own(docker: Path, monkeypatch: pytest.MonkeyPatch) -> None:

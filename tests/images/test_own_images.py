@@ -102,7 +102,7 @@ def test_without_a_dockerfile(repository: Repository) -> None:
     code, said = repository.run("build", "smoothness", "--prefix", PREFIX)
     assert (code, said) == (
         Exit.USAGE,
-        "dodo images: there is no Dockerfile beside the service.yml of 'smoothness': write one there, or build "
+        "dodo images: there is no Dockerfile next to the service.yml of 'smoothness': write one there, or build "
         f"{PREFIX}/smoothness:{__version__} from your own Dockerfile on {PREFIX}/base:{__version__}\n",
     )
 

@@ -135,7 +135,7 @@ def test_services_of_dodo_come_with_the_docker_backend_alone(tmp_path: Path, ans
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--for", "desc"), "there is no rig 'desc' in dodo.yml; did you mean 'desk'?"),
+        (("--for", "desc"), "unknown rig 'desc' in dodo.yml; did you mean 'desk'?"),
         (("--for", "idle"), "no test runs on rig 'idle'"),
     ],
 )

@@ -25,7 +25,7 @@ def hover(editor: Editor, path: Path, text: str, word: str) -> str:
 @pytest.mark.parametrize(
     ("word", "parts"),
     [
-        ("freq:", ["**freq**: number in Hz, default `10 Hz`", "Rate of the pictures. From 0.1 to 1000 Hz."]),
+        ("freq:", ["**freq**: number in Hz, default `10 Hz`", "Rate of the images. From 0.1 to 1000 Hz."]),
         ("10 Hz", ["**freq**: number in Hz"]),
         ("walls:", ["**walls**: list", "must not be touched"]),
         ("right]", ["**walls**: list"]),

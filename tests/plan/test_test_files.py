@@ -97,7 +97,7 @@ def test_shared_files_are_those_that_were_compiled(tmp_path: Path, monkeypatch: 
     (folder / "files/a.rec").symlink_to(f"../../{SHARED}/{name}")
     place = folder.parent / SHARED
     place.mkdir()
-    assert "has to be where they are" in file_problem(folder, shared)
+    assert "has to stay with them" in file_problem(folder, shared)
     (place / name).symlink_to("../../a.rec")
     assert "'a.rec' is not in this checkout; commit it" in file_problem(folder, shared)
     (tmp_path / "a.rec").write_text("drive")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dodo_dsl.run.docker.compose import trace, traced
+from dodo_dsl.run.docker.compose import traced
 from tests.plan.plans import BASE
 
 
@@ -17,7 +17,7 @@ from tests.plan.plans import BASE
     ],
 )
 def test_the_service_that_a_message_names(text: str, line: int | None) -> None:
-    place = trace(BASE, text)
+    place = BASE.place_named_in(text)
     assert (place.line if place else None) == line
 
 

@@ -85,7 +85,7 @@ def test_the_boxes_of_a_truth_for_every_frame(drive: Path, tmp_path: Path) -> No
             (),
             "images[0].width: expected a whole number of pixels above 0",
         ),
-        ('{"images": []}', (), "has 0 images, expected one picture"),
+        ('{"images": []}', (), "has 0 images, expected one"),
         (truth_text([], "", 7, 7), ("--labels", "3"), "--truth and --labels exclude each other"),
         (truth_text([], "", 7, 7), (), "truth.json: has no box"),
     ],

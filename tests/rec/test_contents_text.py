@@ -37,5 +37,5 @@ def test_what_is_odd_is_said() -> None:
     assert "camera frames: 5 packets, 4 decoded" in lines
     assert "2 steps back in time, 1 messages without a sample time" in lines
     assert sum(line.startswith("skipped 1 byte at byte ") for line in lines) == 10
-    assert "skipped 12 bytes at 12 places in all" in lines
+    assert "skipped 12 bytes at 12 positions in all" in lines
     assert "camera frames: 5 packets, not decoded" in text(replace(odd, frames=Frames(5, None)))

@@ -36,7 +36,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TruthError, match="cannot be read: No such file"):
         given(tmp_path / "none.png")
     for data in (b"", b"no picture"):
-        with pytest.raises(TruthError, match="desk: not a readable picture"):
+        with pytest.raises(TruthError, match="desk: not a readable image"):
             decoded(data, "desk")
 
 

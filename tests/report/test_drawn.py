@@ -27,7 +27,9 @@ def test_each_test_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert write_report(report, outcomes, tests, drawn=drawings.problems()) == []
     assert pages == ["first", "second", "last"]
     index = (report / "index.html").read_text()
-    assert all(f'href="{slug}/drive.html"' in index and f'"{slug}/trajectory.png"' in index for slug in tests)
+    assert all(f'href="{slug}/drive.html"' in index for slug in tests)
+    assert index.count('<path class="failed" d="M') == len(tests)
+    assert (report / "_viewer" / "failed.js").read_text().count('"failed"') == len(tests)
 
 
 def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
@@ -57,7 +59,7 @@ def test_on_a_full_disk_results_have_the_room_of_pages(small_disk: Path, tmp_pat
     with Drawings(small_disk) as drawings:
         drawings.begin(OUTCOME, test)
     data = small_disk / OUTCOME.slug / "drive.js"
-    data.write_bytes(data.read_bytes() + bytes(28_000))
+    data.write_bytes(data.read_bytes() + bytes(32_000))
     with (small_disk / "full").open("wb", buffering=0) as file, pytest.raises(OSError, match="No space left"):
         while True:
             file.write(bytes(4096))

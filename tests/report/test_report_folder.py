@@ -6,12 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import yaml
 
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.outcome import Outcome, with_margin
 from dodo_dsl.report import results
-from dodo_dsl.report.overview import MEANINGS
+from dodo_dsl.report.check_display import MEANINGS, meaning
 from dodo_dsl.report.report_folder import Drawable, forget, write_report
 from tests.run.helpers import Bench
 
@@ -52,7 +53,8 @@ def test_a_snapshot_is_shown_beside_the_drive(tmp_path: Path) -> None:
     outcomes = [replace(OUTCOME, name=slug, slug=slug) for slug in slugs]
     write_report(tmp_path, outcomes, {"drive": Drawable(Bench(tmp_path).plan(), tmp_path)})
     page, junit = ((tmp_path / name).read_text() for name in ("index.html", "junit.xml"))
-    assert re.findall(r'src="(.*?)"', page) == ["drive/trajectory.png", "drive/snapshot.png", "look/snapshot.png"]
+    assert re.findall(r'src="(.*?)"', page) == ["drive/snapshot.png", "look/snapshot.png"]
+    assert page.count('<path class="failed" d="M') == 1  # the drive, in the page itself
     assert [path.split("/", 1)[1] for path in re.findall(r"ATTACHMENT\|(.*?)]]", junit)] == [
         "drive/trajectory.png",
         "look/snapshot.png",
@@ -88,16 +90,19 @@ def test_the_page_leads_to_spec_and_recording(tmp_path: Path, monkeypatch: pytes
     assert '<p class="about">Drive &amp; turn.</p>' in page
     assert page.count('class="about"') == 1
     assert re.findall(r'href="([^"#]*)"', page) == ["data:,", "../../t/t.dodo.yml", "test/test.rec"]
-    assert "Test: t/gone.dodo.yml" in page
-    assert "<td>late<br><small>samples or detections that came too late to be judged, ignored</small></td>" in page
-    assert "<td>mean</td>" in page
+    assert "<dt>Test</dt><dd>t/gone.dodo.yml</dd>" in page
+    assert "<dt>late</dt><dd>samples or detections that came too late to be judged, ignored</dd>" in page
+    assert "<b>mean</b> 2</span>" in page
     assert "<td>at most 0.75\u00a0s</td><td>0.25\u00a0s</td>" in page
 
 
-def test_what_the_page_explains_are_checks_of_services() -> None:
-    folder = Path(__file__).parents[2] / "services"
-    pages = "".join((folder / name / "README.md").read_text() for name in ("continuous_signal", "object_detection"))
-    assert [name for name in MEANINGS if f"`{name}`" not in pages] == []
+def test_the_page_explains_every_check_of_a_shipped_evaluator_and_no_other() -> None:
+    services = Path(__file__).parents[2] / "services"
+    names = {
+        name for file in services.glob("*/service.yml") for name in yaml.safe_load(file.read_text()).get("checks", ())
+    }
+    assert [name for name in names if not meaning({"name": name.replace("*", "blue")})] == []
+    assert {*MEANINGS} - names == {"slow-answers", "uncopied-sample-times"}
 
 
 def test_forgetting_spares_what_is_not_a_report(tmp_path: Path) -> None:

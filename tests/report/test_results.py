@@ -77,8 +77,9 @@ def test_what_services_used_is_kept_and_drawn(tmp_path: Path) -> None:
     first, second = results.load(tmp_path / "results.json")[0].resources
     assert (first, second) == (replace(uses[0], processor_s=1.235, processor_share=0.25), uses[1])
     page = (tmp_path / "index.html").read_text()
-    for shown in ("1.23 s (25 %)", "150 MB", "300 MB/min", "1,460 MB", "too short to tell"):
-        assert f">{shown}</td>" in page
+    for use in uses:
+        assert f"<dt>Used by {use.service}</dt><dd>{use.in_words()}" in page
+    assert "growing by 300 MB/min; it may use 2,000 MB of memory</dd>" in page
     assert (
         second.in_words()
         == "2.00 s of processor time, up to 1,460 MB of memory, and the test was too short to measure its growth"

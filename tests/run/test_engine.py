@@ -483,7 +483,7 @@ def test_what_the_application_must_not_send_fails_the_test_whenever_it_is_read()
 
 
 def test_a_verdict_says_what_the_application_is_told() -> None:
-    told = "the application is told its true pose (opendlv.sim.Frame)"
+    told = "the application gets its true pose (opendlv.sim.Frame)"
     for stages, expected in ((drives(), f"it drove; {told}"), ({**READY, "begin": [(1.0, Lost("gone"))]}, "gone")):
         found = outcome(ScriptedBackend(replace(plan(), told=("opendlv.sim.Frame",)), stages))
         assert found.reason == expected
@@ -506,8 +506,8 @@ def test_losses_and_notes_count_until_teardown_has_ended_and_nothing_else_does()
         "passed",
         (
             "a file is missing",
-            "service 'camera' lost 30 messages, as its receive buffer was full: it worked without them",
-            "service 'track' lost 1 message, as its receive buffer was full: its verdict does not consider them",
+            "service 'camera' lost 30 messages, because its receive buffer was full: it worked without them",
+            "service 'track' lost 1 message, because its receive buffer was full: its verdict does not consider them",
         ),
     )
 

@@ -87,7 +87,7 @@ PLAIN = PlannedService("environment", "a", "x", "x", ())
     ids=["other", "recorder", "evaluator"],
 )
 def test_what_losses_mean(service: PlannedService, meaning: str) -> None:
-    assert lost_messages(service, 2) == f"service 'a' lost 2 messages, as its receive buffer was full: {meaning}"
+    assert lost_messages(service, 2) == f"service 'a' lost 2 messages, because its receive buffer was full: {meaning}"
 
 
 @pytest.mark.parametrize(

@@ -205,7 +205,7 @@ def test_what_a_busy_machine_left_undecided_is_tried_again_alone(crowded: Scene)
         ("b", "passed", "it drove"),
         ("c", "passed", "it drove"),
     ]
-    assert a.notes == (f"tried again alone, as the machine was too busy: {TOO_BUSY}",)
+    assert a.notes == (f"tried again alone, because the machine was too busy: {TOO_BUSY}",)
     assert crowded.begins == [(0.0, 1), (7.0, 1)], "when the others have ended"
     assert [slug for slug, text in crowded.progress.phases if text in ("passed", "failed", "error")][-1:] == ["a"]
     assert [left for _, left in crowded.progress.rests] == [2, 1]
@@ -280,7 +280,7 @@ def test_a_report_that_cannot_be_moved_ends_the_retries_of_its_test_alone(logged
     a, b = logged.run(*plans("ab"))
     assert (a.outcome, b.outcome) == ("error", "failed")
     assert a.notes[0] == f"attempt 1 ended in error: {CRASHED}"
-    assert a.notes[1].startswith("not retried, as its report cannot be moved: ")
+    assert a.notes[1].startswith("not retried, because its report cannot be moved: ")
 
 
 @pytest.mark.parametrize(

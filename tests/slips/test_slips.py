@@ -86,7 +86,7 @@ def test_its_fix_makes_it_yaml(name: str) -> None:
 def test_patterns_are_not_tried_on_lines_as_long_as_a_file() -> None:
     """Some would take minutes for what strangers write."""
     messages = [parse(f"a: {'x ' * words}y: z", "long.yml")[1][0].message for words in (100, 100_000)]
-    assert messages == ["a second colon in the value of 'a', which has to be one text", "':' is not expected here"]
+    assert messages == ["a second colon in the value of 'a', which must be one string", "':' is not expected here"]
 
 
 @pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])

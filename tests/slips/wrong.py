@@ -153,7 +153,7 @@ SLIPS = {
     ),
     "brackets-round": Wrong(
         {15: "  pose: (uses: integrator)"},
-        "15:14 yaml-syntax: a second colon in the value of 'pose', which has to be one text",
+        "15:14 yaml-syntax: a second colon in the value of 'pose', which must be one string",
         "write braces: 'pose: {uses: integrator}'",
     ),
     "char-at": Wrong(
@@ -229,7 +229,7 @@ SLIPS = {
     ),
     "colon-in-text": Wrong(
         {3: "description: Note: drive along a straight track to the finish line."},
-        "3:18 yaml-syntax: a second colon in the value of 'description', which has to be one text",
+        "3:18 yaml-syntax: a second colon in the value of 'description', which must be one string",
         "write the text in quotes",
     ),
     "colon-missing-section": Wrong(
@@ -356,7 +356,7 @@ SLIPS = {
     ),
     "keys-in-one-line": Wrong(
         {4: "level: sil kind: closed-loop", 5: None},
-        "4:16 yaml-syntax: a second colon in the value of 'level', which has to be one text",
+        "4:16 yaml-syntax: a second colon in the value of 'level', which must be one string",
         "write 'kind: closed-loop' into a new line, or the text in quotes",
     ),
     "list-behind-key": Wrong(
@@ -406,7 +406,7 @@ SLIPS = {
     ),
     "mapping-behind-key": Wrong(
         {15: "  pose: uses: integrator"},
-        "15:13 yaml-syntax: a second colon in the value of 'pose', which has to be one text",
+        "15:13 yaml-syntax: a second colon in the value of 'pose', which must be one string",
         "write a mapping in braces, 'pose: {uses: integrator}', or into the next lines",
     ),
     "mapping-for-list": Wrong(

@@ -1,6 +1,6 @@
 """Makes the maps beside this file: python tests_registry/maps/make_maps.py [FOLDER].
 
-Yellow cones stand on the left of a track, blue ones on its right, and two large red ones beside the
+Yellow cones stand on the left of a track, blue ones on its right, and two large red ones next to the
 finish. Obstacles: ``left`` and ``right`` are walls through the cones, ``finish`` is the line across the
 lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it names another start; its rows begin behind
 the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
@@ -110,7 +110,7 @@ BOARD = {
     "yellow": [(0.30, 0.172), (0.36, 0.07), (0.52, 0.13), (0.56, -0.05)],
     "blue": [(0.30, -0.08), (0.42, 0.072), (0.44, -0.18), (0.58, 0.04)],
 }
-"""Where the cones of the static rig stand: one at the edge of the picture, one partly behind another."""
+"""Where the cones of the static rig stand: one at the edge of the frame, one partly behind another."""
 
 
 def poses(sections: list[Section], offset: float, start: Place) -> Iterator[Place]:
@@ -137,7 +137,7 @@ def row(sections: list[Section], offset: float, start: Place) -> list[Point]:
 
 
 def across(place: Place, reach: float) -> list[Point]:
-    """The two points ``reach`` m to the left and to the right of a place."""
+    """The two points ``reach`` m to the left and to the right of a position."""
     return [row([Section(1.0)], side * reach, place)[0] for side in (1, -1)]
 
 

@@ -1,12 +1,12 @@
 """Makes the recordings beside this file: python tests_registry/recordings/make_recordings.py [FOLDER].
 
 They are simulated drives with what a real camera adds: a lens that bends, a shutter that blurs what moves, and noise,
-before a background that is not empty. The pictures go through DoDo's own camera, vehicle, integrator and recorder,
+before a background that is not empty. The frames go through DoDo's own camera, vehicle, integrator and recorder,
 without a bus and by their own time, so that the same bytes come out again (with the same libx264; another one
-may choose other bits for the same pictures).
+may choose other bits for the same frames).
 
 ``kiwi-track.rec`` is a drive on the map ``kiwi-track``: from the start through the first corners, by a driver who
-knows the track. Beside the camera's pictures it holds Frame, KinematicState, and the driver's requests for steering
+knows the track. Beside the camera's frames it holds Frame, KinematicState, and the driver's requests for steering
 and pedal, under the sender stamp 0 as applications send theirs. ``static-rig.rec`` is the board of the static rig, from
 where its camera stands, in ordinary light, in bright light, and in the dusk.
 """
@@ -91,7 +91,7 @@ class Recorded:
         self._recording.write(Envelope(self.messages.id(name), payload, now, now, now, sender_stamp))
 
     def show(self, i420: Any, now: int) -> None:
-        """Record a picture."""
+        """Record a frame."""
         width, height = SIZE
         data = self._encoder.encode(pixels.view(i420.tobytes(), "i420", width, height))
         fields = {"format": FORMAT, "width": width, "height": height, "data": data, "sampleId": self._pictures}
@@ -135,7 +135,7 @@ class Driver:
 
 
 def drive(recorded: Recorded) -> None:
-    """The car on the Kiwi track; the driver looks with each picture."""
+    """The car on the Kiwi track; the driver looks with each frame."""
     vehicle, driver = Vehicle(VEHICLE_HZ), Driver("kiwi-track")
     body = Integrator(BodyPose((0.0, 0.0, 0.0), quaternion(0.0, 0.0, math.pi / 2)))
     eye = camera(recorded, "kiwi-track", ORDINARY)
@@ -157,7 +157,7 @@ def drive(recorded: Recorded) -> None:
 
 
 def ticks(length: float) -> Iterator[tuple[int, bool]]:
-    """Test times in us at the vehicle's rate, and whether a picture is due."""
+    """Test times in us at the vehicle's rate, and whether a frame is due."""
     for tick in range(round(length * VEHICLE_HZ) + 1):
         yield BEGIN + tick * 1_000_000 // VEHICLE_HZ, tick % (VEHICLE_HZ // CAMERA_HZ) == 0
 

@@ -44,7 +44,7 @@ MAPS = _maps()
 
 
 def centre(name: str, along: float) -> Place:
-    """The place on a track's centre line after so many metres; it goes straight on behind the finish."""
+    """The position on a track's centre line after so many metres; it goes straight on behind the finish."""
     x, y, heading = MAPS.TRACKS[name].start
     for section in [*MAPS.TRACKS[name].sections, MAPS.Section(100.0)]:
         part = min(1.0, along / section.length)

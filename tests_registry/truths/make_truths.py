@@ -2,8 +2,8 @@
 
 ``static-rig.json`` is COCO JSON, in pixels, for the emulated static rig: the cones of the map ``static-rig`` as a
 camera of 640 x 480 pixels sees them from 9.5 cm above x = 0, y = 0, along +x and level, with a vertical field of view
-of 48.8 degrees. A box holds the whole cone, also what another cone hides of it, and ends where the picture does. A
-real rig has another truth: one that was made of its own picture.
+of 48.8 degrees. A box holds the whole cone, also what another cone hides of it, and ends where the frame does. A
+real rig has another truth: one that was made of its own frame.
 """
 
 import importlib.util

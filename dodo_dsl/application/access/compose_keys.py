@@ -20,9 +20,9 @@ TOP = _table(
         "services": KeyRow("rewritten", "see the keys of a service"),
         "volumes": KeyRow("rewritten", "each test has its own"),
         "secrets configs": KeyRow("kept", "from files of the repository, and from variables that are passed"),
-        "networks": KeyRow("removed", "each test has a network of its own"),
+        "networks": KeyRow("removed", "each test has its own network"),
         "include": KeyRow("rewritten", "DoDo merges the files itself"),
-        "name": KeyRow("removed", "each test is a project of its own"),
+        "name": KeyRow("removed", "each test is its own project"),
         "version": KeyRow("removed", "compose ignores it"),
         "models": KeyRow("refused", "the engine's model runner is shared by all tests"),
         "jobs": KeyRow("refused", "a test starts services and no schedules"),
@@ -114,7 +114,7 @@ SERVICE = _table(
         "restart": KeyRow("removed", "containers are not restarted"),
         "scale": KeyRow("removed", "each service runs once"),
         "secrets": KeyRow("kept", "what the top-level 'secrets' name"),
-        "stdin_open": KeyRow("kept", "nobody types"),
+        "stdin_open": KeyRow("kept", "no keyboard is attached"),
         "stop_grace_period": KeyRow("kept", "DoDo waits 2 s"),
         "stop_signal": KeyRow("kept", "a signal to the container"),
         "sysctls": KeyRow("kept", "the engine allows those of the container's namespaces only"),
@@ -140,8 +140,8 @@ BUILD = _table(
         "isolation": KeyRow("removed", "it is for Windows"),
         "labels": KeyRow("removed", "programs of the host act on them"),
         "network": KeyRow("kept", "default and none only", values.build_network),
-        "no_cache": KeyRow("kept", "builds anew"),
-        "no_cache_filter": KeyRow("kept", "builds stages anew"),
+        "no_cache": KeyRow("kept", "builds again"),
+        "no_cache_filter": KeyRow("kept", "builds stages again"),
         "platforms": KeyRow("kept", "which image is built"),
         "privileged": KeyRow("rewritten", "in hil tests only, where the rig allows it", values.privileged_build),
         "provenance sbom": KeyRow("kept", "what is said of the image"),
@@ -160,7 +160,7 @@ MOUNT = _table(
         "consistency": KeyRow("kept", "Linux ignores it"),
         "image": KeyRow("kept", "a folder of an image"),
         "read_only": KeyRow("kept", "less access"),
-        "source": KeyRow("rewritten", "of the repository, to be read or as a copy; see docs/reference/applications.md"),
+        "source": KeyRow("rewritten", "of the repository, to be read or as a copy; see docs/reference/sandbox.md"),
         "target": KeyRow("kept", "a path in the container"),
         "tmpfs": KeyRow("rewritten", "the memory of `sandbox` at most"),
         "type": KeyRow("kept", "bind, volume, tmpfs and image only", values.mount_type),
@@ -184,7 +184,7 @@ MOUNTED_VOLUME = _table(
 )
 DEPLOY = _table(
     {
-        "endpoint_mode": KeyRow("removed", "each test has a network of its own"),
+        "endpoint_mode": KeyRow("removed", "each test has its own network"),
         "labels": KeyRow("removed", "programs of the host act on them"),
         "mode replicas rollback_config update_config": KeyRow("removed", "each service runs once"),
         "placement": KeyRow("removed", "a test runs on one machine"),
@@ -216,7 +216,7 @@ VOLUME = _table(
 NETWORK = _table(
     {
         "attachable driver driver_opts enable_ipv4 enable_ipv6 external ipam labels name": KeyRow(
-            "removed", "each test has a network of its own"
+            "removed", "each test has its own network"
         ),
         "internal": KeyRow("removed", "a test's network has no way out unless dodo.yml allows it"),
     }

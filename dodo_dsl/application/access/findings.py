@@ -37,7 +37,7 @@ def service_findings(name: str, service: Mapping[str, Any], look: Look) -> Itera
 
 
 def shared_findings(document: Mapping[str, Any], look: Look) -> Iterator[AccessFinding]:
-    """Everything beside the services, in the file's other keys; in a compiled test compose names all."""
+    """Everything except the services, in the file's other keys; in a compiled test compose names all."""
     for finding in mapping_findings("the compose file", TOP, document, replace(look, compiled=False)):
         about = document.get(str(finding.steps[0])) if finding.kind == "unknown" else None
         is_service = isinstance(about, dict) and about.keys() & _OF_SERVICES

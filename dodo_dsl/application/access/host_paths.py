@@ -57,7 +57,7 @@ def _is_home(folder: Path) -> bool:
 class HostPaths:
     """Judges paths that are relative to ``folder``; ``roots`` are the repository's, ``allowed`` what dodo.yml names.
 
-    ``tmp`` tells that the host's ``/tmp`` and shared memory may be mounted, or are the test's own. A path with a
+    ``tmp`` means that the host's ``/tmp`` and shared memory may be mounted, or are the test's own. A path with a
     variable is judged when that is filled in: then paths are ``literal``, and a dollar sign is one.
     """
 
@@ -177,7 +177,7 @@ _RULE = re.compile(r"[ac] ([0-9]+|\*):([0-9]+|\*) [rwm]+")
 
 
 def is_port(device: str, ports: Iterable[str]) -> bool:
-    """Whether a device file is a rig's port, one of its names, or a way to it."""
+    """Whether a device file is a rig's port, one of its names, or a path to it."""
     files = list(_files(ports))
     names = _names(device)
     return bool(files) and any(name in files or _is_below(name, _WAYS) for name in names)
@@ -221,7 +221,7 @@ def _is_below(path: str, folders: Iterable[str]) -> bool:
 
 
 def _numbers(files: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """The kernel's numbers of ports that are there: of each one its own, and all beside it."""
+    """The kernel's numbers of ports that are there: of each one its own, and all others."""
     for file in files:
         try:
             number = Path(file).stat().st_rdev

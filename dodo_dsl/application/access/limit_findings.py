@@ -81,7 +81,7 @@ def _number(value: object) -> float:
 
 
 def _is_above(value: object, most: float, measure: Callable[[object], float], is_at_least_1: bool = False) -> bool:
-    """Whether a value is above ``most``, or is 0 where that sets no limit; never for a variable."""
+    """Whether a value is above ``most``, or is 0 if that sets no limit; never for a variable."""
     return "$" not in str(value) and (measure(value) > most or (is_at_least_1 and not measure(value)))
 
 

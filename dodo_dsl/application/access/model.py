@@ -35,8 +35,8 @@ Treatment = Literal["kept", "rewritten", "removed", "refused"]
 class Access:
     """What a test's application may use of its host.
 
-    ``roots`` are folders whose files are the application's own, beside those of its repository, ``paths`` others that
-    it may mount, ``passed`` variables of DoDo's own environment. ``outside`` tells whether it may reach other networks,
+    ``roots`` are folders whose files are the application's own, besides those of its repository, ``paths`` others that
+    it may mount, ``passed`` variables of DoDo's own environment. ``outside`` says whether it may reach other networks,
     ``devices`` and ``privileged`` what its rig allows. ``ports`` are those of the deployment's rigs: it gets none.
     """
 
@@ -78,8 +78,8 @@ class Look:
     """What a service, a volume, a secret or a config called ``name`` is judged by; ``what`` it is, with an article.
 
     ``containers`` and ``volumes`` are the application's, ``ports`` those of rigs, ``limits`` the highest that it may
-    set. ``passed`` are variables of DoDo's own environment. ``compiled`` tells that a test's copy is judged, as compose
-    shows it: ``images`` are then DoDo's own, and ``own_network`` tells that the test has one.
+    set. ``passed`` are variables of DoDo's own environment. ``compiled`` means that a test's copy is judged, as compose
+    shows it: ``images`` are then DoDo's own, and ``own_network`` means that the test has one.
     """
 
     paths: HostPaths
@@ -133,7 +133,7 @@ def items(written: Any, *keys: str) -> Iterator[tuple[Steps, Any]]:
 
 
 def at(written: Any, keys: Steps) -> Any:
-    """The value that the keys lead to; None where there is none."""
+    """The value that the keys lead to; None if there is none."""
     for key in keys:
         written = written.get(key) if isinstance(written, dict) else None
     return written
@@ -162,7 +162,7 @@ def diagnostic(finding: AccessFinding, node: Node, key: Span) -> Diagnostic:
     span = place(node, finding.steps, key, of_key=finding.kind == "unknown")
     if finding.kind == "unknown":
         own = (
-            f"a key of your own begins with x-, as x-{finding.steps[-1]}; docs/reference/compose-keys.md has compose's"
+            f"your own keys begin with x-, such as x-{finding.steps[-1]}; docs/reference/compose-keys.md has compose's"
         )
         return Diagnostic(span, "unknown-key", finding.message, finding.hint or own, fix=finding.fix)
     if finding.kind in ("refused", "left out"):

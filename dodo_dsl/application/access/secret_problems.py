@@ -56,7 +56,7 @@ def in_files(files: Collection[Path]) -> Iterator[Diagnostic]:
 
 
 def _open(span: Span, kind: str) -> Diagnostic:
-    message = f"this looks like {kind}, which everybody can read who reads the repository"
+    message = f"this looks like {kind}, which everybody with access to the repository can read"
     hint = "keep it out of the repository, name its variable here, and write that in 'environment' of dodo.yml"
     return Diagnostic(span, "application-secret", message, hint, "warning")
 

@@ -337,7 +337,7 @@ volume_driver = one_of(
     "driver",
     ("local",),
     "the driver '{}' of the volume '{of}' reaches beyond the test",
-    "remove it, so that the engine makes a volume of its own",
+    "remove it, so that the engine makes its own volume",
 )
 
 

@@ -1,4 +1,4 @@
-"""What a car is to the single-track model: its parameters, from a file where it is not the Kiwi car."""
+"""What a car is to the single-track model: its parameters, from a file if it is not the Kiwi car."""
 
 import difflib
 import math

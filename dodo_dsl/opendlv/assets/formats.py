@@ -83,7 +83,7 @@ def _picture(file: Path) -> Iterator[InputError]:
         yield error
     else:
         if problem and not pointer:
-            yield InputError(file, problem, hint="save the picture again as PNG or JPEG")
+            yield InputError(file, problem, hint="save the image again as PNG or JPEG")
 
 
 def _obstacles(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
@@ -204,7 +204,7 @@ HELP: Mapping[str, str] = {
 
 
 def _raised(path: Path, read: Callable[[], object]) -> Iterator[InputError]:
-    """What a reader raises, with the place that its sentence begins with."""
+    """What a reader raises, with the position that its sentence begins with."""
     try:
         read()
     except InputError as error:

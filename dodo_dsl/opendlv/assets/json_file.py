@@ -1,4 +1,4 @@
-"""JSON values that know their file and path, so that every error names its place.
+"""JSON values that know their file and path, so that every error names its position.
 
 What is wrong with text that is not JSON is in our own words: a table of the mistakes that people make.
 """
@@ -19,7 +19,7 @@ from dodo_dsl.opendlv.assets.problem import InputError, place_of_key
 _TOKEN = re.compile(r'"(?:[^"\\\n]++|\\.)*+"|[][{}]')
 _CLOSING = {"{": "}", "[": "]"}
 _NEAR = 2000
-"""Characters before and behind the place where Python's reader gives up that are looked at."""
+"""Characters before and behind the position where Python's reader gives up that are looked at."""
 _SHOWN = 30
 _VALUES = "a value is a text in double quotes, a number, true, false, null, [...] or {...}"
 _SLIPS = (
@@ -58,7 +58,7 @@ _SLIPS = (
         "remove it: JSON has numbers without units, and other text in quotes",
     ),
 )
-"""Patterns of the text around that place, which is marked in it, with what to say about their group ``at``."""
+"""Patterns of the text around that position, which is marked in it, with what to say about their group ``at``."""
 
 
 class JsonError(ValueError):
@@ -70,7 +70,7 @@ class JsonError(ValueError):
 
 
 class _Slip(NamedTuple):
-    """A mistake; ``at`` is its place in the text, from 0."""
+    """A mistake; ``at`` is its position in the text, from 0."""
 
     at: int
     what: str

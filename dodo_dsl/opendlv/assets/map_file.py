@@ -22,7 +22,7 @@ FRAME_TURN = math.pi / 2
 """A model at a frame is turned by the frame's yaw and this, in rad about z: it looks along its own -y."""
 NO_BODIES = "no model of the map has 'frames' of other sender stamps than the vehicle's"
 MAX_OVERLAYS = 50
-"""Places of overlays, each of which takes the memory of a picture."""
+"""Places of overlays, each of which takes the memory of an image."""
 
 Vector3 = tuple[float, float, float]
 Paint = Vector3 | Path
@@ -66,7 +66,7 @@ class BlockEntry:
 
 @dataclass(frozen=True)
 class OverlayEntry:
-    """A picture laid over the camera's: its size and places (upper left corners) as fractions of that picture."""
+    """An image laid over the camera's: its size and positions (upper left corners) as fractions of that image."""
 
     name: str
     file: Path
@@ -159,14 +159,14 @@ def _overlay(node: Node) -> OverlayEntry | None:
         return None
     wide, high = _positive(node.required("dimension"), "width height")
     if max(wide, high) > 1.0:
-        node.required("dimension").fail("the numbers [width, height], fractions of the picture up to 1")
+        node.required("dimension").fail("the numbers [width, height], fractions of the image up to 1")
     file = node.required("textureFile").resource()
     places = tuple((row[0], row[1]) for row in rows)
     return OverlayEntry(node.required("name").text(), file, (wide, high), places)
 
 
 def _names(item: Node, names: str) -> str:
-    """OpenDLV reads the first two numbers of an overlay's place; maps often write four as elsewhere."""
+    """OpenDLV reads the first two numbers of an overlay's position; maps often write four as elsewhere."""
     return "x y z angle" if isinstance(item.value, list) and len(item.value) == 4 else names
 
 
@@ -251,7 +251,7 @@ def unread_keys(root: Node) -> Iterator[MapError]:
 
 
 def _without_effect(root: Node) -> Iterator[MapError]:
-    """Keys of the format that change nothing in a picture, each once."""
+    """Keys of the format that change nothing in an image, each once."""
     models, blocks = list(_listed(root, "model")), list(_listed(root, "block"))
     yield from _stamps_twice(models)
     for entries in (models, blocks):

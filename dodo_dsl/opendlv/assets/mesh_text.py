@@ -78,7 +78,7 @@ def _turn(a: Vertex, b: Vertex, c: Vertex) -> float:
 
 
 def _corners(path: Path) -> list[Vertex]:
-    """The places (x, y, z) of the vertices that an OBJ file's faces have, each once; raises MapError."""
+    """The positions (x, y, z) of the vertices that an OBJ file's faces have, each once; raises MapError."""
     data = read_bytes(path)
     check(path, data)
     try:

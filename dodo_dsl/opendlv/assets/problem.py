@@ -1,4 +1,4 @@
-"""A problem of a file that a test names, with its place in that file."""
+"""A problem of a file that a test names, with its position in that file."""
 
 import re
 from json.decoder import JSONDecoder
@@ -11,7 +11,7 @@ _BLANK = re.compile(r"[ \t\n\r]*")
 
 
 class InputError(ValueError):
-    """A file that cannot be used; as a string one sentence that names the file, the place in it and what was expected.
+    """A file that cannot be used; as a string one sentence with the file, the position in it and what was expected.
 
     ``where`` is a path in a JSON document, such as ``$.model[0].color``; in other text there is a line, and perhaps a
     column, from 1. With ``is_slip`` the file can be used, but hardly means what is written. With ``is_of_key`` the key
@@ -37,7 +37,7 @@ class InputError(ValueError):
         super().__init__(sentence or f"{file}{numbers}: {self.what}")
 
     def position(self) -> tuple[int, int]:
-        """Line and column in the file, from 1; the file is read again for a place in JSON."""
+        """Line and column in the file, from 1; the file is read again for a position in JSON."""
         if self.where and not self._line:
             try:
                 text = regular_file.text(self.file, encoding="utf-8-sig")

@@ -57,7 +57,7 @@ def look(path: Path, message: int, sender: int) -> LookedThrough:
 
 
 def picture_size(path: Path, message: int, sender: int) -> tuple[int, int]:
-    """Width and height of the first picture of a sender, 0 if there is none; raises OSError."""
+    """Width and height of the first image of a sender, 0 if there is none; raises OSError."""
     with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
         for body in _bodies(stream, LookedThrough(0)):
             if _type(body) == message and first_number(body, _STAMP_FIELD) == sender:

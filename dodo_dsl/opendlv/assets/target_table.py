@@ -17,7 +17,7 @@ LATEST = Decimal(2**52) / MICROSECONDS  # seconds; beyond it microseconds are no
 
 
 class TargetError(ValueError):
-    """A target that cannot be used; the message names file and place."""
+    """A target that cannot be used; the message names file and position."""
 
 
 def read(path: Path, field: str) -> list[tuple[int, float]]:

@@ -18,7 +18,7 @@ from dodo_dsl.opendlv.numbers import number
 
 
 class TrajectoryError(ValueError):
-    """Way points that make no trajectory; one sentence with their place."""
+    """Way points that make no trajectory; one sentence with their position."""
 
 
 @dataclass(frozen=True)
@@ -100,12 +100,12 @@ def headings(points: Sequence[PathPoint]) -> list[float]:
     """The heading (rad) at each point of a vehicle that looks where it goes.
 
     It is half-way between the directions of the parts before and after the point. Raises TrajectoryError when all
-    points are at one place.
+    points are at one position.
     """
     parts = [math.atan2(b.y - a.y, b.x - a.x) if (a.x, a.y) != (b.x, b.y) else None for a, b in pairwise(points)]
     known = next((part for part in parts if part is not None), None)
     if known is None:
-        raise TrajectoryError(f"{points[-1].place}: all way points are at one place: give a yaw")
+        raise TrajectoryError(f"{points[-1].place}: all way points are at one position: give a yaw")
     directions = []
     for part in parts:  # standing still it looks as before
         known = known if part is None else part
@@ -129,7 +129,7 @@ def _at_speed(points: Sequence[PathPoint], speed: float) -> list[float]:
     for a, b in pairwise(points):
         length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
         if length == 0:
-            raise TrajectoryError(f"{b.place}: the same place as the point before: give times instead of a speed")
+            raise TrajectoryError(f"{b.place}: the same position as the point before: give times instead of a speed")
         times.append(times[-1] + length / speed)
     return times
 
@@ -147,7 +147,7 @@ def _standing(knot: _Knot) -> TrajectoryPose:
 
 
 def straight(x: float, y: float, z: float, yaw: float, length: float | None, speed: float) -> Trajectory:
-    """A straight trajectory from a place along ``yaw`` (rad), without end if it has no ``length`` (m)."""
+    """A straight trajectory from a position along ``yaw`` (rad), without end if it has no ``length`` (m)."""
     begin = PathPoint("the start", x, y, z, yaw)
     reach = length or 1.0
     end = replace(begin, x=x + reach * math.cos(yaw), y=y + reach * math.sin(yaw))

@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.assets.problem import InputError
 
 Frames = Literal["one", "sample-time", "number"]
 Area = tuple[float, float, float, float]
-"""x, y, width and height as fractions of the picture."""
+"""x, y, width and height as fractions of the image."""
 
 LARGEST = 2**63
 _MOST_NAMED = 10
@@ -30,7 +30,7 @@ _KEYS: Mapping[str, frozenset[str]] = {
 
 
 class TruthFileError(InputError):
-    """A truth that cannot be used; the message names file and place."""
+    """A truth that cannot be used; the message names file and position."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def plain(label: str) -> str:
 
 
 def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
-    """The classes and boxes of each picture, by what distinguishes pictures; raises TruthFileError."""
+    """The classes and boxes of each image, by what distinguishes images; raises TruthFileError."""
     document = _document(path)
     images = {_whole(entry, "id", place): (entry, place) for entry, place in _entries(document, "images", path)}
     if len(images) != len(document["images"]):

@@ -1,4 +1,4 @@
-"""The builds of an application's services, as far as they are checked: for whoever builds without running a test."""
+"""The builds of an application's services, as far as they are checked, for builds without a test."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -24,7 +24,7 @@ _LEFT_OUT = (*removed(BUILD), "privileged", "ssh")
 def checked_builds(application: ApplicationSource) -> tuple[dict[str, Any], list[Diagnostic]]:
     """A compose file with the builds alone, and what they may not have: whole paths, and no variables.
 
-    Variables whose values are not known are empty: whoever builds has others in his environment. What a build must not
+    Variables whose values are not known are empty: each builder has others in the environment. What a build must not
     have is left out, as it is of a test.
     """
     paths = replace(application.paths, literal=True)

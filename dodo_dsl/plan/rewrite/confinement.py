@@ -93,7 +93,7 @@ def remove_hardware(copy: ServiceCopy) -> None:
 
 
 def confine(copy: ServiceCopy) -> None:
-    """Limits of processes, memory and files, no way to more privileges, logs that DoDo reads."""
+    """Limits of processes, memory and files, no more privileges, logs that DoDo reads."""
     limits = copy.setting.limits
     for finding in list(service_limits(copy.filled(copy.service), limits)):
         if not _is_removed(copy, finding):
@@ -150,7 +150,9 @@ def _limit_files(copy: ServiceCopy) -> None:
     """The size of a file in bytes, files that are open, and no core dumps, unless the service sets lower ones."""
     own, limits = copy.service.get("ulimits"), copy.setting.limits
     if isinstance(own, dict) and own.pop("nproc", None) is not None:
-        copy.note("ulimits.nproc removed, as it counts the user's processes on the whole machine: pids_limit counts")
+        copy.note(
+            "ulimits.nproc removed, because it counts the user's processes on the whole machine: pids_limit counts"
+        )
     most = {"core": 0, "fsize": limits.file_size, "nofile": limits.files}
     copy.service["ulimits"] = most | (own if isinstance(own, dict) else {})
 

@@ -183,7 +183,7 @@ def _note_others(copy: ServiceCopy, written: Mapping[str, Any], with_paths: Mapp
 
 
 def _of_top_level(application: ApplicationSource, rest: Mapping[str, Any]) -> Iterator[str]:
-    """Of the file's keys beside ``services``: ``rest`` is what the copy has of them."""
+    """Of the file's keys other than ``services``: ``rest`` is what the copy has of them."""
     changed = [key for key, node in application.rest.items() if rest[key] != plain(node)]
     for words, keys in (("changed for the test", changed), ("left out", application.left_out)):
         if keys:

@@ -22,17 +22,17 @@ _ACCESS = ("ro", "rw")
 
 
 def own_name(name: str) -> str:
-    """The name of an application's volume in the test's project, where DoDo has volumes of its own."""
+    """The name of an application's volume in the test's project, where DoDo has its own volumes."""
     return f"application-{name}" if name in OWN_VOLUMES or _OF_COPY.fullmatch(name) else name
 
 
 class FileCopies:
     """The folders that a test copies: those of the repository that any of its services mounts to write to.
 
-    All services that mount such a folder share its copy; what is mounted beside it comes from the repository. So no
+    All services that mount such a folder share its copy; what is mounted next to it comes from the repository. So no
     service can lead the mount of another one elsewhere. ``paths`` are relative to the compiled test's folder, as the
     services and volumes are; ``known`` are the variables whose values are known. ``sources`` are the volumes of the
-    copies, each with the folder that it has at the begin, as the compose file writes it.
+    copies, each with the folder that it has at the start, as the compose file writes it.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class FileCopies:
         return "" if Path(place).is_file() else place
 
     def name(self, volume: Any) -> str:
-        """The volume with the copy that a mount shows; empty where it shows none."""
+        """The volume with the copy that a mount shows; empty if it shows none."""
         found = host_access.mount(interpolated(volume, self._known))
         if host_access.is_bind(volume, found.source):
             return self._names.get(self._folder(found.source), "")

@@ -26,6 +26,8 @@ _ERROR = re.compile(
 )
 _WARNING = re.compile(r"\bwarn(ing)?\b", re.I)
 _APPLICATION = "application"
+READY = "ready"
+"""What services of DoDo say before a test begins, as a line and as its level: the page hides these at first."""
 
 
 class LogLine(NamedTuple):
@@ -54,7 +56,7 @@ def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
 def complaints(folder: Path) -> Iterator[LogLine]:
     """The errors and warnings in the logs of a test, service by service and without times."""
     for log in sorted(folder.glob("*.log")):
-        yield from (line for _, line in _without_times(log) if line.level)
+        yield from (line for _, line in _without_times(log) if line.level not in ("", READY))
 
 
 def _lines(log: Path, test: RecordedTest) -> Iterator[LogLine]:
@@ -76,7 +78,8 @@ def _without_times(log: Path) -> Iterator[tuple[int, LogLine]]:
             continue
         level = _level(line, level)
         length = f" … ({len(raw)} bytes)" if len(text) > _MOST_TEXT else ""
-        yield offset, LogLine(None, name or layer, level, shown(text[:_MOST_TEXT]) + length)
+        kind = READY if text == READY != line else level
+        yield offset, LogLine(None, name or layer, kind, shown(text[:_MOST_TEXT]) + length)
 
 
 def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:

@@ -3,6 +3,8 @@
 PAGE, DATA = "drive.html", "drive.js"
 SHARED = "_viewer"
 """The folder of scripts and style for all of them; no test's folder begins with an underscore."""
+FAILED, FAILED_VARIABLE = "failed.js", "dodoFailed"
+"""Slug, name and outcome of each test of the report that did not pass and has a page, for steps between them."""
 LOGS = "logs"
 """The folder of the services' logs in that of a test."""
 VIDEOS = tuple(f"camera-{number}.mp4" for number in range(4))

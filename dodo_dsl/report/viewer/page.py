@@ -24,6 +24,8 @@ from dodo_dsl.outcome import (
 from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
 from dodo_dsl.plan.model import Place, Plan, PlannedService
 from dodo_dsl.report import comparison
+from dodo_dsl.report.check_display import meaning
+from dodo_dsl.report.check_display import place as bar_place
 from dodo_dsl.report.trajectory import Ground, Way, colour_of, ground_of
 from dodo_dsl.report.viewer import log_lines, moment, pictures, recorded
 from dodo_dsl.report.viewer.encoded import packed, script, shown
@@ -74,8 +76,9 @@ class SpecLines:
 
 def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters) -> Iterator[dict[str, Any]]:
     """All checks, each with the places of its limit: the parameter's, or the service's where it is set by default."""
+    names = {check["name"] for check in outcome.checks}
     for check in outcome.checks:
-        places = list(_places(plan, check["name"], recorded)) if check.get("limit") else []
+        places = list(limit_places(plan, check["name"], recorded)) if check.get("limit") else []
         yield {
             "name": shown(check["name"], 100),
             "value": check["value"],
@@ -84,6 +87,8 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
             "ok": bool(check["ok"]),
             "follows": comparison.only_follows(check, outcome.checks),
             "margin": check.get("margin"),
+            "meaning": shown(meaning(check, names), 200),
+            "bar": bar_place(check),
             "places": [
                 {"file": shown(place.file, 400), "line": place.line, "text": lines.line(place), "flag": flag}
                 for flag, place in places
@@ -91,7 +96,8 @@ def checks(plan: Plan, outcome: Outcome, lines: SpecLines, recorded: Parameters)
         }
 
 
-def _places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
+def limit_places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple[str, Place]]:
+    """Where the spec sets the limit of a check, each with the parameter's name, empty for a service's default."""
     if check in _OF_THE_TEST and "response" in plan.source_map:
         yield _OF_THE_TEST[check], plan.source_map["response"]
     if check.startswith(BASELINE) and "baseline" in plan.source_map:

@@ -48,7 +48,7 @@ _HOST_TURNS, _HOST_TURN_S = 20, 0.05
 
 
 class DockerBackend:
-    """One test as a compose project of its own; ``subnets`` are tried in turn until the engine accepts one."""
+    """One test as its own compose project; ``subnets`` are tried in turn until the engine accepts one."""
 
     name = "docker"
     has_engine = True
@@ -178,7 +178,7 @@ class DockerBackend:
             self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
 
     def _take_memory_kill(self, name: str) -> None:
-        """Ends a service of which the kernel killed a process for memory, as it may have been a child."""
+        """Ends a service of which the kernel killed a process for memory, because it may have been a child."""
         if name in self._outputs and name not in self._out_of_memory:
             self._kills.add(asyncio.ensure_future(asyncio.to_thread(self._kill, name)))
         self._out_of_memory.add(name)
@@ -326,7 +326,7 @@ class DockerBackend:
 
         container, output = self._containers[name], self._outputs[name]
         try:
-            # before its start, as it may end at once; a log comes later than what is attached, and by single bytes
+            # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
             stream = await asyncio.to_thread(attached, container) if self._prints(name) else None
             await asyncio.to_thread(container.start)
         except (DockerException, OSError) as error:
@@ -338,7 +338,7 @@ class DockerBackend:
 
     @staticmethod
     def _follow(container: Any, writer: int) -> None:
-        """Copies a container's output into the pipe of its Output; runs in a thread of its own.
+        """Copies a container's output into the pipe of its Output; runs in its own thread.
 
         It ends with the container, or when nobody reads the pipe any more.
         """

@@ -138,7 +138,7 @@ def _holds_git(place: Path) -> bool:
 
 
 def _link(source: str, target: str) -> None:
-    """A link to the same file, or a copy; a file that nobody may read is left out, as no image could have it."""
+    """A link to the same file, or a copy; a file that nobody may read is left out, because no image could have it."""
     try:
         os.link(source, target, follow_symlinks=False)
     except OSError:

@@ -26,7 +26,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import FILES, SANDBOX, image_variable
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
-from dodo_dsl.plan.model import LAYERS, Place, Plan
+from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.application_files import (
     application_paths,
     env_file_findings,
@@ -51,7 +51,7 @@ def absent(service: Mapping[str, Any], paths: HostPaths, always: bool = False) -
     """Empty folders in the place of what is mounted and not there: the engine would make it, as root.
 
     What dodo.yml lets an application write to is the host's own, and made as always; without ``always``, the engine
-    refuses what it is told not to make.
+    refuses what it must not make.
     """
     binds = [volume for volume in service.get("volumes") or () if volume.get("type") == "bind"]
     gone = [v for v in binds if not os.path.lexists(v["source"]) and not paths.is_writable(v["source"])]
@@ -82,17 +82,9 @@ def _source(volume: Mapping[str, Any], volumes: Mapping[str, Any]) -> Path | Non
     return Path(os.path.realpath(source)) if source else None
 
 
-def trace(plan: Plan, text: str) -> Place | None:
-    """The place in the spec of the service that a message about compiled files names; None when it names none."""
-    for service in sorted(plan.services, key=lambda s: -len(s.name)):
-        if re.search(rf"(?<![\w-]){re.escape(service.name)}(?![\w-])", text):
-            return plan.source_map.get(f"{service.layer}.{service.name}")
-    return None
-
-
 def traced(plan: Plan, text: str) -> str:
-    """The message followed by that place."""
-    place = trace(plan, text)
+    """The message, followed by the place in the spec of the service that it names."""
+    place = plan.place_named_in(text)
     return f"{text} ({place.file}:{place.line}:{place.column})" if place else text
 
 
@@ -121,7 +113,7 @@ class Compose:
         self._outside = {**secrets_of(plan.application, folder, outside), **outside}
 
     async def read(self) -> None:
-        """Fills ``services``; raises BackendError, also where the test has what no test may have."""
+        """Fills ``services``; raises BackendError, also if the test has what no test may have."""
         try:
             self._refuse(env_file_findings(self.plan.application, self._paths, self._outside))
         except EnvironmentProblem as error:
@@ -196,7 +188,7 @@ class Compose:
             await self._build([name for name in built if name not in named], self.project)
 
     def _other_way(self, image: str) -> str:
-        """How a service of the application starts without its image; empty where it has a process, and for others."""
+        """How a service of the application starts without its image; empty if it has a process, and for others."""
         with_image = {name for name, service in self.services.items() if service.get("image") == image}
         found = [s.name for s in self.plan.application.services if s.name in with_image and not s.process]
         return f"; with 'x-dodo-process: [python, main.py]' '{found[0]}' starts as a process" if found else ""
@@ -234,7 +226,7 @@ class Compose:
     async def create(self, subnets: Iterable[str], key: bytes) -> None:
         """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError.
 
-        DoDo's services get the ``key`` by a file of its own, as any variable could be named in the application's file;
+        DoDo's services get the ``key`` in a file, as any variable could be named in the application's file;
         so do the application's services what hides the tests from them.
         """
         code, problem = 1, "no subnet is free"

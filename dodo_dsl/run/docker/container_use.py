@@ -26,16 +26,16 @@ class ContainerProcesses:
         self._services: dict[int, str] | None = None
 
     def load(self) -> Snapshot | None:
-        """What the services have used so far; None where the engine runs one of them on another machine."""
+        """What the services have used so far; None if the engine runs one of them on another machine."""
         if self._services is None:
             self._services = self._pids(self._containers) or {}
         return snapshot.take(self._times, self._services, self._proc) if self._services else None
 
     def listeners(self, names: Collection[str], cid: int) -> set[str] | None:
-        """The services among ``names`` that listen on an OpenDLV bus already; None where that cannot be seen.
+        """The services among ``names`` that listen on an OpenDLV bus already; None if that cannot be seen.
 
         Where the kernel does not show this user their sockets, those do whose network has a member of the bus: each
-        container has a network of its own, but on the host.
+        container has its own network, but on the host.
         """
         services = self._pids({name: c for name, c in self._containers.items() if name in names})
         if not services:
@@ -46,11 +46,11 @@ class ContainerProcesses:
         return found
 
     def first(self, names: Collection[str]) -> Collection[int] | None:
-        """The first processes of containers that run; None where one of them is not found here."""
+        """The first processes of containers that run; None if one of them is not found here."""
         return self._pids({name: c for name, c in self._containers.items() if name in names})
 
     def _pids(self, containers: Mapping[str, Any]) -> dict[int, str] | None:
-        """The first process of each container that runs; None where one of them is not found here."""
+        """The first process of each container that runs; None if one of them is not found here."""
         from docker.errors import DockerException
 
         found = {}
@@ -94,7 +94,7 @@ class ContainerUse:
         self._lock = threading.Lock()
 
     def take(self) -> dict[str, Used] | None:
-        """By service; None where nothing can be told of one. One thread at a time does it, as one may be given up."""
+        """By service; None if nothing is known of one. One thread at a time does it, as one may be given up."""
         with self._lock:
             return self._take()
 

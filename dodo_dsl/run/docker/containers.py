@@ -1,4 +1,4 @@
-"""Tests in containers; apart from the other backends, as its libraries take long to load.
+"""Tests in containers; apart from the other backends, because its libraries take long to load.
 
 Cameras that containers of DoDo's cannot have are refused.
 """
@@ -41,7 +41,7 @@ _Kind = TypeVar("_Kind", bound=DockerBackend)
 
 
 class Containers:
-    """Containers of a Docker engine, each test a compose project of its own."""
+    """Containers of a Docker engine, each test its own compose project."""
 
     name = "docker"
 
@@ -84,7 +84,7 @@ class Containers:
 
     @contextlib.contextmanager
     def project(self, kind: type[_Kind], job: Job, say: Say, key: bytes) -> Iterator[_Kind]:
-        """A backend of a kind with a project of its own, and the project's lease; raises BackendError."""
+        """A backend of a kind with its own project, and the project's lease; raises BackendError."""
         if self._client is None or self._pulls is None:
             raise BackendError(self._problem)
         plan = job.plan

@@ -1,6 +1,6 @@
-"""The events of one compose project on an engine, watched in a thread, and the begin of its test, announced.
+"""The events of one compose project on an engine, watched in a thread, and the start of its test, announced.
 
-Services hear of the begin through their sandbox container, or on the host.
+Services hear of the start through their sandbox container, or on the host.
 """
 
 import asyncio
@@ -73,7 +73,7 @@ async def announce_begin(seed: int, to: Sequence[Address], sandbox: Any | None, 
     frame = begin_frame(seed, key=key)
     problem = _host_problem(frame, to) if sandbox is None else await asyncio.to_thread(_problem, sandbox, frame, to)
     if problem:
-        raise BackendError(f"the begin of the test cannot be announced to its services: {problem}")
+        raise BackendError(f"the start of the test cannot be announced to its services: {problem}")
 
 
 def _host_problem(frame: bytes, to: Sequence[Address]) -> str:

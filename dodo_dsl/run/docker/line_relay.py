@@ -1,4 +1,4 @@
-"""What containers print, as it comes, and a sender of lines in a test's network: a program beside its recorder."""
+"""What containers print, as it comes, and a sender of lines in a test's network: a program next to its recorder."""
 
 import contextlib
 import os

@@ -114,7 +114,7 @@ class Pulls:
 
     @cached_property
     def _machine(self) -> str:
-        """What the engine's machine runs, such as ``amd64``; empty where it does not say."""
+        """What the engine's machine runs, such as ``amd64``; empty if it does not say."""
         from docker.errors import DockerException
 
         try:
@@ -123,7 +123,7 @@ class Pulls:
             raise BackendError(f"the Docker engine does not say its version: {error}") from error
 
     def _architecture(self, image: str) -> str:
-        """What a local image is for, such as ``arm64``; empty where there is no such image."""
+        """What a local image is for, such as ``arm64``; empty if there is no such image."""
         from docker.errors import DockerException, ImageNotFound
 
         try:

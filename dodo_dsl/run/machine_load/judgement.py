@@ -35,6 +35,9 @@ LEAST_CROWDED = 0.1
 """Share of the test's time in which others must have filled the machine for lateness to be their fault."""
 _MAX_FOUND = 300
 WAY_OUT = "run it with --clock lockstep, or fewer tests at once (-j 1)"
+TIMED_WAY_OUT = (
+    "the application acts by its own clock: run it on a quiet machine (-j 1), or with --clock virtual, not in lockstep"
+)
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,10 @@ class FindingUnderLoad:
     load: MachineLoad | None
 
 
-def consider(finding: Finding, load: MachineLoad | None) -> FindingUnderLoad:
+def consider(finding: Finding, load: MachineLoad | None, is_timed: bool = False) -> FindingUnderLoad:
     """An error in place of a failure that may be due to a busy machine; anything else as it is.
+
+    ``is_timed`` means that the application acts by its own clock, so that lockstep does not help.
 
     Only findings that depend on time can turn. An application that waits for a tenth of the time answers each picture
     of a 10 Hz camera 10 ms later on average, some much later, as waits come in bursts: on two cores with four busy
@@ -60,7 +65,7 @@ def consider(finding: Finding, load: MachineLoad | None) -> FindingUnderLoad:
     if load is None or finding.result != "failed" or not finding.is_timed or not (why := too_busy(load)):
         return FindingUnderLoad(finding, load)
     found = finding.reason if len(finding.reason) <= _MAX_FOUND else f"{finding.reason[:_MAX_FOUND]}..."
-    reason = f"the machine was too busy to judge: {why}; it found: {found}; {WAY_OUT}"
+    reason = f"the machine was too busy to judge: {why}; it found: {found}; {TIMED_WAY_OUT if is_timed else WAY_OUT}"
     return FindingUnderLoad(replace(finding, result="error", reason=reason), replace(load, undecided=True))
 
 
@@ -87,9 +92,11 @@ def too_busy(load: MachineLoad) -> str:
     return ""
 
 
-UNSEEN = "the limit of the time of an answer is not judged, as what containers wait for a processor cannot be seen"
+UNSEEN = "the limit of the time of an answer is not judged, because what containers wait for a processor cannot be seen"
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
+MOST_SURPLUS_FRAMES = 0.1
+"""Share of frames that may have surplus answers before a note says so."""
 MOST_PERIODS = 10
 """The periods of frames that one answer may take before a note says so."""
 
@@ -109,14 +116,18 @@ class JudgedFigures:
 UNTIMED = "the time of answers is not judged, as with clock virtual computing takes no test time"
 
 
-def judged_response(response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> JudgedFigures:
-    """Judges the answers by the limits of the test; ``services`` are the application's."""
+def judged_response(
+    response: Response | None, lockstep: Lockstep | None, services: Sequence[str], timed: Sequence[str] = ()
+) -> JudgedFigures:
+    """Judges the answers by the limits of the test; ``services`` are the application's, ``timed`` those with timers."""
     if response is None or lockstep is None:
         return JudgedFigures()
     every = [*_times(response, lockstep), *_copies(response, lockstep)]
     who = services[0] if services else ""
     findings = tuple(Finding("failed", reason, who) for reason, _ in every if reason)
-    return JudgedFigures(findings, tuple(with_margin(check) for _, check in every), tuple(_notes(response, lockstep)))
+    return JudgedFigures(
+        findings, tuple(with_margin(check) for _, check in every), tuple(_notes(response, lockstep, timed))
+    )
 
 
 def _times(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
@@ -140,7 +151,9 @@ def _copies(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
     yield "" if ok else reason, check
 
 
-def _notes(response: Response, lockstep: Lockstep) -> Iterator[str]:
+def _notes(response: Response, lockstep: Lockstep, timed: Sequence[str]) -> Iterator[str]:
+    if note := own_clock(response, timed):
+        yield note
     if response.slow > MOST_SLOW * response.answers:
         slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
         yield f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
@@ -156,10 +169,32 @@ def _notes(response: Response, lockstep: Lockstep) -> Iterator[str]:
         yield UNSEEN
 
 
+def own_clock(response: Response, timed: Sequence[str] = ()) -> str:
+    """That an application does not only answer frames, and what follows for its results; empty where it does.
+
+    It is a note, and not an error: a program with timers may well give the same verdict each time, as one that answers
+    each frame twice does, and of the drive that was judged everything is true.
+    """
+    frames, counts = response.answers + 1, []
+    if timed:
+        counts.append(f"'{timed[0]}' declares timers (x-dodo: timed)")
+    if response.unasked:
+        counts.append(f"it sent messages in {response.unasked} of {response.pauses} pauses without a frame")
+    if response.surplus_frames > MOST_SURPLUS_FRAMES * frames:
+        others = f", {response.differing} of them with other values" if response.differing else ""
+        counts.append(f"{response.surplus} surplus answers in {response.surplus_frames} of {frames} frames{others}")
+    if not counts:
+        return ""
+    if response.unasked or timed:
+        way = "results can differ from run to run; run it with --clock realtime, or --clock virtual"
+        return f"the application acts by its own clock: {'; '.join(counts)}: {way}"
+    return f"{counts[0]}: the first answer to a frame counts, and the others are dropped"
+
+
 SOON_S = 600.0
 """Memory that would reach its limit within this time, by the test's own, is worth a note."""
 UNSEEN_USE = (
-    "the limits of processor time and memory are not judged, as what the application uses cannot be measured here"
+    "the limits of processor time and memory are not judged, because what the application uses cannot be measured here"
 )
 _MB, _MINUTE_S = 1e6, 60.0
 

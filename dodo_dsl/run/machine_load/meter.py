@@ -223,7 +223,7 @@ def _figures(
 
 
 def test_time(progress: Sequence[tuple[float, float]], at_s: float) -> float:
-    """The time that a test had reached, between those that are known; 0 where none is."""
+    """The time that a test had reached, between those that are known; 0 if none is."""
     after = bisect.bisect_right(progress, at_s, key=lambda pair: pair[0])
     if after in (0, len(progress)):
         return progress[after - 1 if after else 0][1] if progress else 0.0
@@ -235,7 +235,7 @@ def growth(points: Sequence[Point], known: Collection[float] | None = None) -> f
     """Bytes a second by which memory grows in the second half of the time, in which programs have warmed up.
 
     It is the median slope of all pairs of points (Theil and Sen), as single points may be anywhere. 0 where memory does
-    not rise by LEAST_RISE, or not in each half of this half. None where there are too few points to tell,
+    not rise by LEAST_RISE, or not in each half of this half. None if there are too few points to tell,
     or too few times that are ``known``: without these all are.
     """
     found = _second_half(points)

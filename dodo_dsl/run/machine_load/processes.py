@@ -1,9 +1,9 @@
 """Processes by ``/proc``: which descend from which, their memory, and their processor time and run delay by service.
 
-Memory is told without cgroups, which not every machine hands out. Programs and files that are only read do not count.
+Memory is measured without cgroups, which not every machine has. Programs and files that are only read do not count.
 Files in memory that only a descriptor holds (memfd_create(2)), and System V memories that processes are attached to,
 count as shared memory that is mapped does; the larger of both. System V memories to which no process is attached count
-beside these. Time is by thread, added up by service.
+in addition. Time is by thread, added up by service.
 """
 
 import contextlib
@@ -149,7 +149,7 @@ class ThreadTimes:
         """Processes that were seen and have ended since."""
 
     def add_up(self, services: Mapping[int, str]) -> dict[str, tuple[float, float]] | None:
-        """Seconds on a processor, and ready without one, by service; None where the kernel does not measure them.
+        """Seconds on a processor, and ready without one, by service; None if the kernel does not measure them.
 
         ``services`` are process ids and names. What their processes have started belongs to them, too. A name ``''``
         is for what descends from a process and belongs to none of the others; the process itself does not count.
@@ -218,7 +218,7 @@ class ThreadTimes:
             return []
 
     def _read(self, pid: int, thread: int) -> _Nanoseconds | None:
-        """The times of a thread, none for one that has ended; None where the kernel does not measure them."""
+        """The times of a thread, none for one that has ended; None if the kernel does not measure them."""
         folder = self._proc / str(pid) / "task" / str(thread)
         try:
             words = (folder / "schedstat").read_text().split()

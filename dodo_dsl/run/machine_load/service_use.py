@@ -45,7 +45,7 @@ class _Process(NamedTuple):
 
 
 class _Sharing(NamedTuple):
-    """Which part of the memory counts that some processes have, as it is partly the same, and until when that is so."""
+    """Which part of the memory of some processes counts, because it is partly the same, and until when."""
 
     part: float
     among: Set[int]
@@ -134,7 +134,7 @@ class UseReader:
         self._ticks[name] = ticks
 
     def _memory(self, name: str, pids: Iterable[int], now: float) -> int:
-        """Bytes of all processes; one that began since it was told what they share counts when it is told again."""
+        """Bytes of all processes; one that began since then counts at the next update."""
         sizes = {pid: resident(pid, self._proc) for pid in pids}
         large = {pid for pid, size in sizes.items() if sum(size) > _SMALL}
         part, detached = 1.0, self._detached.get(name, 0)
@@ -148,14 +148,14 @@ class UseReader:
         return int((anonymous + max(shared, self._held.get(name, 0))) * part) + detached
 
     def _shared(self, name: str, large: Set[int], sizes: Mapping[int, tuple[int, int]], now: float) -> _Sharing:
-        """Which part of their memory counts, as the kernel told it at last."""
+        """Which part of their memory counts, by the kernel's last figures."""
         sharing = self._sharing.get(name)
         if sharing is None or now >= sharing.until_s:
             began = time.thread_time()
             theirs = [sum(proportional(pid, self._proc)) for pid in large]
             every = sum(sum(size) for size in sizes.values())
             shared = sum(sum(sizes[pid]) for pid in large) - sum(theirs)
-            part = (every - max(shared, 0)) / every if all(theirs) else 1.0  # not told to everybody
+            part = (every - max(shared, 0)) / every if all(theirs) else 1.0  # not readable for everybody
             sharing = self._sharing[name] = _Sharing(part, frozenset(large), now + _patience_s(began))
         return sharing
 
@@ -189,7 +189,7 @@ class ControlGroup:
     tick_s: float
 
     def used(self) -> Used | None:
-        """What was used so far; None where the kernel does not tell, or when the group is gone."""
+        """What was used so far; None if the kernel does not report it, or when the group is gone."""
         try:
             memory = memory_of(numbers(self.memory.read_text()))
             text = self.processor.read_text()
@@ -200,7 +200,7 @@ class ControlGroup:
 
 
 def processor_s(descriptor: int) -> float | None:
-    """Seconds by an open ``cpuacct.usage`` or ``cpu.stat``; None where the kernel does not tell."""
+    """Seconds by an open ``cpuacct.usage`` or ``cpu.stat``; None if the kernel does not report it."""
     try:
         text = os.pread(descriptor, _MOST, 0).decode()
         ticks = numbers(text).get("usage_usec") if " " in text else int(text)
@@ -210,7 +210,7 @@ def processor_s(descriptor: int) -> float | None:
 
 
 def of_process(pid: int, proc: Path = Path("/proc")) -> ControlGroup | None:
-    """The control group of a process; None where it has none that counts both, as without the controller of memory."""
+    """The control group of a process; None if it has none that counts both, as without the controller of memory."""
     try:
         mounts = (proc / "self" / "mountinfo").read_text()
         groups = (proc / str(pid) / "cgroup").read_text()
@@ -227,13 +227,13 @@ def of_process(pid: int, proc: Path = Path("/proc")) -> ControlGroup | None:
 
 
 def memory_of(stat: Mapping[str, int]) -> int | None:
-    """Bytes of memory by the rows of ``memory.stat``; None where they do not tell."""
+    """Bytes of memory by the rows of ``memory.stat``; None if they do not have it."""
     names = _OF_1 if _OF_1[0] in stat else _OF_2
     return stat[names[0]] + stat.get(names[1], 0) if names[0] in stat else None
 
 
 def of_engine(stats: Mapping[str, Any]) -> Used | None:
-    """What the engine says of a container (``GET /containers/ID/stats``); None where it does not know."""
+    """What the engine says of a container (``GET /containers/ID/stats``); None if it does not know."""
     try:
         memory = memory_of(stats["memory_stats"]["stats"])
         return None if memory is None else Used(stats["cpu_stats"]["cpu_usage"]["total_usage"] * _NANOSECONDS, memory)
@@ -268,7 +268,7 @@ def _places(mounts: str, groups: str) -> dict[str, Path]:
 
 
 def _below(path: str, root: str) -> str | None:
-    """A group's path in a mount that shows only what is below ``root``; None where it is not shown."""
+    """A group's path in a mount that shows only what is below ``root``; None if it is not shown."""
     if root == "/":
         return path
     return path.removeprefix(root) if path == root or path.startswith(f"{root}/") else None

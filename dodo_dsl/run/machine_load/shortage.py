@@ -1,7 +1,7 @@
 """Limits of the machine and of its users that a test shares with others: which of them are used up, and by whom.
 
 An application that meets one of them is not to blame where others alone have used it up; where that cannot be known, it
-is. Limits that a test has for itself, by namespaces, control groups or a user id of its own, are not among these.
+is. Limits that a test has for itself, by namespaces, control groups or its own user id, are not among these.
 """
 
 import contextlib
@@ -43,7 +43,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Shortage:
-    """A sentence on a limit that is used up, empty where there is none; and whether it is without the application."""
+    """A sentence on a limit that is used up, empty if there is none; and whether it is without the application."""
 
     text: str = ""
     is_of_others: bool = False
@@ -52,7 +52,7 @@ class Shortage:
 def used_up(shared: Shared, application: Collection[int] | None, root: Path = Path("/")) -> Shortage:
     """A limit that is used up, first one that is without the application. Takes some tens of milliseconds.
 
-    The application's are processes ``application`` and what they started; None where they are not known.
+    The application's are processes ``application`` and what they started; None if they are not known.
     """
     table = _Processes(root / "proc", application)
     found = [*_of_machine(table), *_of_users(table), *_of_place(shared, root, table)]
@@ -61,7 +61,7 @@ def used_up(shared: Shared, application: Collection[int] | None, root: Path = Pa
 
 
 def below(limits: SandboxLimits) -> str:
-    """A sentence on a limit of this process that is below what the test allows a program; empty where there is none."""
+    """A sentence on a limit of this process that is below what the test allows a program; empty if there is none."""
     for kind, what, name in _OF_THE_SHELL:
         _, hard = resource.getrlimit(kind)
         if hard != resource.RLIM_INFINITY and hard < (wanted := getattr(limits, name)):
@@ -96,7 +96,7 @@ class _Processes:
         return "".join(f", {number:,} of them by '{name}'" for name, number in names.most_common(1))
 
     def of_others(self, count: _Count, user: int | None = None, among: Collection[int] | None = None) -> int:
-        """What others than the application use at least, by a user and among some processes; 0 where it is not known.
+        """What others than the application use at least, by a user and among some processes; 0 if it is not known.
 
         Counted are others and not the application, which may end meanwhile and leave what it used to nobody.
         """
@@ -199,7 +199,7 @@ def _of_place(shared: Shared, root: Path, table: _Processes) -> Iterator[Shortag
 def _full(
     what: str, used: int, most: int, by: Callable[[], str] = lambda: "", others: Callable[[], int] = lambda: 0
 ) -> Shortage:
-    """``others`` is what others than the application use, 0 where it cannot be known."""
+    """``others`` is what others than the application use, 0 if it cannot be known."""
     if not most or used < most - _FEW:
         return Shortage()
     return Shortage(f"{used:,} of {most:,} {what} were in use{by()}", others() >= max(most - _FEW, 1))
@@ -222,7 +222,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _number(path: Path, place: int = 0) -> int:
-    """A number among the words of a file, the second of a pair with a slash; 0 where there is none."""
+    """A number among the words of a file, the second of a pair with a slash; 0 if there is none."""
     words = " ".join(_lines(path)).split()
     word = words[place].rpartition("/")[2] if place < len(words) else ""
     return int(word) if word.isdecimal() else 0

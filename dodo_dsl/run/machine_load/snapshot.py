@@ -52,7 +52,7 @@ def with_ended(taken: Snapshot, took_s: Mapping[str, float | None], ended: int, 
 
 
 def take(times: ThreadTimes, services: Mapping[int, str], proc: Path = PROC) -> Snapshot | None:
-    """A snapshot of ``services``, which are process ids and names; None where the kernel does not measure."""
+    """A snapshot of ``services``, which are process ids and names; None if the kernel does not measure."""
     cores = os.sched_getaffinity(0)
     found = times.add_up(services)
     try:
@@ -66,7 +66,7 @@ def take(times: ThreadTimes, services: Mapping[int, str], proc: Path = PROC) -> 
 
 
 def busy_s(text: str, cores: Iterable[int]) -> float | None:
-    """Seconds for which ``cores`` were busy, by the text of ``/proc/stat``; None when it tells nothing of one."""
+    """Seconds for which ``cores`` were busy, by the text of ``/proc/stat``; None when it has nothing of one."""
     rows = {words[0]: words[1:] for words in map(str.split, text.splitlines()) if words}
     ticks = 0
     for core in cores:

@@ -1,1 +1,1 @@
-"""The process backend: local processes in a sandbox of their own."""
+"""The process backend: local processes in their own sandbox."""

@@ -1,4 +1,4 @@
-"""The process backend: services as local processes in a sandbox of their own."""
+"""The process backend: services as local processes in their own sandbox."""
 
 import asyncio
 import contextlib
@@ -61,7 +61,7 @@ class ProcessBackend:
         is_apart: bool = True,
         events: asyncio.Queue[Event] | None = None,
     ) -> None:
-        """``is_apart`` tells that on the host, too, the application gets a process namespace of its own.
+        """``is_apart`` means that on the host, too, the application gets its own process namespace.
 
         ``events`` is a queue of somebody else's to report to, by default an own one.
         """
@@ -223,7 +223,7 @@ class ProcessBackend:
         """Lets ``lines`` send on the test's bus; raises BackendError."""
         address = await self._ask("relay", cid=self.slot.cid)
         if address is None:
-            raise BackendError("what the application prints cannot be sent: the sandbox has no way to the test's bus")
+            raise BackendError("what the application prints cannot be sent: the sandbox does not reach the test's bus")
         lines.connect(
             lambda frame: self._sandbox.send({"do": "line", "data": frame.hex()}),
             (str(address[0]), int(address[1])),
@@ -285,7 +285,7 @@ class ProcessBackend:
             try:
                 return ServiceOutput(log, on_line, terminal=True)
             except OSError as error:
-                why = f"there is no pseudo terminal ({error.strerror}), and into a pipe programs often print late"
+                why = f"no pseudo terminal is available ({error.strerror}), and programs often print late into a pipe"
                 self._note(f"'{command.name}' prints into a pipe: {why}")
         return ServiceOutput(log, on_line)
 
@@ -364,7 +364,7 @@ class ProcessBackend:
         return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
-        self._is_noted = True  # what ends now was told to end
+        self._is_noted = True  # what ends now was asked to end
         for turn in self._turns.values():
             turn.cancel()
         if keep and (pid := self._sandbox.pid):

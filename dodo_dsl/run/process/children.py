@@ -99,7 +99,7 @@ Child = subprocess.Popen[bytes] | ForkedModule | ConfinedProcess
 class ChildExit:
     """How a child ended: ``code`` below 0 for a signal; ``used`` bytes of memory where that was more than allowed.
 
-    ``failed`` tells that it never began, as its sandbox could not be set up.
+    ``failed`` means that it never began, because its sandbox could not be set up.
     """
 
     code: int

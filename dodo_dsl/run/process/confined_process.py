@@ -24,7 +24,7 @@ from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _SIGNALLED = range(129, 129 + 64)
-"""Exit codes by which bubblewrap tells the signal that ended the program."""
+"""Exit codes by which bubblewrap reports the signal that ended the program."""
 
 
 class ConfinedProcess:
@@ -76,7 +76,7 @@ class ConfinedProcess:
         """Whether the program never began; known after ``wait``."""
 
     def used_s(self) -> float | None:
-        """Processor time in s, also of all that ended; None where it has no control group that counts it."""
+        """Processor time in s, also of all that ended; None if it has no control group that counts it."""
         return self._group.used_s() if self._group else None
 
     def wait(self) -> int:

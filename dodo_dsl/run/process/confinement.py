@@ -29,7 +29,7 @@ _OF_TESTS = ("tests_registry", "tests", "templates", "benchmarks", "docs", "gene
 class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
-    With ``isolation`` ``host`` it has only processes of its own, and sees what DoDo sees but for ``masked`` devices.
+    With ``isolation`` ``host`` it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
     ``cid`` says which user id of its own is tried first, where DoDo runs as root.
     """
 
@@ -61,7 +61,7 @@ def _inside(hidden: Iterable[Path], shown: Iterable[str]) -> Iterator[str]:
 
 @functools.cache
 def own_data() -> tuple[Path, ...]:
-    """Where DoDo's tests lie, whichever way it is installed, also beside other Pythons that an application sees."""
+    """Where DoDo's tests lie, however it is installed, also next to other Pythons that an application sees."""
     root = package_data.root()
     optional = [path for path in _entries(Path("/opt")) if path.is_dir()]
     prefixes = [*map(Path, (*INTERPRETER, "/usr", "/usr/local")), *optional]
@@ -133,7 +133,7 @@ def sandbox_words(
 
 
 def _masked(devices: Iterable[str]) -> list[str]:
-    """Nothing in the place of devices; root then has no capability to look behind, or to make the device anew."""
+    """Nothing in the place of devices; root then has no capability to look behind, or to make the device again."""
     binds = [word for path in devices for word in ("--dev-bind", "/dev/null", path)]
     return [*binds, *(word for name in _TO_UNMASK for word in ("--cap-drop", name))] if binds else []
 

@@ -1,4 +1,4 @@
-"""Slots on the host: what keeps tests apart by leases where they have no namespaces of their own."""
+"""Slots on the host: what keeps tests apart by leases where they share the host's namespaces."""
 
 import asyncio
 import contextlib
@@ -31,14 +31,14 @@ PROBE_S = 0.3
 
 @dataclass(frozen=True)
 class IsolationRefusal:
-    """Why applications cannot be isolated; ``missing`` is what was found missing by a trial of its own, or empty."""
+    """Why applications cannot be isolated; ``missing`` is what was found missing by its own trial, or empty."""
 
     why: str
     missing: str = ""
 
     @property
     def remedy(self) -> str:
-        """What to do about what is missing; empty where nothing is."""
+        """What to do about what is missing; empty if nothing is."""
         if self.missing == NAMESPACES and os.getuid() == 0:
             return "allow this container to make namespaces (docker run --privileged, for example)"
         return {BUBBLEWRAP: "install bubblewrap", NAMESPACES: "allow user namespaces"}.get(self.missing, "")
@@ -52,7 +52,7 @@ class IsolationRefusal:
 
 
 def isolation_refusal(fork_server: ForkServer | None = None) -> IsolationRefusal | None:
-    """Why tests and applications cannot have namespaces of their own on this machine; None when they can.
+    """Why tests and applications cannot have their own namespaces on this machine; None when they can.
 
     A sandbox tries it, which the fork server forks, where there is one.
     """
@@ -91,7 +91,7 @@ def _start(channel: socket.socket, _log: int, _slot: str) -> "subprocess.Popen[b
 
 
 def process_namespace_refusal() -> str:
-    """Why an application on the host cannot have a process namespace of its own; empty when it can."""
+    """Why an application on the host cannot have its own process namespace; empty when it can."""
     words = [PROGRAM, "--unshare-pid", "--dev-bind", "/", "/", "--proc", "/proc", "--", "true"]
     for _ in range(MOST_TRIES):
         try:
@@ -166,7 +166,7 @@ async def host_slot(
 
 
 def _claimed(name: str) -> socket.socket | None:
-    """Holds a lease's name in this network, of which all users and all lease folders are part; None where it is held.
+    """Holds a lease's name in this network, of which all users and all lease folders are part; None if it is held.
 
     An abstract name (unix(7)) lives as long as a process that holds its socket, and is one of a network namespace, as
     the bus is that it stands for.

@@ -80,7 +80,7 @@ def unshare() -> None:
 
 
 def refusal() -> str:
-    """Why the kernel refuses this process further namespaces with mounts of their own; empty when it allows them.
+    """Why the kernel refuses this process further namespaces with their own mounts; empty when it allows them.
 
     A child tries it as bubblewrap would: without root within a user namespace.
     """
@@ -186,9 +186,9 @@ def bind(source: Path, target: Path, *, deep: bool) -> None:
 
 
 def bind_as(source: Path, target: Path, owner: int, user: int) -> None:
-    """Shows a folder at another place, where what belongs to ``owner`` belongs to ``user`` and the other way round.
+    """Shows a folder at another place, where what belongs to ``owner`` belongs to ``user`` and vice versa.
 
-    By an ID-mapped mount (mount_setattr(2)); raises OSError where the kernel or the file system has none.
+    By an ID-mapped mount (mount_setattr(2)); raises OSError if the kernel or the file system has none.
     """
     users = _user_namespace(_swapped(owner, user))
     try:

@@ -31,7 +31,7 @@ class Places:
 
     def __init__(self, user: int | None) -> None:
         self.user = user
-        """Who the application is; None for the user of this process."""
+        """The user that the application runs as; None for the user of this process."""
         self._root = Path(tempfile.mkdtemp(prefix="dodo-application-", dir=namespaces.SHARED[0]))  # the sandbox's own
         namespaces.mount_tmpfs(self._root, _SIZE)
         self.home = self._own("home")
@@ -117,7 +117,7 @@ _FREE, _TAKEN = b"+", b"-"
 
 
 def own_user(cid: int) -> int | None:
-    """Who the application of a test is where DoDo is root, as nobody else is; None without root: who runs DoDo.
+    """The user that a test's application runs as if DoDo is root; None without root: the user of DoDo.
 
     Raises as ``lease``.
     """

@@ -37,7 +37,7 @@ class ProcessGroup:
         return False
 
     def used_s(self) -> float | None:
-        """Processor time in s of all that were ever in it; None where it is not counted."""
+        """Processor time in s of all that were ever in it; None if it is not counted."""
         return None if self._usage is None else service_use.processor_s(self._usage)
 
     def remove(self) -> None:
@@ -63,7 +63,7 @@ def _remove(folder: Path) -> None:
 
 
 def make(limit: int, proc: Path = Path("/proc/self")) -> ProcessGroup | None:
-    """A group for this many processes of a service; None where this user may make none."""
+    """A group for this many processes of a service; None if this user may make none."""
     name = f"{_PREFIX}{secrets.token_hex(6)}"
     for parent in _parents(proc):
         folder = parent / name

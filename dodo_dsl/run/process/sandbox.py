@@ -1,6 +1,6 @@
 """The sandbox of one test: a small process that starts, watches and ends the test's processes.
 
-It is process 1 of namespaces of its own (``network``), or their parent on the host (``host``). The runner talks to it
+It is process 1 of its own namespaces (``network``), or their parent on the host (``host``). The runner talks to it
 over a socket; when that closes, for whatever reason, the sandbox ends everything that it started, and itself. If it is
 killed, the kernel sends SIGTERM to what it started. It has one thread, as that signal depends on the starting thread.
 
@@ -62,7 +62,7 @@ class Sandbox:
     """The main loop of the sandbox's process."""
 
     def __init__(self, channel: socket.socket, isolation: str, forks: bool = False) -> None:
-        """``forks`` tells that this process has loaded what services need."""
+        """``forks`` means that this process has loaded what services need."""
         self.channel = channel
         self.isolation = isolation
         self.forks = forks

@@ -26,7 +26,7 @@ LOG = "sandbox.log"
 class SandboxClient:
     """One sandbox; ``on_message`` gets its messages, ``on_lost`` the reason when it is out of reach.
 
-    It is forked by the ``fork_server``, or started as a process where there is none.
+    It is forked by the ``fork_server``, or started as a process if there is none.
     """
 
     def __init__(

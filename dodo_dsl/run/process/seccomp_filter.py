@@ -22,7 +22,7 @@ _CLONE_NAMESPACES = 0x7E020080
 _SOCKET_TYPE = 0xF
 _FAMILIES = (socket.AF_PACKET, socket.AF_ALG, socket.AF_VSOCK)
 _F_SETLEASE = 1024
-"""fcntl(2): who opens a file under a lease, as DoDo does its own, waits for up to 45 s."""
+"""fcntl(2): opening a file under a lease, as DoDo does its own, waits for up to 45 s."""
 _PERSONALITIES = 0x00020008
 """Bits of personality(2) that may be set: Linux on 32 bits and the version's number. All bits together only ask."""
 _TIOCSTI, _TIOCLINUX = 0x5412, 0x541C

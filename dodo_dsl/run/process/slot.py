@@ -1,6 +1,6 @@
 """What keeps tests of the process backend apart: slots, namespaces to enter, and the Python path.
 
-A sandbox enters namespaces of its own, or those of a container, which the application shares. On the path Python finds
+A sandbox enters its own namespaces, or those of a container, which the application shares. On the path Python finds
 services and sandboxes.
 """
 

@@ -19,7 +19,7 @@ class CalibrationProblem(Exception):
 
 
 FEWEST = 4
-"""Readings of an axis: three that fit tell which fourth one does not."""
+"""Readings of an axis: three that fit show which fourth one does not."""
 _DEGREES = 360.0
 
 
@@ -86,7 +86,7 @@ class AxisLine:
 
 
 class ReadingOff(CalibrationProblem):
-    """Readings do not fit a line; ``index`` is the one that the others contradict, None where there are several."""
+    """Readings do not fit a line; ``index`` is the one that the others contradict, None if there are several."""
 
     def __init__(self, text: str, index: int | None) -> None:
         super().__init__(text)

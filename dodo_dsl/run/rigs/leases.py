@@ -68,7 +68,7 @@ def device_key(device: str) -> str:
 
 
 def _serial_number(entry: Path) -> str:
-    """Maker, product and serial number of the USB device that a device belongs to; empty where it has none."""
+    """Maker, product and serial number of the USB device that a device belongs to; empty if it has none."""
     folder = Path(os.path.realpath(entry / "device"))
     for place in (folder, *folder.parents[:_ABOVE]):
         try:

@@ -220,14 +220,16 @@ def _rig_of(device: str, rigs: Iterable[PermittedRig]) -> PermittedRig:
     for rig in rigs:
         if identity(device) in map(identity, rig.devices):
             return rig
-    raise RigProblem(f"'{device}' is not a rig's device in {operator.FILE}, which has all that may be used", usage=True)
+    raise RigProblem(
+        f"'{device}' is not a device of a rig in {operator.FILE}, which lists all that may be used", usage=True
+    )
 
 
 def _refuse_strangers(rig: PermittedRig, motion: Motion, roots: Sequence[Path]) -> None:
     permitted = [folder.resolve() for folder in rig.repositories]
     for root in roots:
         if not any(root.resolve().is_relative_to(folder) for folder in permitted):
-            text = f"'{root}' may not use rig '{rig.name}' of {operator.FILE}, which has other repositories"
+            text = f"'{root}' may not use rig '{rig.name}': it is not in this rig's 'repositories' in {operator.FILE}"
             raise RigProblem(text, usage=True)
     limits, own = motion.by(rig.constants), motion.limits
     for name, most in rig.limits.items():

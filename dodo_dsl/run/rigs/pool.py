@@ -20,7 +20,7 @@ Open = Callable[[Job], AbstractAsyncContextManager[Backend]]
 async def opened(job: Job, say: Say, backend_of: Open) -> AsyncIterator[tuple[Job, Backend]]:
     """The job for the rig that it runs on, with its backend; raises BackendError.
 
-    All that the test waits for, it waits for since now, so that nobody who comes later overtakes it.
+    All that the test waits for, it waits for since now, so that no later test overtakes it.
     """
     async with contextlib.AsyncExitStack() as stack:
         with leases.arrived(), contextlib.ExitStack() as tickets:
@@ -63,7 +63,7 @@ def _is_free(names: Sequence[str], place: Path, since: int) -> bool:
 
 
 def _usable(jobs: Sequence[Job]) -> list[Job]:
-    """The jobs whose rigs this machine has, and may use; raises BackendError where there are none."""
+    """The jobs whose rigs this machine has, and may use; raises BackendError if there are none."""
     refusals = {job.plan.rig: _refusal(job) for job in jobs}
     if usable := [job for job in jobs if not refusals[job.plan.rig]]:
         return usable
@@ -72,7 +72,7 @@ def _usable(jobs: Sequence[Job]) -> list[Job]:
 
 
 def _refusal(job: Job) -> str:
-    """Why a rig cannot be used; empty where it can."""
+    """Why a rig cannot be used; empty if it can."""
     devices = _devices(job)
     absent = [device for device in devices if device.startswith("/") and not Path(device).exists()]
     if absent:

@@ -46,7 +46,7 @@ def changed(text: str, rig: str, values: Values) -> str:
 
 
 class _NoPlace(Exception):
-    """A key does not lead to a mapping of its own."""
+    """A key does not lead to its own mapping."""
 
 
 def _by_hand(rig: str, values: Values) -> str:
@@ -109,7 +109,7 @@ def _inserted(text: str, node: Any, keys: Path_, value: str) -> str:
 
 
 def _inserted_in_flow(text: str, node: Any, entry: str, newline: str) -> str:
-    """With a newline, the entry gets a line of its own, below the one with the mapping's begin."""
+    """With a newline, the entry gets its own line, below the one with the mapping's start."""
     if not node.value:
         at = node.end_mark.index - 1
         return f"{text[:at]}{entry}{text[at:]}"

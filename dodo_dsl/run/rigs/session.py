@@ -115,7 +115,7 @@ GANTRY, CALIBRATE = "gantry", "calibrate"
 class RigSession:
     """What holds from test to test of one command: ``fit`` rigs passed their check, and their last test was judged.
 
-    Who knows the outcome of a test adds its rig; it is taken out as soon as the next one begins. A fit rig is not
+    The caller adds the rig of a test with its outcome; it is taken out as soon as the next one begins. A fit rig is not
     checked again, and has found its home.
     """
 
@@ -135,7 +135,7 @@ class RigSession:
 
 
 def is_real(plan: Plan) -> bool:
-    """Whether a test runs on hardware, which has a CID of its own."""
+    """Whether a test runs on hardware, which has its own CID."""
     return bool(plan.rig) and plan.rig not in EMULATED_RIGS
 
 

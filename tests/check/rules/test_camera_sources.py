@@ -36,7 +36,7 @@ def test_sources(rig: str, source: str, width: int, count: int, tmp_path: Path) 
 
 def test_ways_out(tmp_path: Path) -> None:
     (problem,) = check_camera_sources(context(example("kiwi", "rpicm"), tmp_path))
-    assert (problem.message, problem.hint) == ("'rpicm' is not a source of pictures", "did you mean 'rpicam'?")
+    assert (problem.message, problem.hint) == ("'rpicm' is not a source of frames", "did you mean 'rpicam'?")
     (problem,) = check_camera_sources(context(example("kiwi", "rpicam", 600), tmp_path))
     assert problem.hint == "write a width of 576"
 
@@ -47,8 +47,8 @@ def test_ways_out(tmp_path: Path) -> None:
         ("rpicam", "freq: 10 Hz", []),
         ("rpicam", "freq: 30 Hz, exposure: 33 ms", []),
         ("drive.rec", "freq: 30 Hz", []),
-        ("/dev/video0", "freq: 30 Hz", ["an exposure of 100 ms does not fit into the 33.3 ms between two pictures"]),
-        ("rpicam", "exposure: 0.2 s", ["an exposure of 200 ms does not fit into the 100 ms between two pictures"]),
+        ("/dev/video0", "freq: 30 Hz", ["an exposure of 100 ms does not fit into the 33.3 ms between two frames"]),
+        ("rpicam", "exposure: 0.2 s", ["an exposure of 200 ms does not fit into the 100 ms between two frames"]),
     ],
 )
 def test_exposures(source: str, written: str, said: list[str], tmp_path: Path) -> None:

@@ -61,11 +61,11 @@ SIZED = "environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/p
         ("--name=other --width=640 --height=480", []),
         (
             "--name video0.argb --width 640 --height 480",
-            ["'driver' asks for pictures of 640 x 480 pixels, and 'camera' makes them of 1280 x 720"],
+            ["'driver' asks for frames of 640 x 480 pixels, and 'camera' makes them of 1280 x 720"],
         ),
         (
             "--name=/video0.argb --width=${W:-640}",
-            ["'driver' asks for pictures of 640 x 720 pixels, and 'camera' makes them of 1280 x 720"],
+            ["'driver' asks for frames of 640 x 720 pixels, and 'camera' makes them of 1280 x 720"],
         ),
         (
             "--name.bgr=video0.argb",
@@ -92,5 +92,5 @@ def test_pictures_of_a_recording_have_its_size(tmp_path: Path) -> None:
         'driver: {image: driver, command: "--cid=111 --name=video0.argb --width=64 --height=48"}'
     )
     (problem,) = wiring_rules.check_pictures(context(written, tmp_path))
-    assert problem.message.endswith("pictures of 64 x 48 pixels, and 'camera' makes them of 640 x 480")
+    assert problem.message.endswith("frames of 64 x 48 pixels, and 'camera' makes them of 640 x 480")
     assert problem.hint == "write --width=640 --height=480 in the command of 'driver'"

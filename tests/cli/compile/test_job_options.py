@@ -4,11 +4,10 @@ import argparse
 from pathlib import Path
 
 import pytest
-import yaml
 
 from dodo_dsl.cli.pipeline_options import services, tags
 from tests.check import examples
-from tests.emit.readers import run
+from tests.emit.readers import pipeline, run
 
 
 @pytest.mark.parametrize(
@@ -79,7 +78,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_pipeline_has_them() -> None:
     wanted = ("--tags", ' ["docker"]', "--image", "dodo-runner", "--run-options", "--isolation host")
     assert run("compile", *wanted)[0] == 0
-    made = yaml.safe_load(Path("generated/child.gitlab-ci.yml").read_text())
+    made = pipeline(Path("generated/child.gitlab-ci.yml").read_text())
     assert (made["example"]["tags"], made["example"]["image"]) == (["docker"], "dodo-runner")
     assert made["variables"]["DODO_RUN_OPTIONS"] == "--isolation host"
     assert run("compile", "--check", *wanted)[0] == 0
@@ -97,7 +96,7 @@ def test_images_that_were_built_reach_each_test(repository: Path) -> None:
         assert run("compile", "--images", "images.env")[0] == 0
         lines = (repository / "generated/example/.env").read_text().splitlines()
         assert lines[-1] == image and lines.count(image) == 1
-    made = yaml.safe_load((repository / "generated/child.gitlab-ci.yml").read_text())
+    made = pipeline((repository / "generated/child.gitlab-ci.yml").read_text())
     assert " --backend docker " in made["example"]["script"][0]
     (repository / "images.env").write_text("")
     assert run("compile", "--images", "images.env")[0] == 0

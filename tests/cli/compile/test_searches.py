@@ -49,7 +49,7 @@ def test_a_pipeline_without_searches_has_none() -> None:
     ("words", "said"),
     [
         (("--search", "base"), "base has no ranges to search"),
-        (("--search", "nothing"), "there is no test 'nothing'"),
+        (("--search", "nothing"), "unknown test 'nothing'"),
         (("--search", "example", "--workers", "201"), "--workers 201 is more than the 200 jobs"),
         (("--workers", "2"), "--workers are jobs of a search: name its test with --search"),
     ],

@@ -93,4 +93,4 @@ def test_lines_of_progress_have_coloured_verdicts() -> None:
     terminal = Terminal()
     with PlainProgress(terminal, ["test"]) as progress:
         progress.done(OUTCOME)
-    assert terminal.getvalue().endswith(f"s] test  {RED}failed\x1b[0m\n")
+    assert terminal.getvalue().endswith(f"s] test  {RED}failed\x1b[0m: hit wall\n")

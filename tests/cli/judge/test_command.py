@@ -32,7 +32,7 @@ def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_files_and_tests_that_are_not_there(recording: Path) -> None:
     assert refused("none.rec", "--spec", "example") == "dodo judge: none.rec: No such file or directory\n"
-    assert refused(recording, "--spec", "exampel").startswith("dodo judge: there is no test 'exampel'; did you mean")
+    assert refused(recording, "--spec", "exampel").startswith("dodo judge: unknown test 'exampel'; did you mean")
     assert "there is no compiled test at 'nowhere'" in refused(recording, "--compiled", "nowhere")
     other = write(recording.with_name("other.rec"), message("opendlv.proxy.PedalPositionRequest", 3, 3))
     assert "has no dodo.TestBegin (2900)" in refused(other, "--spec", "example")

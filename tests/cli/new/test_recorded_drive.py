@@ -132,7 +132,7 @@ def test_pictures_alone_have_to_be_answered(empty: Path) -> None:
     (empty / "drive.rec").write_bytes(b"".join(map(encode_frame, pictures)))
     code, out, err = dodo("new", "mine", "--level", "dil", "--rec", "drive.rec")
     assert (code, err) == (0, "")
-    assert f"judged: whether each picture is answered by {STEERING}/0, as there is no recorded signal\n" in out
+    assert f"judged: whether each picture is answered by {STEERING}/0, because there is no recorded signal\n" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     found = yaml.safe_load((empty / "tests/mine/mine.dodo.yml").read_text())
     assert (found["clock"], found["evaluation"]["answers"]) == ("lockstep", {"uses": "responds", "with": {

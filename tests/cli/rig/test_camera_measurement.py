@@ -41,7 +41,9 @@ def test_a_camera_is_measured_by_pictures_and_written(tmp_path: Path, monkeypatc
     assert json.loads(dodo("measure", "desk", "--pictures", "seen", "--dry-run", "--json", code=0).split("\n", 1)[1])
     assert (tmp_path / "dodo.yml").read_text() == RIGS
     said = dodo("measure", "desk", "--pictures", "seen", code=0)
-    assert "none.jpg: not used, as it is no picture" in said and "desk: 9 pictures of 640 x 480: focal-x " in said
+    assert (
+        "none.jpg: not used, because it is not a picture" in said and "desk: 9 pictures of 640 x 480: focal-x " in said
+    )
     text = (tmp_path / "dodo.yml").read_text()
     assert text.endswith("}}}  # mine\n")
     found = yaml.safe_load(text)["rigs"]["desk"]["camera"]
@@ -105,5 +107,5 @@ def test_the_board_is_written_once(tmp_path: Path) -> None:
 
 def test_the_board_is_an_svg_file(tmp_path: Path) -> None:
     said = dodo("board", "-o", str(tmp_path / "board.png"), code=2)
-    assert "is no name of an SVG file, expected one that ends in .svg" in said
+    assert "is not the name of an SVG file, expected one that ends in .svg" in said
     assert not (tmp_path / "board.png").exists()

@@ -30,7 +30,7 @@ def test_manual_use(place: Place) -> None:
     moves = len(place.rig.commands("GOTO"))
     assert "out of the rig's ranges" in place.dodo("rig", "goto", "fake", "0", "0.5", "0", code=2)
     assert len(place.rig.commands("GOTO")) == moves
-    assert "there is no rig 'fke'" in place.dodo("rig", "home", "fke", code=2)
+    assert "unknown rig 'fke'" in place.dodo("rig", "home", "fke", code=2)
 
 
 @pytest.mark.realtime

@@ -118,7 +118,7 @@ DESK = ("desk", "--picture", "desk.png")
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((*DESK, "--box", "yellow", 300, 20, 30, 40), "lies outside the picture of 320 x 240 pixels"),
+        ((*DESK, "--box", "yellow", 300, 20, 30, 40), "lies outside the frame of 320 x 240 pixels"),
         ((*DESK, "--box", "yellow", -1, 20, 30, 40), "box 1 (yellow -1 20 30 40): lies outside"),
         ((*DESK, "--box", "yellow", 10, 20, 0, 40), "has no area, expected a width and a height above 0"),
         ((*DESK, "--box", "yellow", 10, 20, "nan", 40), "expected a class and four numbers X Y WIDTH HEIGHT"),
@@ -127,17 +127,17 @@ DESK = ("desk", "--picture", "desk.png")
         ((*DESK, "--box", "red", 1, 2, 3, 4, "--test", "hil-camera"), "no class 'red', expected one of blue, yellow"),
         (
             (*DESK, "--boxes", "tests/truths/static-rig.json"),
-            "a picture of 640 x 480 pixels, expected one of 320 x 240",
+            "a frame of 640 x 480 pixels, expected one of 320 x 240",
         ),
         ((*DESK, "--boxes", "desk.png"), "desk.png: cannot be read as COCO JSON"),
         (("desk", *BOX, "--picture", "none.png"), "none.png: cannot be read: No such file"),
-        (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: not a readable picture"),
+        (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: not a readable image"),
         (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),
         (("desk", *BOX, "--test", "sil-open-straight"), "has no service 'camera'"),
         (("blind", *BOX), "rig 'blind' has no camera in dodo.yml"),
         (
             ("nobody", *BOX),
-            "there is no rig 'nobody', expected one of emulated, emulated-circle, blind, desk, kiwi-static",
+            "unknown rig 'nobody', expected one of emulated, emulated-circle, blind, desk, kiwi-static",
         ),
         (("emulated",), "the emulated rig's camera sees the map of a test: name one with --test"),
         (("emulated", "--test", "hil-camera-scenes"), "matches 6 tests, expected one"),

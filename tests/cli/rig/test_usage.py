@@ -34,7 +34,7 @@ def test_an_unknown_rig_and_those_that_are_known(folder: Path) -> None:
     assert rig("home", "dask") == (
         2,
         "",
-        "dodo rig: there is no rig 'dask', expected one of emulated, emulated-circle, desk\n",
+        "dodo rig: unknown rig 'dask', expected one of emulated, emulated-circle, desk\n",
     )
     assert rig("home", "desk") == (2, "", "dodo rig: rig 'desk' has no serial port, so it cannot move\n")
 

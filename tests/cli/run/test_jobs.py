@@ -3,6 +3,7 @@
 import argparse
 import io
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,9 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import parser
 from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.emit.output_folder import PLAN_FILE
-from dodo_dsl.plan.plan_json import from_json
+from dodo_dsl.plan.plan_json import from_json, to_json
 from dodo_dsl.run.backends import Job
+from dodo_dsl.run.history import History
 from dodo_dsl.spec.deployment import Deployment
 from tests.check import examples
 
@@ -45,6 +47,25 @@ def test_a_changed_clock_replaces_what_was_wrong_in_the_first(folder: Path) -> N
     assert jobs[0].plan.clock == "realtime"
     assert jobs[0].plan.lockstep is None
     assert "dodo-clock" not in {service.name for service in jobs[0].plan.services}
+
+
+def test_of_an_application_that_acted_by_its_own_clock_the_next_run_in_real_time_knows(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(History, "is_timed", lambda *_: True)
+    (steady,), _ = prepared(folder, "--clock", "realtime")
+    (stepped,), _ = prepared(folder)
+    assert (steady.plan.timed, stepped.plan.timed) == (("application",), ())
+
+
+def test_a_declared_timer_is_in_the_plan(folder: Path) -> None:
+    application = "services: {driver: {image: driver, command: --cid=111, x-dodo: {timed: true}}}\n"
+    (folder / "docker-compose.yml").write_text(application)
+    (job,), _ = prepared(folder)
+    plan = job.plan
+    assert plan.timed == ("driver",)
+    assert from_json(to_json(plan)).timed == plan.timed
+    assert '"timed"' not in to_json(replace(plan, timed=())), "compiled tests stay as they were"
 
 
 def test_a_changed_isolation_is_checked_and_built(folder: Path) -> None:

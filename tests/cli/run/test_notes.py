@@ -32,10 +32,13 @@ def dodo(*words: str) -> tuple[int, str, str]:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["hil-dynamic", "--clock", "lockstep"], "note: hil-dynamic runs in real time, as hardware does not wait\n"),
+        (
+            ["hil-dynamic", "--clock", "lockstep"],
+            "note: hil-dynamic runs in real time, because hardware does not wait\n",
+        ),
         (
             ["hil-*", "--clock", "lockstep"],
-            f"note: hil-camera and {HIL - 1} more run in real time, as hardware does not wait\n",
+            f"note: hil-camera and {HIL - 1} more run in real time, because hardware does not wait\n",
         ),
         (["hil-dynamic"], ""),
     ],

@@ -1,6 +1,7 @@
 """What others say is shown as it is, on a terminal and off it."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -80,3 +81,27 @@ def test_the_time_of_a_test_begins_anew_with_its_next_attempt(terminal: Terminal
 def test_a_pace_without_time_has_no_factor() -> None:
     assert Pace(1.0, 1.0, Standing(0.0, True)).text(5.0) == "0.0 s"
     assert Pace(1.0, 1.0, Standing(2.0, True)).text(5.0) == "2.0 s"
+
+
+PASSED = replace(OUTCOME, slug="other", outcome="passed", reason="drove")
+
+
+def test_what_did_not_pass_stays_above_with_its_reason(terminal: Terminal) -> None:
+    with LiveProgress(terminal, ["test", "other"]) as progress:
+        progress.done(PASSED)
+        progress.done(OUTCOME)
+        progress.rest(3.0, 2)
+    said = shown(terminal.getvalue())
+    assert "test   failed: hit wall" in said
+    assert "1 passed, 1 failed, 2 tests to go, about 3 s" in said
+    assert "drove" not in said and "other" not in said
+
+
+@pytest.mark.parametrize("is_verbose", [True, False])
+def test_steps_of_set_up_are_for_verbose_lines(is_verbose: bool, terminal: Terminal) -> None:
+    with PlainProgress(terminal, ["test"], is_verbose) as progress:
+        for phase in ("setting up", "waiting for action", "waiting for rig 'a'", "taking down"):
+            progress.phase("test", phase)
+    lines = [line.split("  ", 2)[-1] for line in terminal.getvalue().splitlines()]
+    steps = ["waiting for action"] * is_verbose
+    assert lines == ["setting up", *steps, "waiting for rig 'a'", *["taking down"] * is_verbose]

@@ -17,7 +17,7 @@ def said(folder: Path) -> str:
 def test_the_second_says_so_and_nothing_stays(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     with reserved(tmp_path, io.StringIO()):
-        assert said(tmp_path).startswith(f"note: another run writes into '{tmp_path}', too, ")
+        assert said(tmp_path).startswith(f"note: another run also writes into '{tmp_path}': ")
         assert said(tmp_path / "other") == ""
     assert said(tmp_path) == ""
     assert [path.name for path in tmp_path.iterdir()] == ["other"]

@@ -107,7 +107,7 @@ def test_with_its_true_pose_it_would(name: str, tmp_path: Path) -> None:
     (attack,) = (each for each in chosen("lockstep", "network") if each.name == name)
     test = attacked(tmp_path, [attack], told=True)[named(attack)]
     assert test["outcome"] == "passed", test["reason"]
-    assert test["reason"].endswith("; the application is told its true pose (opendlv.sim.Frame)")
+    assert test["reason"].endswith("; the application gets its true pose (opendlv.sim.Frame)")
 
 
 @pytest.mark.realtime

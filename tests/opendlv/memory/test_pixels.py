@@ -34,7 +34,7 @@ def test_the_order_of_the_bytes() -> None:
     [
         (lambda: pixels.size("yuyv", 2, 2), "unknown pixel format 'yuyv'"),
         (lambda: pixels.size("i420", 3, 2), "even width and height, not 3 x 2"),
-        (lambda: pixels.format_of("video0.argb", 100, 64, 48), "100 bytes, not a picture of 64 x 48"),
+        (lambda: pixels.format_of("video0.argb", 100, 64, 48), "100 bytes, not an image of 64 x 48"),
         (lambda: pixels.view(bytes(11), "bgr", 2, 2), "11 bytes are too few for bgr of 2 x 2 pixels, 12 bytes"),
     ],
 )

@@ -289,7 +289,8 @@ def test_two_tokens_of_one_memory_are_told(memory_name: str) -> None:
     with SharedMemory.create(memory_name, 10):
         os.link(path, twin)
         try:
-            with pytest.raises(SharedMemoryError, match=rf"cannot be told from '{twin.name}': the keys .* collide"):
+            message = rf"cannot be distinguished from '{twin.name}': the keys .* collide"
+            with pytest.raises(SharedMemoryError, match=message):
                 SharedMemory.attach(memory_name)
         finally:
             twin.unlink()

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
 TRACE, SHEET = "trace.svg", "virtual-camera.png"
 
-VOLATILE = "#log, .number"
+VOLATILE = "#log, .number, .facts"
 """What shows wall times."""
 _MENDED = ("-(left + right)", "-0.3 * (left + right)")
 _CONES = """\

@@ -3,16 +3,19 @@
 import base64
 import hashlib
 import re
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from markupsafe import Markup
 
 from dodo_dsl.report import overview
+from dodo_dsl.report.check_display import MEANINGS, BarPlace, Bars, place
 from dodo_dsl.report.comparison import compare
 from dodo_dsl.report.overview import ReportFiles, ReportPicture, breakable, render
 from dodo_dsl.report.report_folder import write_summaries
-from dodo_dsl.report.results import GivenReport
+from dodo_dsl.report.results import Circumstances, GivenReport, Repository, RunRecord
 from tests.report.changes.test_check_change import check
 from tests.report.joined.reports import named, write
 from tests.report.viewer import drives, failures
@@ -42,7 +45,7 @@ def test_the_policy_allows_the_pages_own_script_and_style_alone(tmp_path: Path) 
 
 
 def test_a_page_of_a_hundred_tests_is_small() -> None:
-    """Also when all of 15 checks changed."""
+    """Also when all of 15 checks failed and changed."""
     checks = [tuple({**check(n + old, max=2 * n), "name": f"deviation-{n}"} for n in range(15)) for old in (0.123, 0.5)]
     old, new = (
         [named(f"sil-{n}[light=0.3,speed={n}]", checks=each, last_lines=("frame 12: x",) * 20) for n in range(100)]
@@ -63,26 +66,24 @@ def test_tests_are_searched_filtered_and_sorted(chromium: Chromium, tmp_path: Pa
     before = [replace(test, outcome="passed") for test in TESTS]
     write_summaries(tmp_path, TESTS, compare(TESTS, GivenReport(Path("main/results.json"), before)))
     with chromium.page((tmp_path / "index.html").as_uri()) as page:
-        names = [test.name for test in TESTS]
+        names = [test.name for test in (*TESTS[1:2], *TESTS[3:], TESTS[2], TESTS[0])]
         assert shown(page) == names
         for form, expected in (
             ({"search": "WALL hit"}, ["sil-b"]),
             ({"search": "wall-margin"}, ["sil-b"]),
             ({"search": "nothing"}, []),
-            ({"level": "dil", "outcome": "failed,error"}, names[3:5]),
+            ({"level": "dil", "outcome": "failed"}, names[1:3]),
             ({"outcome": "error"}, ["hil-c"]),
             ({"change": "newly failing", "search": "sil"}, ["sil-b"]),
         ):
             fill(page, **form)
             assert shown(page) == expected
-            hidden = "Array.from(document.querySelectorAll('section.test'), s => !s.hidden).filter(Boolean).length"
-            assert page.value(hidden) == len(expected)
         page.value("location.hash = 'sil-a'")
         page.wait("!document.getElementById('sil-a').hidden")
         assert shown(page) == names
-        for column, expected in (("Set-up", ["sil-a", "sil-b"]), ("Set-up", ["sil-b", "sil-a"]), ("Level", names[3:5])):
-            buttons = "Array.from(document.querySelectorAll('#_tests th button'))"
-            page.value(f"{buttons}.find(button => button.textContent === '{column}').click()")
+        assert page.value("document.getElementById('sil-a').querySelector('details').open")
+        for order, expected in (("setup", ["sil-b", "sil-a"]), ("name", names[1:3]), ("", names[:2])):
+            fill(page, sort=order)
             assert shown(page)[:2] == expected
         cells = page.value("Array.from(document.querySelectorAll('.grid b'), cell => cell.textContent)")
         assert cells == ["failed", "failed", "passed", "passed"]
@@ -113,11 +114,14 @@ def test_no_column_is_clipped(chromium: Chromium, tmp_path: Path) -> None:
     for changes in (None, comparison):
         write_summaries(tmp_path, [*new, *grid], changes)
         with chromium.page((tmp_path / "index.html").as_uri()) as page:
-            assert page.value("document.querySelectorAll('.facts .curve, .pictures img').length") > 3
+            page.value("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+            assert page.value("document.querySelectorAll('.multiples .curve, .thumb svg').length") > 3
             for width in (1366, 1024, 768, 390):
                 page.resize(width, 900)
                 page.wait("document.documentElement.scrollWidth <= innerWidth")
-                cells = "Array.from(document.querySelectorAll('.facts, .wide, .wide :is(th, td), .checks :is(th, td)'))"
+                cells = (
+                    "Array.from(document.querySelectorAll('.facts-of, .wide, .wide :is(th, td), .row *, .multiples *'))"
+                )
                 wide = f"{cells}.filter(e => e.scrollWidth > e.clientWidth + 1 && e.checkVisibility())"
                 assert page.value(f"{wide}.map(e => [e.className, e.textContent, e.scrollWidth])") == [], width
 
@@ -130,21 +134,24 @@ def test_another_script_does_not_run_and_all_tests_are_shown_without(chromium: C
     with chromium.page(page_file.as_uri()) as page:
         assert page.value("window.hacked") is None
         assert "Content Security Policy" in str(page.faults)
-        assert shown(page) == [test.name for test in TESTS]
+        assert sorted(shown(page)) == sorted(test.name for test in TESTS)
         assert page.value("document.getElementById('_filters').checkVisibility()") is False
 
 
 def shown(page: Page) -> list[str]:
-    """The names in the table that can be seen."""
-    rows = "Array.from(document.querySelectorAll('#_tests tbody tr')).filter(row => row.checkVisibility())"
-    return list(page.value(f"{rows}.map(row => row.cells[0].textContent)"))
+    """The names of the tests that can be seen."""
+    rows = "Array.from(document.querySelectorAll('.test')).filter(row => row.checkVisibility())"
+    return list(page.value(f"{rows}.map(row => row.querySelector('h3').textContent)"))
 
 
 def fill(page: Page, **values: str) -> None:
-    for name in ("search", "outcome", "level", "change"):
+    values = {"outcome": "all", **values}
+    for name in ("search", "outcome", "level", "change", "sort"):
+        fill_one = "field.value = value; (field.dispatchEvent ? field : field[0]).dispatchEvent(event)"
+        event = "new Event('input', {bubbles: true})"
         field = f"document.getElementById('_filters').elements['{name}']"
         page.value(
-            f"{field}.value = '{values.get(name, '')}'; {field}.dispatchEvent(new Event('input', {{bubbles: true}}))"
+            f"((field, value, event) => {{ if (field) {{ {fill_one} }} }})({field}, '{values.get(name, '')}', {event})"
         )
 
 
@@ -162,7 +169,7 @@ def test_strings_of_others_are_text(chromium: Chromium, tmp_path: Path) -> None:
     write_summaries(tmp_path, outcomes, compare(outcomes, GivenReport(Path(texts[0]), old)))
     with chromium.page((tmp_path / "index.html").as_uri()) as page:
         page.value("document.querySelectorAll('details').forEach(each => { each.open = true; })")
-        tags = "img, svg, iframe, base, body style, body link, body meta"
+        tags = "img, svg:not(.bar), iframe, base, body style, body link, body meta"
         tags = f"Array.from(document.querySelectorAll('{tags}'), e => e.outerHTML)"
         assert page.value(tags) == []
         assert page.value("document.querySelectorAll('script').length") == 1
@@ -180,3 +187,68 @@ def test_strings_of_others_are_text(chromium: Chromium, tmp_path: Path) -> None:
 
 def test_names_of_matrices_break_between_their_values_alone() -> None:
     assert breakable("t[a=0.45,b=<x>]") == "t<wbr>[a=0.45,<wbr>b=&lt;x&gt;]"
+
+
+@pytest.mark.parametrize(
+    ("checked", "expected"),
+    [
+        (check(2.0, ok=False, max=1), BarPlace(0, 50, 50, 25, False)),
+        (check(0.5, min=1, ok=False), BarPlace(50, 100, 33, 17, False)),
+        (check(3.0, min=1), BarPlace(50, 100, 50, 33, True)),
+        (check(2.0, min=1, max=3), BarPlace(25, 75, 25, 25, True)),
+        (check(9.0, min=1, max=3, ok=False), BarPlace(25, 75, 75, 21, False)),
+        (check(0.0, min=0, ok=False), BarPlace(50, 100, 50, 2, False)),  # a wall that is touched
+        (check(None, min=1, ok=False), None),
+        (check(2.0), None),
+    ],
+)
+def test_a_bar_leads_from_the_limit_to_the_value(checked: dict[str, object], expected: BarPlace | None) -> None:
+    assert place(checked) == expected
+
+
+def test_equal_bars_of_a_page_are_drawn_once() -> None:
+    bars = Bars()
+    assert bars.symbols() == ""
+    drawn = [bars.bar(check(value, max=4)) for value in (1.0, 3.0, 1.0)]
+    assert drawn[0] == drawn[2] != drawn[1]
+    assert bars.symbols().count("<symbol") == 2
+
+
+def test_a_matrix_is_one_row_and_what_did_not_pass_comes_first() -> None:
+    found = [(row.outcomes[0].name, len(row.outcomes), row.count("failed")) for row in overview.rows(TESTS)]
+    assert found == [("sil-b", 1, 1), ("dil-m[light=dark,speed=1]", 4, 2), ("hil-c", 1, 0), ("sil-a", 1, 0)]
+
+
+def test_a_usual_page_of_a_hundred_tests_is_below_half_a_megabyte() -> None:
+    """Each with a drive, seven checks with limits, fifteen without, logs of eight services and the latest runs."""
+    limited = [{**check(0.2, max=1.0, unit="m"), "name": name} for name in list(MEANINGS)[:7]]
+    counted = [{**check(7.0), "name": name} for name in list(MEANINGS)[7:22]]
+    tests = [named(f"sil-{n}", checks=(*limited, *counted), description="Find the cones.") for n in range(100)]
+    way = Markup("<svg>" + "l6 0 " * 120 + "</svg>")
+    page = render(
+        tests,
+        ReportFiles(
+            {test.slug: [] for test in tests},
+            {test.slug: [f"{test.slug}/logs/environment.{layer}.log" for layer in "abcdefgh"] for test in tests},
+            {test.slug: f"{test.slug}/test.rec" for test in tests},
+            {},
+            {test.slug: f"{test.slug}/drive.html" for test in tests},
+            ways={test.slug: way for test in tests},
+        ),
+    )
+    assert 250_000 < len(page.encode()) < 500_000
+
+
+def test_the_branch_is_shown_where_its_commit_is_the_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    git = ("git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
+    for words in (("init", "-q", "-b", "<main>"), ("commit", "-q", "--allow-empty", "-m", "x")):
+        subprocess.run([*git, *words], check=True)
+    commit = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+    for name, value in (("CI_COMMIT_SHA", "b" * 40), ("CI_COMMIT_REF_NAME", "of-the-job")):
+        monkeypatch.setenv(name, value)
+    for of_run, shown_branch in ((commit, "&lt;main&gt;"), ("b" * 40, "of-the-job"), ("c" * 40, None)):
+        run = RunRecord("2026-11-23T04:10:00+00:00", "host", "1", "dodo run", (Repository("tests", of_run, False),))
+        write_summaries(tmp_path / "report", TESTS, circumstances=Circumstances((run,)))
+        found = re.findall("<dt>Branch</dt><dd>(.*?)</dd>", (tmp_path / "report" / "index.html").read_text())
+        assert found == ([shown_branch] if shown_branch else [])

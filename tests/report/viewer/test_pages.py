@@ -248,3 +248,32 @@ def test_a_phone_shows_everything_below_one_another(page: Page) -> None:
     page.wait("document.documentElement.scrollWidth <= innerWidth")
     tops = page.value("Array.from(document.querySelectorAll('main > section'), e => e.getBoundingClientRect().top)")
     assert tops == sorted(tops)
+
+
+@pytest.mark.parametrize("page", ["timeout"], indirect=True)
+def test_keys_lead_to_other_failed_tests_and_list_themselves(page: Page) -> None:
+    for key, number in (("n", 2), ("p", 1)):
+        page.press(key)
+        page.wait(f"location.href.includes('/test-{number}/') && window.dodo && dodo.header && dodo.cursor.time() > 0")
+    page.press("?")
+    page.wait("document.querySelector('dialog').open")
+    links = page.value("Array.from(document.querySelectorAll('#actions a'), each => each.getAttribute('href'))")
+    assert links == ["../test-0/drive.html", "../test-2/drive.html"]
+    assert page.value("document.querySelector('.jump').textContent") == "Jump to failure"
+
+
+def test_the_command_is_quoted_and_lines_of_services_that_are_ready_are_hidden(
+    chromium: Chromium, tmp_path: Path
+) -> None:
+    crash = failures.crash()
+    said = [(-0.5, '{"dodo": "ready"}'), (0.1, "looking")]
+    outcome = {**crash.outcome, "name": "a[of='x $HOME'][run=2]", "seed": 7}
+    drives.write(tmp_path / "report", [replace(crash, outcome=outcome, logs={**crash.logs, "evaluation.track": said})])
+    with chromium.page((tmp_path / "report" / "test-0" / "drive.html").as_uri()) as page:
+        assert page.value("dodo.header.command()") == r"dodo run 'a[of='\''x $HOME'\'']' --seed 7"
+        lines = "Array.from(document.querySelectorAll('.lines p'), e => [e.innerText, e.checkVisibility()])"
+        shown = f"{lines}.filter(([text]) => /ready|looking/.test(text)).map(([, isShown]) => isShown)"
+        assert page.value(shown) == [False, True]
+        page.value("document.querySelectorAll('#log input[type=checkbox]')[1].click()")
+        assert page.value(shown) == [True, True]
+        assert page.faults == []

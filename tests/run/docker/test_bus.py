@@ -32,7 +32,7 @@ def test_it_is_received_on_the_host(cid: int) -> None:
 
 
 def test_a_host_that_cannot_send_is_an_error() -> None:
-    with pytest.raises(BackendError, match="the begin of the test cannot be announced to its services: "):
+    with pytest.raises(BackendError, match="the start of the test cannot be announced to its services: "):
         asyncio.run(announce_begin(7, [("225.0.0.999", 1)], None))
 
 

@@ -28,6 +28,15 @@ def test_a_failure_on_a_busy_machine_is_an_error() -> None:
     assert judged.load == replace(CROWDED, undecided=True)
 
 
+def test_lockstep_is_no_way_out_for_an_application_with_a_clock_of_its_own() -> None:
+    reason = consider(FAILED, CROWDED, is_timed=True).finding.reason
+    assert reason.endswith(
+        "; the application acts by its own clock: run it on a quiet machine (-j 1), or with --clock virtual, not in "
+        "lockstep"
+    )
+    assert "--clock lockstep" not in reason
+
+
 @pytest.mark.parametrize(
     ("load", "why"),
     [

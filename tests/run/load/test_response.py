@@ -76,3 +76,38 @@ def test_sample_times_have_to_be_copied_where_the_test_says_so(uncopied: int) ->
     reasons = [f"{uncopied} of 60 answers did not carry the sample time of their frame"] if uncopied else []
     assert [finding.reason for finding in found.findings] == reasons
     assert judged_response(replace(FAST, uncopied=uncopied), PLAIN, []).checks == ()
+
+
+TIMED = replace(FAST, surplus=174, surplus_frames=17, differing=9, pauses=2, unasked=2)
+WAY = ": results can differ from run to run; run it with --clock realtime, or --clock virtual"
+
+
+@pytest.mark.parametrize(
+    ("response", "timed", "note"),
+    [
+        (
+            TIMED,
+            (),
+            "the application acts by its own clock: it sent messages in 2 of 2 pauses without a frame; 174 surplus "
+            f"answers in 17 of 61 frames, 9 of them with other values{WAY}",
+        ),
+        (
+            replace(FAST, pauses=2),
+            ("driver",),
+            f"the application acts by its own clock: 'driver' declares timers (x-dodo: timed){WAY}",
+        ),
+        (
+            replace(TIMED, unasked=0, differing=0),
+            (),
+            "174 surplus answers in 17 of 61 frames: the first answer to a frame counts, and the others are dropped",
+        ),
+    ],
+    ids=["seen", "declared", "answers more than once"],
+)
+def test_a_clock_of_its_own_is_a_note_and_no_error(response: Response, timed: tuple[str, ...], note: str) -> None:
+    found = judged_response(response, PLAIN, ["driver"], timed)
+    assert (found.notes, found.findings, found.checks) == ((note,), (), ())
+
+
+def test_a_few_surplus_answers_are_no_note() -> None:
+    assert judged_response(replace(FAST, surplus=6, surplus_frames=6, pauses=2), PLAIN, []).notes == ()

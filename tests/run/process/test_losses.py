@@ -61,6 +61,6 @@ def test_what_the_recorder_lost_reaches_the_outcome(tmp_path: Path, monkeypatch:
     assert recorded[-2:] == [LAST, RECORDING_END]
     lost = CROWD - recorded.count(1086)
     assert lost > 0
-    note = f"service 'dodo-recorder' lost {lost} messages, as its receive buffer was full"
+    note = f"service 'dodo-recorder' lost {lost} messages, because its receive buffer was full"
     assert outcome.notes == (f"{note}: the recording is incomplete",)
     assert f"{lost} messages were lost" in bench.log(plan, "environment.dodo-recorder")

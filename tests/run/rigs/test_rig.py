@@ -36,7 +36,7 @@ def test_a_hil_test_on_a_real_rig(place: Place) -> None:
 def test_a_tuned_rig_is_checked_and_calibrated_once(place: Place) -> None:
     words = ("tune", "hil-fake", *APPLICATION, "--runs", "1", "--metres", "20")
     out = place.dodo(*words, code=0)
-    assert "on rig fake: at most 30 min, and 20 m of way" in out and "2 of 2 drives" in out
+    assert "on rig fake: at most 30 min, and 20 m of driving" in out and "2 of 2 drives" in out
     received = [word for word, _ in place.rig.received]
     assert "CALIBRATE" in received and "CALIBRATE" not in received[received.index("RUN") :]
     assert place.rig.last() == "STOP"

@@ -166,8 +166,8 @@ def test_what_does_not_convert_is_said_once_and_is_no_message(desk: Desk) -> Non
         (3, 0, {"groundSteering": 0.5})
     ]
     assert desk.said == [
-        f"a line of 'app' is no {STEERING}: groundSteering '0.1.2' is no number: 'group_06;1;0.1.2'",
-        f"a line of 'app' is no {STEERING}: sample_time '99999999999999999' is no time in microseconds: "
+        f"a line of 'app' is not a valid {STEERING}: groundSteering '0.1.2' is no number: 'group_06;1;0.1.2'",
+        f"a line of 'app' is not a valid {STEERING}: sample_time '99999999999999999' is not a time in microseconds: "
         f"'{late.decode()}'",
     ]
 

@@ -171,6 +171,9 @@ RESPONSE = {
 }
 
 
+SENT_ON = {"surplus": 174, "surplus_frames": 17, "differing": 3, "pauses": 2, "unasked": 2}
+
+
 def response(**changes: object) -> str:
     return json.dumps({"dodo": "response", **RESPONSE, **changes})
 
@@ -183,6 +186,9 @@ CLOCKED = {
     response(median_s=None): None,
     response(worst_s=-1): None,
     response(p95_s="0.1"): None,
+    response(**SENT_ON): Responded(Response(**RESPONSE, **SENT_ON)),  # type: ignore[arg-type]
+    response(surplus=-1): None,
+    response(unasked=True): None,
     response(processor=7): Responded(Response(**RESPONSE)),  # type: ignore[arg-type]
     '{"dodo": "time", "s": 1.5}': Time(1.5, False),
     '{"dodo": "time", "s": 2, "last": true}': Time(2.0, True),

@@ -122,6 +122,15 @@ def test_one_who_answers_twice_drives_as_one_who_answers_once() -> None:
     assert (once.surplus, twice.surplus) == (0, 2)
 
 
+def test_surplus_answers_are_counted_with_their_frames_and_what_they_say() -> None:
+    answers = answering(said(STEER, FRAME, b"a"), said(STEER, FRAME, b"a"), said(PEDAL, FRAME, b"b"))
+    answers.collect()
+    show(answers, NEXT)
+    for envelope in (said(STEER, NEXT, b"c"), said(STEER, NEXT, b"d"), said(STEER, FRAME, b"e"), said(4711, NEXT)):
+        answers.take(envelope)
+    assert (answers.surplus, answers.surplus_frames, answers.differing, answers.heard) == (3, 2, 2, 6)
+
+
 def test_names_with_and_without_a_stamp() -> None:
     assert filters(["a.B", "a.B/3"], {"a.B": 5}) == (MessageFilter("a.B", 5), MessageFilter("a.B/3", 5, 3))
     for wrong in ("a.C", "a.B/x"):

@@ -270,7 +270,7 @@ def test_with_sample_times_of_their_own_the_newest_says_what_was_observed() -> N
 def test_a_window_without_a_target_is_the_fault_of_the_test(limits: SignalLimits, seconds: int, text: str) -> None:
     with pytest.raises(UnjudgeableError) as raised:
         decided(judge(limits), seconds)
-    assert str(raised.value) == f"there is no time to judge: the target is from 0.00 s to 10.00 s, {text}"
+    assert str(raised.value) == f"no time to judge: the target is from 0.00 s to 10.00 s, {text}"
 
 
 @pytest.mark.parametrize(("limit", "outcome"), [(0.5, "passed"), (math.nextafter(0.5, 0), "failed")])

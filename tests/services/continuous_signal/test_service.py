@@ -92,7 +92,7 @@ def test_a_live_target_has_its_own_message(table: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "there is no target: give --target, or --target-sender of one that comes live"),
+        ((), "no target: give --target, or --target-sender for a live one"),
         (("--target=TABLE", "--min-share=0.9"), "--min-share needs --band, the distance that counts as inside"),
         (("--target=TABLE", "--min-frame-share=0.9"), "--min-frame-share needs --band, the distance that counts"),
         (
@@ -114,7 +114,7 @@ def test_flags_that_leave_something_open_are_refused(table: Path, words: tuple[s
 
 def test_a_test_without_a_limit_is_refused(table: Path) -> None:
     open_ended = Flags({**flags(f"--target={table}"), "max-mean": None})
-    with pytest.raises(ValueError, match=r"^there is no limit: give one or more of --max-mean, --max-std, --"):
+    with pytest.raises(ValueError, match=r"^no limit: give one or more of --max-mean, --max-std, --"):
         ContinuousSignal(Context("continuous-signal", open_ended, MessageSet.standard()))
 
 

@@ -95,7 +95,7 @@ def test_the_area_is_a_loop_of_the_map(tmp_path: Path) -> None:
     with judge(f"--map-path={tmp_path}", "--area=lawn", "--length=4", "--width=1") as it:
         frame(it, 0, 1, 0.5)
         assert decided(it, 1).checks[0].value == 0.5
-    said = f"the lines of obstacle 'open' of the map {tmp_path} enclose nothing: end where they begin"
+    said = f"the lines of obstacle 'open' of the map {tmp_path} enclose nothing: they must end where they begin"
     assert refusal("coverage", f"--map-path={tmp_path}", "--area=open") == said
     said = f"the map {tmp_path} has no obstacle 'x'; it has lawn, open"
     assert refusal("coverage", f"--map-path={tmp_path}", "--area=x") == said

@@ -45,8 +45,8 @@ def test_silence_is_explained() -> None:
 def test_a_measure_without_a_value_says_why() -> None:
     reason = verdict(score(0, 0, 0), DetectionLimits(precision=0.1, recall=0.1), "").reason
     assert reason == (
-        "precision has no value (at least 0.1), as nothing was detected; "
-        "recall has no value (at least 0.1), as there was nothing to detect"
+        "precision has no value (at least 0.1), because nothing was detected; "
+        "recall has no value (at least 0.1), because there was nothing to detect"
     )
 
 
@@ -71,7 +71,7 @@ def test_a_class_that_is_worse_than_another_is_named() -> None:
     reason = verdict(by_class(yellow=Counts(0, 0, 3), blue=Counts(3, 0, 0)), ALL, "").reason
     assert reason == (
         "recall is 0.5 (at least 0.9), with 3 missed beside 3 found; "
-        "precision of yellow has no value (at least 0.9), as nothing was detected; "
+        "precision of yellow has no value (at least 0.9), because nothing was detected; "
         "recall of yellow is 0 (at least 0.9), with 3 missed beside 0 found"
     )
 

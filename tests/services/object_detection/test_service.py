@@ -66,7 +66,7 @@ def test_it_hears_what_its_flags_name(truth: Path) -> None:
         ((*LIMITS, "--truth-sender=0"), "--truth-sender=0 is the --sender of the detections"),
         (
             ("--truth=TRUTH",),
-            "there is no limit: give one or more of --min-precision, --min-recall, --min-f1",
+            "no limit: give one or more of --min-precision, --min-recall, --min-f1",
         ),
         (
             (*LIMITS, "--truth=TRUTH", "--max-time=1"),

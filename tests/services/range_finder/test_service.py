@@ -70,7 +70,7 @@ def test_silence_and_frames_that_are_none(folder: Path, caplog: pytest.LogCaptur
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
-        (["--id=0,0"], "--id needs a sender stamp of its own for each sensor"),
+        (["--id=0,0"], "--id needs a different sender stamp for each sensor"),
         (["--id=0,1,2", "--yaw=0,90"], "--yaw has 2 items, expected one, or 3 as --id has"),
         (["--id=0", "--sensor=ultrasonic", f"--message={VOLTAGE}"], f"--message={VOLTAGE} is of infrared sensors"),
         (["--id=0", "--min-range=2", "--max-range=2"], "the range from 2 to 2 m is empty"),

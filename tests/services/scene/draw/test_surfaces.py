@@ -143,5 +143,5 @@ def test_the_default_ground_has_structure_but_is_grey():
 def test_what_is_no_picture_is_told(tmp_path):
     for content in (b"", b"no picture"):
         (tmp_path / "a.png").write_bytes(content)
-        with pytest.raises(MapError, match=r"a\.png: not a readable picture"):
+        with pytest.raises(MapError, match=r"a\.png: not a readable image"):
             load_picture(tmp_path / "a.png")

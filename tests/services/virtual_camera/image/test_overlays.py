@@ -53,7 +53,7 @@ def test_overlays_that_make_no_sense_are_told(write_map):
 
 def test_an_overlay_of_a_broken_picture_is_told(write_map):
     folder = write_map({"overlay": [overlay()]}, {"t.png": "no picture"})
-    with pytest.raises(MapError, match=r"t\.png: not a (readable )?picture"):
+    with pytest.raises(MapError, match=r"t\.png: not a (readable )?image"):
         laid(folder)
 
 

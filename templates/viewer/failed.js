@@ -1,0 +1,2 @@
+// Overwritten in each report: the tests that did not pass.
+var dodoFailed = [];

@@ -1,0 +1,104 @@
+"""What repetitions of a test in lockstep have to have in common."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from dodo_dsl import package_data
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.outcome import Outcome
+from dodo_dsl.report import results
+from dodo_dsl.report.repetitions import Repeated, path_of, repeated
+from dodo_dsl.report.results import Circumstances
+from tests.report.test_report_folder import OUTCOME
+
+
+def check(name: str, value: float | None, ok: bool = True) -> dict[str, Any]:
+    return {"name": name, "value": value, "limit": {"max": 1.0}, "unit": "m", "ok": ok}
+
+
+FIRST = replace(
+    OUTCOME, clock="lockstep", outcome="passed", reason="reached it", sim_s=4.0, execution_s=1.0,
+    checks=(check("gap", 0.1), check("gap", 0.2), check("slow-answers", 0.0)),
+)  # fmt: skip
+
+
+def among(folder: Path, *outcomes: Outcome) -> list[Repeated]:
+    runs = [replace(outcome, slug=f"test--run-{n}") for n, outcome in enumerate(outcomes, 1)]
+    return repeated((folder / "compiled", run, folder / run.slug) for run in runs)
+
+
+def test_what_measures_the_machine_may_differ(tmp_path: Path) -> None:
+    slower = replace(FIRST, execution_s=9.0, notes=("slow",), checks=(*FIRST.checks[:2], check("slow-answers", 0.4)))
+    (found,) = among(tmp_path, FIRST, slower)
+    assert found == Repeated("test--run-1", ("test--run-1", "test--run-2"))
+    assert list(found.lines()) == ["test--run-1: the 2 runs in lockstep have the same values"]
+    failed = replace(FIRST, outcome="failed", reason="9 answers took 2 s", checks=(check("slow-answers", 2, ok=False),))
+    (found,) = among(tmp_path, failed, replace(failed, reason="8 answers took 3 s"))
+    assert found.differing == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"outcome": "failed"}, "outcome: passed in runs 1, 3; failed in run 2"),
+        ({"reason": "near it"}, "reason: reached it in runs 1, 3; near it in run 2"),
+        ({"sim_s": 4.1}, "test time: 4.0 s in runs 1, 3; 4.1 s in run 2"),
+        ({"sim_s": None}, "test time: 4.0 s in runs 1, 3; none in run 2"),
+        ({"checks": (check("gap", 0.1), check("gap", 0.3))}, "gap (1): 0.2 m in runs 1, 3; 0.3 m in run 2"),
+        ({"checks": (check("gap", 0.1),)}, "gap (1): 0.2 m in runs 1, 3; none in run 2"),
+    ],
+    ids=str,
+)
+def test_any_other_value_that_differs_is_named_with_its_runs(
+    change: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    (found,) = among(tmp_path, FIRST, replace(FIRST, **change), FIRST)
+    assert list(found.lines()) == ["test--run-1: the 3 runs in lockstep differ", f"        {words}"]
+
+
+def test_of_many_values_some_are_shown(tmp_path: Path) -> None:
+    (found,) = among(tmp_path, *(replace(FIRST, sim_s=float(n)) for n in range(9)))
+    assert list(found.lines())[1].endswith("; 3.0 s in run 4; and 5 more")
+
+
+def test_the_path_is_compared_by_its_messages_alone(tmp_path: Path) -> None:
+    messages = MessageSet.standard()
+
+    def recorded(run: int, *names: str) -> None:
+        file = tmp_path / f"test--run-{run}" / "test.rec"
+        file.parent.mkdir()
+        frames = (Envelope(messages.id(name), b"", run, 0, 7, 0) for name in names)
+        file.write_bytes(b"".join(map(encode_frame, frames)))
+
+    frame, other = "opendlv.sim.Frame", "opendlv.proxy.GroundSteeringRequest"
+    for run, names in ((1, (frame,)), (2, (other, frame)), (3, (frame, frame))):
+        recorded(run, *names)
+    paths = [path_of(tmp_path / f"test--run-{run}" / "test.rec") for run in (1, 2, 3, 4)]
+    assert paths[0] == paths[1] != paths[2]
+    assert paths[3] == "none"
+    (found,) = among(tmp_path, FIRST, FIRST, FIRST)
+    assert [each.name for each in found.differing] == ["path"]
+
+
+def test_in_real_time_and_of_single_runs_nothing_is_compared(tmp_path: Path) -> None:
+    steady = replace(FIRST, clock="realtime")
+    assert among(tmp_path, steady, replace(steady, sim_s=5.0)) == []
+    assert among(tmp_path, FIRST) == []
+
+
+def test_results_hold_them(tmp_path: Path) -> None:
+    (found,) = among(tmp_path, FIRST, replace(FIRST, reason="\udc80"))
+    circumstances = results.writable_circumstances(Circumstances(repeated=(found,)))
+    text = results.to_json([FIRST], circumstances)
+    jsonschema.validate(json.loads(text), json.loads((package_data.schemas() / "results.schema.json").read_text()))
+    (tmp_path / "results.json").write_text(text)
+    read = results.read_results(tmp_path / "results.json")
+    assert read.circumstances.repeated[0].differing[0].values == ("reached it", "?")
+    assert results.joined([read, read]).repeated == 2 * read.circumstances.repeated
+    assert "repeated" not in results.to_json([FIRST])
