@@ -351,7 +351,7 @@ class VirtualApplication:
                     f"of its own time within {time.monotonic() - began:.0f} s of wall time"
                 )
         spent = time.monotonic() - began
-        self.waited_first += spent if self.frames == 1 else 0.0
+        self.waited_first += spent if self.frames <= 1 else 0.0
         self.waited += spent if self.frames > 1 else 0.0
 
     @property

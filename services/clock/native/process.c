@@ -9,6 +9,10 @@
 #include <sys/wait.h>
 #include <threads.h>
 
+#ifndef SYS_pidfd_open
+#define SYS_pidfd_open 434
+#endif
+
 enum { MOST_CHILDREN = 128, RETRY_NS = 1000000, LOOK_AGAIN_NS = 100000000 };
 
 static pthread_key_t at_end;
