@@ -58,7 +58,7 @@ def test_fifty_drives_under_load_are_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.proof
-def test_a_program_with_libclouns_timers_drives_the_same_each_time(tmp_path: Path) -> None:
+def test_a_program_with_libcluons_timers_drives_the_same_each_time(tmp_path: Path) -> None:
     """With libcluon as a header, ``LIBCLUON_HEADER=.../cluon-complete.hpp``."""
     header = os.environ.get("LIBCLUON_HEADER")
     if not header or not shutil.which("cmake") or not shutil.which("g++"):
