@@ -38,7 +38,7 @@ class ApplicationTime:
     agent: Path
 
     def words(self, plan: Plan, folder: str, *, on_host: bool) -> tuple[str, ...]:
-        """The agent's command, for a sandbox whose applications have process namespaces of their own."""
+        """The agent's command, for a sandbox whose applications have their own process namespaces."""
         others = ("--by-environment",) if on_host else ()
         flags = agent_flags(len(plan.application.services), plan.seed, folder)
         return (str(self.agent), *flags, "--nested", *others)

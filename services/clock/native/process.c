@@ -1,4 +1,4 @@
-/* Threads and processes: each begins, forks and ends with a slot of its own. */
+/* Threads and processes: each begins, forks and ends with its own slot. */
 #define _GNU_SOURCE
 #include "library.h"
 
