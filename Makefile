@@ -47,6 +47,7 @@ style: dev
 	.venv/bin/ruff format --check --quiet .
 	.venv/bin/ruff check --quiet .
 	PYTHONPATH=. .venv/bin/lint-imports
+	@scripts/count-words --check
 
 types: dev
 	$(BESIDE) .venv/bin/mypy

@@ -24,7 +24,7 @@ _OF_MACHINE = re.compile(
     r"/dev/(mem|kmem|port|kmsg|(s|h|v|xv)d[a-z]\d*|(nvme|mmcblk|loop|nbd|mtd|zram|ram|vhost|tpm|watchdog)[^/]*"
     r"|(dm-|md|sr|sg|bsg/)[^/]*|(mapper|disk|block|char|cpu)(/.*)?|kvm|fuse|btrfs-control|snapshot|userfaultfd)"
 )
-"""Devices that are no hardware of a robot: disks, memory and the kernel's own."""
+"""Devices that are not robot hardware: disks, memory and the kernel's own."""
 _OF_DESKTOP = re.compile(
     r"/(var/)?run/user/\d+/(pulse|pipewire|wayland)[^/]*(/native)?|/tmp/\.X11-unix(/.*)?|(.*/)?\.Xauthority"
 )

@@ -189,7 +189,7 @@ _PLAIN = re.compile(r"[\w./-]+")
 
 
 def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnostic]:
-    """A warning where compose would read other files together with one of ``paths``.
+    """A warning if compose would read other files together with one of ``paths``.
 
     Its hint names files as ``dodo.yml`` does, which is in ``root`` or else next to them.
     """

@@ -64,7 +64,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class EnvFile:
-    """A path of ``env_file`` with its place; ``required`` is False where compose starts without the file."""
+    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file."""
 
     path: str
     span: Span
@@ -75,7 +75,7 @@ class EnvFile:
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo, or where that says nothing of messages.
+    ``declared`` is None without x-dodo, or if that says nothing of messages.
     ``cid_variables`` are the CID variables that its ``env_files`` set.
     """
 

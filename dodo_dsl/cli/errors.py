@@ -68,7 +68,7 @@ def sentence(error: Exception) -> str:
 
 
 def _is_no_utf8(error: Exception) -> bool:
-    """Whether the bytes of a name, which are no UTF-8, were to be written as text."""
+    """Whether the bytes of a name, which are not UTF-8, were to be written as text."""
     return isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed"
 
 

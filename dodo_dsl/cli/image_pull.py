@@ -79,7 +79,7 @@ def _tests(options: argparse.Namespace) -> tuple[Checked, Rig]:
 
 
 def _remote(name: str, platform: str, hint: str) -> RemoteImage:
-    """An image of a registry; raises DockerError with the ``hint`` where it has none."""
+    """An image of a registry; raises DockerError with the ``hint`` if it has none."""
     try:
         return remote.remote_image(name, platform)
     except docker_command.DockerError as error:

@@ -44,7 +44,7 @@ def dockerfiles(deployment: Deployment) -> Dockerfiles:
 
 
 def require_dockerfiles(names: Collection[str], own: Dockerfiles, images: Sequence[Image]) -> None:
-    """Raises UsageError where an image is named that has no Dockerfile."""
+    """Raises UsageError if an image is named that has no Dockerfile."""
     for image in images:
         if image.name in names and own.get(image.name, Path()) is None:
             base = images_names.beside(image.reference, "base")
@@ -229,7 +229,7 @@ def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:
     found = choose(options.name, (*names, *own), prefix, options.tag or deployment.image_tag)
     if options.name:
         return found
-    is_left = options.action == "sbom"  # what an image of somebody else's is made of, it may not be able to tell
+    is_left = options.action == "sbom"  # it may not know what somebody else's image is made of
     return [image for image in found if image.name not in own or (own[image.name] and not is_left)]
 
 

@@ -126,7 +126,7 @@ class Destination:
 
 
 def destination(checked: Checked) -> Destination:
-    """Raises UsageError where ``dodo.yml`` is wrong or names no folder of the repository."""
+    """Raises UsageError if ``dodo.yml`` is wrong or names no folder of the repository."""
     deployment = checked.deployment
     root = deployment.root.resolve()
     schemas = missing_schemas(root)

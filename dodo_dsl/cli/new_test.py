@@ -1,6 +1,6 @@
 """What ``dodo new`` writes for a new test: from a template, as a copy of a shipped test, or extending another one.
 
-The level and the kind say which. A copy of a shipped test is in the user's registry, where it can be changed.
+The level and the kind say which. A copy of a shipped test is in the user's registry, if it can be changed.
 """
 
 import os

@@ -239,7 +239,7 @@ def _named(word: str) -> tuple[str, Path]:
 
 
 def _check_goals(teams: dict[str, list[Outcome]]) -> None:
-    """Raises UsageError where two runs of a test have other goals: their scores say nothing about each other."""
+    """Raises UsageError if two runs of a test have other goals: their scores say nothing about each other."""
     known: dict[str, tuple[str, tuple[Goal, ...]]] = {}
     for team, outcomes in teams.items():
         for outcome in outcomes:

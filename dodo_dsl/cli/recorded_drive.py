@@ -187,7 +187,7 @@ def files(
 
 
 def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None, pictures: Pictures) -> str:
-    """A warning where services of the application read pictures, of which the recording has none."""
+    """A warning if services of the application read pictures, of which the recording has none."""
     names = (*_MEMORIES, *pictures.memories.values())
     readers = [] if drive.cameras or application is None else wiring_rules.readers(application, names)
     if not readers:

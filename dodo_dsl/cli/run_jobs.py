@@ -200,7 +200,7 @@ def compile_tests(
 def sample(checked: compiler.Checked, number: int) -> tuple[compiler.Checked, dict[str, str]]:
     """The tests with ranges at the first values of a sweep, which depend on their seed alone.
 
-    With them the slug of each one's test by its own slug. Raises UsageError where no test has a range.
+    With them the slug of each one's test by its own slug. Raises UsageError if no test has a range.
     """
     require_extra("--samples", "search")
     if not any(test.spec.ranges for test in checked.tests):

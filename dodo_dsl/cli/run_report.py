@@ -109,7 +109,7 @@ def _table(passed: Sequence[Outcome], width: int | None) -> Iterator[list[Piece]
 
 
 def _margin(outcome: Outcome, room: int | None) -> str:
-    """The check nearest to its limit, with the limit where there is room; the verdict's sentence where none has one."""
+    """The check nearest to its limit, with the limit if there is room; the verdict's sentence if none has one."""
     value = decisive_value(outcome)
     limit = decisive_limits(outcome)
     whole = printable(f"{value} ({limit})" if limit else value or outcome.reason)

@@ -66,7 +66,7 @@ class SearchSession:
     def drives(
         self, study: Study, store: Store, folder: Path, limits: DriveLimits, total: int | None
     ) -> Iterator[Drives]:
-        """Drives by processes, with progress of ``total`` of them, None where time ends them."""
+        """Drives by processes, with progress of ``total`` of them, None if time ends them."""
         progress = SearchProgress(self.stdout, total, limits.deadline)
         try:
             yield Drives(study.checked, store, self._machine(study), progress, folder, limits)

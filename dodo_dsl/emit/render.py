@@ -3,7 +3,7 @@
 import functools
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,7 +13,7 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.application.model import FILES
-from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, containers, copy_command
+from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, Variable, containers, copy_command
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions
 from dodo_dsl.plan.added_services import RECORDER, TIME, TIME_MOUNT, agent_flags
@@ -67,25 +67,24 @@ _SHARED = (
 
 def _application(compose: dict[str, Any]) -> str:
     """The application's copy in block style; what several services share stands once."""
-    services: dict[str, dict[str, Any]] = compose.get("services") or {}
-    first, *others = services.values() or [{}]
-    shared = {
-        key: first[key]
-        for key in _SHARED
-        if others and key in first and all(repr(other.get(key)) == repr(first[key]) for other in others)
-    }
+    blocks = {name: {k: _dumped({k: v}) for k, v in each.items()} for name, each in compose["services"].items()}
+    first, *others = blocks.values()
+    shared = {k: first[k] for k in _SHARED if others and k in first and all(o.get(k) == first[k] for o in others)}
     if not shared:
         return _yaml_block(compose)
     parts = [
         "# What all services share; 'sandbox' in dodo.yml sets the limits.",
-        f"x-shared: &shared\n{textwrap.indent(_yaml_block(shared, _SERVICE_DEPTH), '  ')}\n\nservices:",
+        f"x-shared: &shared\n{_indented(shared.values(), 2)}\n\nservices:",
     ]
-    for name, service in services.items():
-        own = _yaml_block({key: value for key, value in service.items() if key not in shared}, _SERVICE_DEPTH)
+    for name, block in blocks.items():
         head = _dumped({name: None}).removesuffix(" null")
-        parts.append(textwrap.indent(f"{head}\n  <<: *shared\n{textwrap.indent(own, '  ')}", "  "))
+        parts += [f"  {head}", _indented(["<<: *shared", *(block[key] for key in block if key not in shared)], 4)]
     rest = {key: value for key, value in compose.items() if key != "services"}
     return "\n".join([*parts, *([_yaml_block(rest)] if rest else [])])
+
+
+def _indented(blocks: Iterable[str], spaces: int) -> str:
+    return textwrap.indent("\n".join(blocks), " " * spaces)
 
 
 def _yaml_block(value: dict[str, Any], depth: int = 0) -> str:
@@ -119,13 +118,29 @@ def _plain(value: Any) -> str:
     """A string or a mapping of them on one line, without quotes where every reader of YAML takes it for the same."""
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{key}: {_within(each)}' for key, each in value.items())}}}"
-    is_safe = isinstance(value, str) and _PLAIN.fullmatch(value) and value.lower() not in _WORDS
-    return str(value) if is_safe else json_text(value)
+    return _word(value) if isinstance(value, str) else json_text(value)
+
+
+@functools.lru_cache(maxsize=_MOST_BLOCKS)
+def _word(text: str) -> str:
+    return text if _PLAIN.fullmatch(text) and text.lower() not in _WORDS else json_text(text)
+
+
+@functools.lru_cache(maxsize=_MOST_BLOCKS)
+def _variables(variables: tuple[Variable, ...], spaces: int) -> str:
+    """Environment variables, each below what it is for; a list of words that is long has a line for each."""
+    lines = []
+    for variable in variables:
+        lines += [f"# {variable.note}"] if variable.note else []
+        words = variable.lines
+        lines += [f"{variable.name}: >-", *(f"  {word}" for word in words)] if words else []
+        lines += [] if words else [f"{variable.name}: {_word(variable.value)}"]
+    return _indented(lines, spaces)
 
 
 def _within(value: Any) -> str:
     """A value between braces, where commas and colons say something."""
-    return _yaml(value) if isinstance(value, str) and set(value) & set(",:") else _plain(value)
+    return _yaml(value) if isinstance(value, str) and ("," in value or ":" in value) else _plain(value)
 
 
 @functools.cache
@@ -137,7 +152,9 @@ def _templates() -> jinja2.Environment:
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
         keep_trailing_newline=True,
     )
-    environment.filters.update(yaml=_yaml, plain=_plain, application=_application, dotenv=dotenv_line)
+    environment.filters.update(
+        yaml=_yaml, plain=_plain, variables=_variables, application=_application, dotenv=dotenv_line
+    )
     return environment
 
 

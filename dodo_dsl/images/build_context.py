@@ -27,6 +27,8 @@ _DATA = ("schemas", "templates", "tests_registry")
 """What DoDo has beside its package and the services."""
 _FIRMWARE, _RIG = "build/firmware", ("rig-emulator", "gantry.elf", "gantry-circle.elf")
 """The emulated rig, if ``make firmware`` has built it: part of the gantry's image."""
+_TIME, _OF_TIME = "build/time", ("dodo-time", "libdodo-time.so")
+"""What gives an application the test's time, if ``scripts/setup`` has built it: part of the sandbox's image."""
 
 
 def assemble(folder: Path, wheels: Path | None, *, whole: bool = False) -> None:
@@ -52,12 +54,14 @@ def assemble(folder: Path, wheels: Path | None, *, whole: bool = False) -> None:
         (folder / "rig").mkdir()
         for name in _RIG:
             shutil.copy2(root / _FIRMWARE / name, folder / "rig" / name)
+    if all((root / _TIME / name).is_file() for name in _OF_TIME):
+        shutil.copytree(root / _TIME, folder / "time")
     if wheels is not None:
         shutil.copytree(wheels, folder / "wheels", copy_function=_link)
 
 
 def _link(source: str, target: str) -> None:
-    """Hard-links a wheel, or copies it where that is impossible."""
+    """Hard-links a wheel, or copies it if that is impossible."""
     try:
         os.link(source, target)
     except OSError:

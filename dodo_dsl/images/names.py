@@ -32,11 +32,11 @@ class Image:
     name: str
     reference: str
     platform: str = ""
-    """That of the engine where it is empty."""
+    """That of the engine if it is empty."""
 
 
 def of_platforms(images: Sequence[Image], platforms: Sequence[str]) -> list[Image]:
-    """The images for each platform; where there are several, the tag names it: ``collision:1-arm64``."""
+    """The images for each platform; if there are several, the tag names it: ``collision:1-arm64``."""
     if len(platforms) < 2:
         return [replace(image, platform=platform) for platform in platforms for image in images] or list(images)
     return [replace(image, reference=tagged(image, one), platform=one) for one in platforms for image in images]
@@ -72,7 +72,7 @@ _DEFAULT = re.compile(rf"^\s*ARG\s+{BASE_ARGUMENT}=[\"']?(?:\S*/)?(?P<name>[\w-]
 
 
 def dockerfiles(manifests: Iterable[Manifest], shipped: Collection[str]) -> dict[str, Path | None]:
-    """The Dockerfile of each image that is none of DoDo's, by its bare name; None where a service has none."""
+    """The Dockerfile of each image that is none of DoDo's, by its bare name; None if a service has none."""
     found: dict[str, Path | None] = {}
     for manifest in sorted(manifests, key=lambda m: m.image):
         if manifest.has_own_image and manifest.image not in shipped:

@@ -22,7 +22,7 @@ class RemoteImage:
 
 
 def remote_image(reference: str, platform: str) -> RemoteImage:
-    """An image for a platform; raises DockerError where the registry has none."""
+    """An image for a platform; raises DockerError if the registry has none."""
     manifest = _inspect(reference, "--raw")
     whole = reference
     if "manifests" in manifest:

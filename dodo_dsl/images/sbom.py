@@ -1,7 +1,7 @@
 """Bills of materials: what an image, or the Python that runs DoDo, is made of, as CycloneDX 1.6 JSON.
 
 Packages name themselves and their licences: Python's by their metadata, Debian's by dpkg and their file `copyright`,
-where it has the form that programs read (DEP 5), else by the common licences that it refers to. The same contents give
+if it has the form that programs read (DEP 5), else by the common licences that it refers to. The same contents give
 the same text.
 """
 

@@ -22,7 +22,7 @@ CLOCK_MANIFEST = "clock"
 TIME = "dodo-time"
 """What gives the application the test's time, where the clock is virtual; its folder has that name, too."""
 RUNNER_VARIABLE = "DODO_RUNNER"
-"""Empty in the clock's container where no runner announces the start of the test, as with ``docker compose up``."""
+"""Empty in the clock's container if no runner announces the start of the test, as with ``docker compose up``."""
 
 _WALL_FACTOR, _WALL_SPARE_S = 10.0, 60.0
 

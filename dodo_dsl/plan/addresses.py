@@ -1,7 +1,6 @@
-"""CIDs and subnets by the names of tests, so that a test has the same ones whatever is compiled beside it.
+"""CIDs in the order of names, and subnets by names, so that the same specs get the same numbers on any machine.
 
-Each name gives a number. Where another test has it, the next free one is taken, in the order in which tests come, which
-is that of their names: so the same specs get the same numbers on any machine.
+A test keeps its subnet whatever else is compiled; if another test has it, the next free one is taken.
 """
 
 import ipaddress
@@ -13,27 +12,21 @@ class OutOfAddresses(ValueError):
     """More tests than the deployment's range can hold."""
 
 
-def _number(name: str, count: int) -> int:
-    return zlib.crc32(name.encode()) % count
-
-
-def cids(names: Sequence[str], isolations: Sequence[str], available: Sequence[int]) -> list[int]:
+def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
     """A CID for each test: unique while the range lasts, beyond it only tests on their own network share one.
 
     Tests on the host network come first. Raises OutOfAddresses when they alone are more than the range.
     """
     on_host = [i for i, isolation in enumerate(isolations) if isolation == "host"]
-    if len(names) > len(available) and len(on_host) >= len(available):
+    if len(isolations) <= len(available):
+        return list(available[: len(isolations)])
+    if len(on_host) >= len(available):
         raise OutOfAddresses(f"{len(on_host)} tests on the host network, but only {len(available)} CIDs")
-    others = [i for i, isolation in enumerate(isolations) if isolation != "host"]
-    given: dict[int, int] = {}
-    free = set(available)
-    for index in [*on_host, *others][: len(available)]:
-        first = _number(names[index], len(available))
-        given[index] = next(cid for cid in (*available[first:], *available[:first]) if cid in free)
-        free.remove(given[index])
-    shared = [cid for cid in available if cid not in {given[index] for index in on_host}]
-    return [given[i] if i in given else shared[_number(name, len(shared))] for i, name in enumerate(names)]
+    given = dict(zip(on_host, available, strict=False))
+    shared = list(available[len(on_host) :])
+    rest = (i for i in range(len(isolations)) if i not in given)
+    given.update((index, shared[n % len(shared)]) for n, index in enumerate(rest))
+    return [given[i] for i in range(len(isolations))]
 
 
 SMALLEST = 28
@@ -52,6 +45,10 @@ def subnets(network: ipaddress.IPv4Network, length: int = SMALLEST) -> list[str]
     return [str(part) for part in network.subnets(new_prefix=length)] if length >= network.prefixlen else []
 
 
+def _number(name: str, count: int) -> int:
+    return zlib.crc32(name.encode()) % count
+
+
 class Subnets:
     """Gives subnets of the deployment's network, apart from one another while there are free ones."""
 
@@ -65,7 +62,7 @@ class Subnets:
     def give(self, name: str, containers: int = 1) -> str:
         """A test's subnet, with room for so many containers.
 
-        Raises OutOfAddresses where the network is smaller than one.
+        Raises OutOfAddresses if the network is smaller than one.
         """
         network, length = self._network, prefix(containers)
         if length < network.prefixlen:
@@ -76,7 +73,7 @@ class Subnets:
         return f"{ipaddress.IPv4Address(int(network.network_address) + (index << (32 - length)))}/{length}"
 
     def _free(self, first: int, length: int) -> int:
-        """The first free subnet of a length from ``first`` on; ``first`` where none is free."""
+        """The first free subnet of a length from ``first`` on; ``first`` if none is free."""
         count = 1 << (length - self._network.prefixlen)
         for step in range(0 if length in self._full else count):
             index = (first + step) % count

@@ -126,7 +126,7 @@ def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
 
 
 def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
-    """A volume that the engine cannot make for a test, because its name has to tell tests apart."""
+    """A volume that the engine cannot make for a test, because its name must differ between tests."""
     name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
     if not name:
         return None
@@ -161,8 +161,7 @@ def _cids(tests: Sequence[ResolvedTest], deployment: Deployment, built_in: int |
     """
     reserved = [cid if test.rig and (cid := test.rig.cid) is not None else built_in for test in tests]
     free = [test for test, cid in zip(tests, reserved, strict=True) if cid is None]
-    isolations = [isolation(test.spec, test.rig) for test in free]
-    given = iter(addresses.cids([test.spec.slug for test in free], isolations, deployment.cids))
+    given = iter(addresses.cids([isolation(test.spec, test.rig) for test in free], deployment.cids))
     return [next(given) if cid is None else cid for cid in reserved]
 
 

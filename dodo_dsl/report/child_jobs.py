@@ -90,7 +90,7 @@ def fetch(pipeline: ParentPipeline, folder: Path) -> Iterator[tuple[str, Path | 
             elif job.get("status") != "success":
                 yield name, None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise error if isinstance(error, NoChildJobs) else NoChildJobs("GitLab's answer is no list of jobs") from error
+        raise error if isinstance(error, NoChildJobs) else NoChildJobs("GitLab's answer lists no jobs") from error
 
 
 def _fetched(pipeline: ParentPipeline, number: int, folder: Path) -> Path | None:

@@ -2,7 +2,7 @@
 
 A change is for the better or not by the side of its limit and the margin to it. Terminal, Markdown and the page have
 the words for changes in common. The Markdown is for the note of a merge request: short, and no text of others in it is
-markup. A test has one slug where several reports hold the same: retries, repetitions, or jobs that ran the same test.
+markup. A test has one slug if several reports hold the same: retries, repetitions, or jobs that ran the same test.
 What checks say elsewhere is here, too: what failed, and what only shows where a drive ended.
 """
 
@@ -73,7 +73,7 @@ Direction = Literal["worse", "better", "different", "unchanged"]
 
 @dataclass(frozen=True)
 class CheckChange:
-    """A check of a test in both reports; values in its unit, None where nothing was measured."""
+    """A check of a test in both reports; values in its unit, None if nothing was measured."""
 
     index: int
     """Of the check in the newer report's test."""
@@ -91,7 +91,7 @@ class CheckChange:
 
     @property
     def difference(self) -> float | None:
-        """Of the values, where they have one unit."""
+        """Of the values, if they have one unit."""
         is_comparable = self.before is not None and self.after is not None and self.unit == self.old_unit
         return self.after - self.before if is_comparable else None  # type: ignore[operator]
 
@@ -147,7 +147,7 @@ def _is_alike(before: float | None, after: float | None, limit: Mapping[str, flo
 
 
 def _shown(value: float | None) -> str:
-    """As pages and texts show it: what no one sees is no change."""
+    """As pages and texts show it: what no one sees is not a change."""
     return "none" if value is None else f"{value:.4g}"
 
 
@@ -290,7 +290,7 @@ def value_text(number: float | None, unit: str) -> str:
 
 
 def difference(check: CheckChange) -> str:
-    """``-0.07 m``; empty where there is none to tell."""
+    """``-0.07 m``; empty if there is none."""
     return "" if not check.difference else f"{check.difference:+.3g} {check.unit}".rstrip()
 
 

@@ -138,7 +138,7 @@ def _labels(check: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def to_moments(outcomes: Sequence[Outcome], pages: Mapping[str, str], folder: str) -> dict[str, str]:
-    """The page of each test at the moment that decided, where the verdict tells it.
+    """The page of each test at the moment that decided, if the verdict has it.
 
     ``pages`` are paths in the report by slug, ``folder`` the report as seen from the working folder. In a job of GitLab
     that is the job's folder, and links lead to the job's artifacts.

@@ -14,7 +14,7 @@ _CHOICE = re.compile(r"(?P<before>.*)\[(?P<choice>[^\[\]]+)\]")
 _NEXT = re.compile(r",(?=[a-z][a-z0-9-]*=)")
 _LONGEST_NAME = 1000
 _MOST_GAPS = 4
-"""Cells an outcome, of which a part may be empty where not all instances ran."""
+"""Cells an outcome, of which a part may be empty if not all instances ran."""
 _REPETITIONS = ("run", "report")
 """Dimensions whose first value is not written: ``--repeat`` and joined reports."""
 
@@ -28,7 +28,7 @@ class GridRow(NamedTuple):
 
 @dataclass(frozen=True)
 class MatrixGrid:
-    """A test's instances; ``column`` is the dimension of the columns, empty where there is but one dimension."""
+    """A test's instances; ``column`` is the dimension of the columns, empty if there is but one dimension."""
 
     name: str
     dimensions: Sequence[str]

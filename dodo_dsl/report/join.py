@@ -1,8 +1,9 @@
 """Any number of reports in one new folder, in which every link works offline.
 
 Copies are of files that reports hold: no symlinks, no more than fits. A report's ``drive.js`` is a script, and may come
-from a stranger: only the value that it assigns is kept, checked to be data, with this DoDo's page and scripts. For a
-comparison, the ways of another report's tests lie beside the pages of this one's, to be drawn over one another.
+from an untrusted source: only the value that it assigns is kept, checked to be data, with this DoDo's page and
+scripts. For a comparison, the ways of another report's tests lie beside the pages of this one's, to be drawn over one
+another.
 """
 
 import contextlib
@@ -171,7 +172,7 @@ def _refuse(constant: str) -> None:
 def join(reports: Sequence[GivenReport], out: Path) -> tuple[list[Outcome], list[str]]:
     """Copies results and files of the reports to ``out``, whose summaries are still to be written.
 
-    Returns the outcomes, and sentences on what was renamed or left out. Raises OSError, NotReplaceable where ``out`` is
+    Returns the outcomes, and sentences on what was renamed or left out. Raises OSError, NotReplaceable if ``out`` is
     anything but new, empty or an earlier report that is not among ``reports``; before that nothing is written.
     """
     tests = list(distinct(reports))
@@ -188,7 +189,7 @@ def join(reports: Sequence[GivenReport], out: Path) -> tuple[list[Outcome], list
 
 
 def _earlier(out: Path, reports: Sequence[GivenReport], slugs: Sequence[str]) -> set[str] | None:
-    """The slugs of the report that ``out`` replaces; None where there is no report."""
+    """The slugs of the report that ``out`` replaces; None if there is no report."""
     if out.is_symlink():
         raise atomic.NotReplaceable(errno.ELOOP, "a symlink, which no output follows", str(out))
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
@@ -259,7 +260,7 @@ def write_other_ways(folder: Path, comparison: Comparison | None, other: GivenRe
 
 
 def _way(source: Path, test: TestChange) -> dict[str, Any] | None:
-    """The positions of a test in another report, which may come from a stranger; None where there are none."""
+    """The positions of a test in another report, which is untrusted; None if there are none."""
     if not is_folder(source):
         return None
     with contextlib.suppress(NotCopied, OSError, KeyError, TypeError, ValueError, StopIteration, AttributeError):

@@ -123,7 +123,7 @@ def _move(source: Path, target: Path) -> None:
 
 
 class Drawings:
-    """The pictures and pages of tests in a report's folder, drawn one after the other in a thread of their own.
+    """The pictures and pages of tests in a report's folder, drawn one after the other in a separate thread.
 
     What was begun is whole when the context ends; after an exception, no further one begins.
     """

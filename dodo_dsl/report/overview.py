@@ -63,7 +63,7 @@ def write_history(folder: Path, past: Past) -> None:
 
 
 def read_history(folder: Path) -> Past:
-    """What ``write`` wrote into a report's folder; empty where there is nothing."""
+    """What ``write`` wrote into a report's folder; empty if there is nothing."""
     try:
         past = json.loads(regular_file.text(folder / FILE_NAME))
     except (OSError, ValueError, RecursionError):
@@ -72,7 +72,7 @@ def read_history(folder: Path) -> Past:
 
 
 def curve(past: Past, slug: str, check: Mapping[str, Any]) -> Markup:
-    """A check's values as a picture; empty with fewer than two of them, and for what is no history."""
+    """A check's values as a picture; empty with fewer than two of them, and for what is not a history."""
     try:
         values = [float(run["checks"][check["name"]]) for run in past.get(slug, ()) if check["name"] in run["checks"]]
         limits = [float(limit) for limit in (check.get("limit") or {}).values()]
@@ -131,7 +131,7 @@ class ReportPicture(NamedTuple):
 
 @dataclass(frozen=True)
 class ReportFiles:
-    """The files beside the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty.
+    """The files next to the page, as paths relative to it, by slug; ``times`` is the path of one picture, or empty.
 
     ``past`` are earlier values of checks, ``ways`` pictures of drives to put into the page.
     """
@@ -192,7 +192,7 @@ _UNITS = re.compile(r"(?<=\d) (?=\S)")
 _MOST_TEXT = 10_000
 """Characters of one text of others on the page."""
 _MOST_REPOSITORIES = 4
-_MOST_OF_A_LINE = 70
+_MOST_OF_A_LINE = 56
 """Characters of the reason of a test that passed, which has one line."""
 _DIRECTIONS = ("worse", "better", "different")
 
@@ -268,7 +268,7 @@ def style() -> str:
 
 @functools.cache
 def environment() -> jinja2.Environment:
-    """Renders pages of texts that come from strangers."""
+    """Renders pages of untrusted texts."""
     return jinja2.Environment(
         bytecode_cache=compiled_templates(),
         loader=jinja2.FileSystemLoader(package_data.templates()),

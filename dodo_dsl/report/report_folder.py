@@ -61,7 +61,7 @@ def forget(folder: Path, slugs: Sequence[str], others: Collection[str] = ()) -> 
 
 def _forget_test(place: Path) -> None:
     if place.is_symlink():
-        place.unlink()  # what it points to is no report
+        place.unlink()  # what it points to is not a report
         return
     for name in (viewer.LOGS, ATTEMPTS):
         with contextlib.suppress(OSError):

@@ -1,7 +1,7 @@
 """``results.json``: the outcomes of a run, when, where and of what it was, and how to repeat it.
 
 ``schemas/results.schema.json`` describes it. A report that a command line names, by its folder or its
-``results.json``, may come from a stranger.
+``results.json``, is untrusted.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ _SHOWN = 12
 class Repository:
     """A git repository at a commit; ``what`` is in it, the application or the tests.
 
-    ``changed`` tells whether it had changes or files that were in no commit.
+    ``changed`` means that it had changes or files that were in no commit.
     """
 
     what: str
@@ -228,12 +228,12 @@ class GivenReport:
 
 
 def read_given(path: Path) -> GivenReport:
-    """The report in a folder, or of a file; raises ResultsError, also where a slug could leave its folder."""
+    """The report in a folder, or of a file; raises ResultsError, also if a slug could leave its folder."""
     is_file = not path.is_dir() and (path.is_file() or path.suffix == ".json")
     file = path if is_file else path / FILE_NAME
     found = read_results(file)
     for outcome in found.outcomes:
         if len(outcome.slug) > MOST_SLUG or not SLUG.fullmatch(outcome.slug):
             shown = outcome.slug[:_SHOWN_PATH]
-            raise ResultsError(f"{file}: '{shown}' is no slug, expected lower-case letters, digits and hyphens")
+            raise ResultsError(f"{file}: '{shown}' is not a slug, expected lower-case letters, digits and hyphens")
     return GivenReport(file, found.outcomes, found.circumstances)

@@ -42,13 +42,13 @@ class Way:
 
     @property
     def goal(self) -> str:
-        """The obstacle to be reached; empty where there is none."""
+        """The obstacle to be reached; empty if there is none."""
         return next((name for name, role in self.roles.items() if role == "goal"), "")
 
 
 @dataclass(frozen=True)
 class DrivenPath:
-    """A path in the world frame: x and y in metres, heading in radians, and seconds since its begin."""
+    """A path in the world frame: x and y in metres, heading in radians, and seconds since its start."""
 
     path: list[tuple[float, float, float, float]]
     ground: Ground

@@ -37,7 +37,7 @@ class Canvas:
         self._font = cv2.FontFace("sans")
 
     def text(self, text: str, x: float, y: float, size: int, before: float = 0.5) -> None:
-        """With its baseline at ``y``, and so much of it before ``x``: 0 for its begin, 1 its end, 0.5 the middle."""
+        """With its baseline at ``y``, and so much of it before ``x``: 0 for its start, 1 its end, 0.5 the middle."""
         place = round(x - before * self.text_width(text, size)), round(y)
         cv2.putText(self.pixels, text, place, INK, self._font, size, _WEIGHT)
 
@@ -70,7 +70,7 @@ class Canvas:
 
 
 class Axes:
-    """A part of a canvas with a scale of its own, the same in x and y; what lies outside is not drawn."""
+    """A part of a canvas with its own scale, the same in x and y; what lies outside is not drawn."""
 
     def __init__(self, canvas: Canvas, left: int, top: int, first: Point, last: Point, scale: float) -> None:
         """``first`` is the lower left corner and ``last`` the upper right one; ``scale`` is in pixels a unit."""

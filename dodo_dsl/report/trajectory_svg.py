@@ -1,6 +1,6 @@
 """A drive from above as a small SVG: lines of the map, its cones, the path and where it ended.
 
-Pages put it inline, so that it follows their colours. As a report may come from a stranger, only what this module
+Pages put it inline, so that it follows their colours. Because a report is untrusted, only what this module
 could have written is put there.
 """
 
@@ -42,7 +42,7 @@ def write(drive: DrivenPath, outcome: Outcome, target: Path) -> None:
 
 
 def read(path: Path) -> Markup:
-    """The picture in a file, empty where there is none or where it holds anything else."""
+    """The picture in a file, empty if there is none or if it holds anything else."""
     try:
         text = regular_file.text(path, _MOST_BYTES)
     except (OSError, ValueError):

@@ -1,6 +1,6 @@
 """Files next to a compiled test: those that the application reads, its secrets, and what it never sees.
 
-Files of tests among an application's own are known by what they are, as their users choose the names: specs and what
+Files of tests among an application's own are known by what they are, because users choose the names: specs and what
 they name, maps, recordings, compiled tests and reports.
 """
 
@@ -257,7 +257,7 @@ def _paths(folder: Path, line: str) -> Iterator[Path]:
 
 
 def _data(path: Path) -> Path | None:
-    """The real path of a file of data, or of a folder with a map; None for what can be no path, as with a NUL."""
+    """The real path of a file of data, or of a folder with a map; None if it cannot be a path, as with a NUL."""
     try:
         real = Path(os.path.realpath(path))
         is_data = (real.suffix.lower() in _DATA - {".md"} and real.is_file()) or (real / _MAP).is_file()

@@ -38,7 +38,7 @@ class ApplicationTime:
     agent: Path
 
     def words(self, plan: Plan, folder: str, *, on_host: bool) -> tuple[str, ...]:
-        """The agent's command, for a sandbox whose applications have process namespaces of their own."""
+        """The agent's command, for a sandbox whose applications have their own process namespaces."""
         others = ("--by-environment",) if on_host else ()
         flags = agent_flags(len(plan.application.services), plan.seed, folder)
         return (str(self.agent), *flags, "--nested", *others)
@@ -72,6 +72,7 @@ def built() -> ApplicationTime:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not _is_ready(folder):
             _build(sources, folder)
+            folder.chmod(0o755)  # programs of other users load it
     return ApplicationTime((folder / LIBRARY).resolve(), (folder / AGENT).resolve())
 
 

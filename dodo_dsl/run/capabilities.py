@@ -59,9 +59,7 @@ def namespaces() -> Iterator[Capability]:
         way = f"{remedy}for applications you trust, --isolation host"
         yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal}", way)
     else:
-        yield Capability(
-            "namespaces", "ok", "each test gets a network, IPC and /tmp of its own, its application a sandbox"
-        )
+        yield Capability("namespaces", "ok", "each test gets its own network, IPC and /tmp, its application a sandbox")
 
 
 def multicast() -> Iterator[Capability]:

@@ -92,7 +92,7 @@ class Engine:
         return self.state.outcome(self.backend), kept
 
     async def _explain(self) -> None:
-        """Tells the state what of the machine, or of the limits that it was given, the test may have lacked."""
+        """Reports to the state what of the machine, or of the limits that it was given, the test may have lacked."""
         application = None
         try:
             async with asyncio.timeout(EXPLAIN_PATIENCE_S):

@@ -180,7 +180,7 @@ def _seconds(time: int) -> float:
 
 
 _LEAST_MESSAGES = 10
-"""Of one kind: fewer are no answers to frames."""
+"""Of one kind: fewer are not answers to frames."""
 
 
 def long_pause(plan: Plan, folder: Path, recording: Path) -> str:

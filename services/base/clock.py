@@ -44,9 +44,13 @@ class Inbox(Protocol):
 
 
 class Clock(Protocol):
-    """Test time, in microseconds since the epoch. ``relays``: messages come from the clock, not from the bus."""
+    """Test time, in microseconds since the epoch. ``relays``: messages come from the clock, not from the bus.
+
+    ``is_virtual``: the application's own time is the test's, so that messages are sent at the test's time, too.
+    """
 
     relays: bool
+    is_virtual: bool
 
     @property
     def has_new_picture(self) -> bool:
@@ -89,6 +93,7 @@ class RealTimeClock:
     """
 
     relays = False
+    is_virtual = False
     has_new_picture = False
     _has_memory = False
 

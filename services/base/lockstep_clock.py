@@ -241,7 +241,7 @@ class LockstepClock:
         key: bytes = b"",
         is_virtual: bool = False,
     ) -> None:
-        """``is_virtual`` tells that the application's own time is the test's: pictures are shown when they are due."""
+        """With ``is_virtual`` the application's own time is the test's: frames are shown when they are due."""
         self._session, self._name = session, name
         self._step_done = session.messages.type(STEP_DONE)
         self._client: StepSource = source or ClockClient(session, name, key)

@@ -103,7 +103,7 @@ class SenderTable:
         return said.service == service and (said.host, said.port) == source
 
     def report(self, reason: str) -> None:
-        """Tell the runner why the test fails."""
+        """Report to the runner why the test fails."""
         if reason not in self._reported:
             self._reported.add(reason)
             print(json.dumps({"dodo": "foreign", "reason": reason}), flush=True)

@@ -32,7 +32,7 @@ def from_i420(i420: Image, time: int | None = None) -> SharedPicture:
 
 
 def from_bgr(bgr: Image, width: int, height: int, time: int | None = None) -> SharedPicture:
-    """The picture of B, G, R (any height, any width, 3), scaled where it has another size."""
+    """The picture of B, G, R (any height, any width, 3), scaled if it has another size."""
     if bgr.shape[:2] != (height, width):
         smaller = bgr.shape[0] * bgr.shape[1] > height * width
         bgr = np.asarray(

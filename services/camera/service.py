@@ -20,7 +20,7 @@ SHORTEST = 1_000_000
 class CameraTelemetry:
     """A SystemStatusMessage at first and whenever the state changes; none without a sender stamp.
 
-    ``patience`` in us: for how long there may be no picture, if that is more than 1 s.
+    ``patience`` in us: for how long frames may be missing, if that is more than 1 s.
     """
 
     def __init__(self, messages: MessageSet, sender_stamp: int | None, patience: int) -> None:

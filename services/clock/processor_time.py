@@ -146,7 +146,7 @@ class ApplicationProcesses:
         return None
 
     def _used_by_groups(self) -> float | None:
-        """None if a service has no group of its own."""
+        """None if a service does not have its own group."""
         for root, group in self._groups.items():
             if group is None:
                 return None

@@ -68,14 +68,14 @@ class Busy(NamedTuple):
 
 
 class Destroyed(NamedTuple):
-    """The application has made the page unreadable by which it is told the time."""
+    """The application has made the page of the time unreadable."""
 
 
 Report = Reached | Busy | Destroyed
 
 
 def report_of(line: bytes) -> Report | None:
-    """What a line of the agent says; None where it says nothing, as strangers may write there, too."""
+    """What a line of the agent says; None where it says nothing, because others may write there, too."""
     try:
         message = json.loads(line)
     except (ValueError, RecursionError):
@@ -283,7 +283,7 @@ class VirtualApplication:
         return self.answers.facts()
 
     def begin(self, now: int) -> None:
-        """Let it come to the begin of the test (us), before services send anything; what it sent is left out.
+        """Let it come to the start of the test (us), before services send anything; what it sent is left out.
 
         Raises as ``show``.
         """
@@ -345,7 +345,7 @@ class VirtualApplication:
                 if report.now_ns >= until * _NS:
                     break
             elif isinstance(report, Destroyed):
-                raise ApplicationSilent("the application destroyed the page by which it is told the test's time")
+                raise ApplicationSilent("the application destroyed the page that gives it the test's time")
             elif isinstance(report, Busy):
                 self._refuse_busy(report)
             else:
@@ -356,7 +356,7 @@ class VirtualApplication:
                     f"of its own time within {time.monotonic() - began:.0f} s of wall time"
                 )
         spent = time.monotonic() - began
-        self.waited_first += spent if self.frames == 1 else 0.0
+        self.waited_first += spent if self.frames <= 1 else 0.0
         self.waited += spent if self.frames > 1 else 0.0
 
     @property
@@ -405,7 +405,7 @@ class VirtualApplication:
 _SENTENCES = {
     "static": "service '{service}' started '{name}', a statically linked program, which keeps the machine's time",
     "setuid": "service '{service}' started '{name}', which changes its user and so keeps the machine's time",
-    "slots": "service '{service}' has more threads than DoDo's clock can tell the time ('{name}')",
+    "slots": "service '{service}' has more threads than DoDo's clock can serve ('{name}')",
     "page": "the application wrote into what gives it the test's time; DoDo put right what others read there",
     "spin": "a thread of service '{service}' asks for the time again and again without waiting ('{name}')",
 }

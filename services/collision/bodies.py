@@ -128,7 +128,7 @@ Move = tuple[VehiclePose, VehiclePose]
 def least_distance(own: Move, its: Move, box: VehicleBox, footprint: shapely.Geometry) -> float:
     """How close (m) a vehicle comes to a footprint while both move from their first pose to their second at a time.
 
-    Exact where neither turns. A turn is made in parts of five degrees at most, in each of which the vehicle, as seen
+    Exact if neither turns. A turn is made in parts of five degrees at most, in each of which the vehicle, as seen
     from the body, covers the convex hull of its two rectangles.
     """
     turns = (math.remainder(end.heading - start.heading, math.tau) for start, end in (own, its))

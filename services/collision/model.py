@@ -146,7 +146,7 @@ class Requests:
         return f"no request came between {begin:.2f} s and {end:.2f} s (at most {self._max_silence:g} s)"
 
     def checks(self) -> tuple[Check, ...]:
-        """The longest silence in s, where that has a limit."""
+        """The longest silence in s, if that has a limit."""
         if math.isinf(self._max_silence):
             return ()
         longest = self._longest / MICROSECONDS if self.came else None

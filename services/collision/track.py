@@ -181,7 +181,7 @@ def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
 
 
 def told(value: float, limit: float) -> str:
-    """A value beyond its limit for sentences: with three decimals, or as many as it takes to tell it from the limit."""
+    """A value beyond its limit for sentences: with three decimals, or as many as distinguish it from the limit."""
     texts = (f"{value:.{decimals}f}" for decimals in range(3, 10))
     return next((text for text in texts if float(text) != limit), str(value))
 
@@ -240,7 +240,7 @@ EVERY, BLOCKS = "*", "blocks"
 def pick_walls(
     known: Obstacles, names: Sequence[str], others: Collection[str], path: Path, height: float
 ) -> dict[str, shapely.Geometry]:
-    """Obstacles, and blocks by their names, that a vehicle of ``height`` m must not touch; ``others`` are no walls.
+    """Obstacles, and blocks by their names, that a vehicle of ``height`` m must not touch; ``others`` are not walls.
 
     Raises ObstaclesError for a name that is neither, and if nothing stands in the vehicle's path.
     """
@@ -253,7 +253,7 @@ def pick_walls(
             what = (
                 "obstacle" if name == EVERY else f"block between {map_file.LOWEST:g} and {height:g} m above the ground"
             )
-            raise ObstaclesError(f"--walls: {name!r} is not a {what} in the map {path}")
+            raise ObstaclesError(f"--walls: {name!r} names no {what} in the map {path}")
     found = [each for name in names for each in ([name] if name in shapes else groups.get(name, [name]))]
     return pick(shapes, found, "walls", path)
 

@@ -262,7 +262,7 @@ class SignalEvaluator(Evaluator):
         return first, min(end, observed)
 
     def _observed(self, target: Target, is_complete: bool) -> int:
-        """Until when the target's time was observed, in us; with sample times of their own by the newest sample.
+        """Until when the target's time was observed, in us; with their own sample times by the newest sample.
 
         No less than the time of the test, or else the application could stay where the target is easy.
         """

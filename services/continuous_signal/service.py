@@ -78,7 +78,7 @@ def _target(flags: Flags, signal: Signal, messages: MessageSet) -> Target | None
 
 
 def _frames(flags: Flags, target: Target) -> Times | None:
-    """The pictures of a recorded target, where it has some; in us on the target's own scale."""
+    """The pictures of a recorded target, if it has some; in us on the target's own scale."""
     path, is_asked = Path(flags["target"]), flags["min-frame-share"] is not None or flags["min-sign-share"] is not None
     if path.suffix != RECORDING or not is_asked:
         return None

@@ -29,7 +29,7 @@ class Pose(NamedTuple):
 
 @dataclass(frozen=True)
 class Footprint:
-    """What passes over: a rectangle of ``length`` along the heading and ``width`` across, or where that is 0 a disc."""
+    """What passes over: a rectangle of ``length`` along the heading and ``width`` across, or if that is 0 a disc."""
 
     length: float
     width: float

@@ -38,7 +38,7 @@ class EmulatedRig:
     """The program, started; ``port`` is its pseudo terminal. A context manager that ends it."""
 
     def __init__(self, folder: Path | None = None, kind: str | None = None) -> None:
-        """``kind`` is circle or None. Raises PortError where programs are missing, RigError when they do not start."""
+        """``kind`` is circle or None. Raises PortError if programs are missing, RigError when they do not start."""
         options, firmware = (CIRCLE, "gantry-circle.elf") if kind else (("--start", START), "gantry.elf")
         folder = folder or _folder(firmware)
         self.port = ""

@@ -81,7 +81,7 @@ class SerialPort:
 def checked(target: str) -> str:
     """A target that may be opened: a device, or a socket of this machine; raises PortError.
 
-    Other URLs of pyserial are refused, as some of them write files or listen.
+    Other URLs of pyserial are refused, because some of them write files or listen.
     """
     if "://" in target:
         if _SOCKET.fullmatch(target):

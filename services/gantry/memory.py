@@ -1,6 +1,6 @@
 """A rig's limits by the gantry's flags: true ones for what moves it, and its firmware's in the rig's memory.
 
-Those in the memory are read, and where needed written, before anything moves.
+Those in the memory are read and, if needed, written before anything moves.
 """
 
 import logging
@@ -47,7 +47,7 @@ def wanted(text: str | None, conversion: Conversion) -> dict[str, float]:
 
     They are its firmware's, by which no place, speed or acceleration is beyond the true limit, but where that is
     narrower than the memory can have: then it has the narrowest, and the programs that move the rig keep the true one.
-    Raises PortError for a text that is no such list.
+    Raises PortError for a text that is not such a list.
     """
     circle = conversion.circle
     found = {name: widest for name, (_, widest) in LIMITS.items()} | ({"yaw": CIRCLE_YAW} if circle else {})
@@ -66,10 +66,10 @@ def wanted(text: str | None, conversion: Conversion) -> dict[str, float]:
 
 
 def agree(link: Link, limits: Mapping[str, float], write: bool, widen: bool = False) -> None:
-    """See that the rig's memory has these limits of its firmware; with ``write`` they are written where it has others.
+    """See that the rig's memory has these limits of its firmware; with ``write`` they are written if it has others.
 
     Limits that were kept become wider with ``widen`` alone, as an operator asks for it: what is safe on a rig is not up
-    to each repository with a test for it. Raises PortError then, and RigError where the memory has other limits at
+    to each repository with a test for it. Raises PortError then, and RigError if the memory has other limits at
     last. A firmware without such a memory has the built-in limits; tighter ones are kept by the programs that move it
     alone, which is logged.
     """

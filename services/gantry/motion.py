@@ -74,7 +74,7 @@ class Conversion:
         return {axis: one.steps * getattr(place, axis) + one.offset for axis, one in self._constants.items()}
 
     def _shift(self, name: str) -> float:
-        """The yaw's limit is to either side of true 0, the firmware's of its own."""
+        """The yaw's limit is to either side of true 0, the firmware's of its own 0."""
         return abs(self._true("yaw", 0.0)) if name == "yaw" and not self.circle else 0.0
 
     def _largest(self, name: str) -> float:

@@ -28,7 +28,7 @@ def find(link: Link) -> Status:
 
 
 def check_kind(link: Link, circle: bool) -> None:
-    """Raises RigError unless the rig's firmware is of its kind, as that of a circle would wind up another rig's cable.
+    """Raises RigError unless the rig's firmware is of its kind: that of a circle would wind up another rig's cable.
 
     The firmware of the other kind does not know KIND. It has to say so twice, as a damaged KIND is unknown, too.
     """

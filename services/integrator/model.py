@@ -12,7 +12,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 SERIES = 0.05  # rad; below it the series is more exact than the quotient
-UPRIGHT = 1 - 1e-12  # sine of a pitch at which roll and yaw cannot be told apart
+UPRIGHT = 1 - 1e-12  # sine of a pitch at which roll and yaw cannot be distinguished
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:

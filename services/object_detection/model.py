@@ -144,7 +144,7 @@ _DAY = 86_400.0
 
 
 class DetectionEvaluator(Evaluator):
-    """Consumes detections, and the truth where ``truth`` is None, in test time (microseconds).
+    """Consumes detections, and the truth if ``truth`` is None, in test time (microseconds).
 
     What came before time zero, and before ``begin``, is forgotten. A frame is forgotten as soon as it is judged, but
     for its sample time.

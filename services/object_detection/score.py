@@ -153,7 +153,7 @@ def compare(
 ) -> CountsByClass:
     """The counts of one frame. Boxes of a class pair up where they overlap by more than ``threshold``.
 
-    Only classes in ``labels`` count, or all where it is empty.
+    Only classes in ``labels`` count, or all if it is empty.
     """
     result = CountsByClass()
     false, hit, missed = list[LabelledBox](), list[LabelledBox](), list[LabelledBox]()

@@ -26,7 +26,7 @@ class FloodError(RuntimeError):
 
 
 Kind = tuple[int, int]
-"""A message's id and sender stamp; the id is 0 for those that are too many to be told apart."""
+"""A message's id and sender stamp; the id is 0 for those that are too many to be counted separately."""
 
 
 class Traffic:
@@ -91,7 +91,7 @@ class RecordingFile:
 
     ``traffic`` counts what it takes. Nothing is buffered in the process: whatever ends it, the file holds all frames
     written so far.
-    Raises RecordingError for a file that exists, and where none can be made.
+    Raises RecordingError for a file that exists, and if none can be made.
     """
 
     def __init__(self, path: Path, max_size: int | None = None, traffic: Traffic | None = None) -> None:
@@ -176,7 +176,7 @@ _PIECE = 1 << 20
 class NewestPictures:
     """A new `.rec` file of at most ``max_size`` bytes, without its oldest quarter each time that it would be larger.
 
-    What cannot be written is logged, and ends it: pictures decide no test. Raises RecordingFileError where no file can
+    What cannot be written is logged, and ends it: pictures decide no test. Raises RecordingFileError if no file can
     be made, and for one that exists.
     """
 

@@ -38,7 +38,7 @@ class Taken(NamedTuple):
 
 
 class RecordedCamera:
-    """One memory's pictures, encoded; `sender_stamp` tells the memories of a recording apart."""
+    """One memory's pictures, encoded; `sender_stamp` distinguishes the memories of a recording."""
 
     def __init__(self, source: PictureSource, quality: Quality, messages: MessageSet, sender_stamp: int) -> None:
         self._source, self._quality = source, quality
@@ -70,7 +70,7 @@ class RecordedCamera:
         )
 
     def restart(self) -> None:
-        """Begin with a key frame at the next picture, as those before are not in the recording."""
+        """Begin with a key frame at the next picture, because those before are not in the recording."""
         self._source.skip()
         self._encoder = None
 

@@ -25,7 +25,7 @@ MEGABYTE = 1_000_000
 
 
 class Recorder(Service):
-    """Records every envelope, and pictures where there are cameras."""
+    """Records every envelope, and pictures if there are cameras."""
 
     period = None
     has_begun = False

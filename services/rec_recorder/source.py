@@ -27,7 +27,7 @@ class SourceError(ValueError):
 
 @dataclass(frozen=True)
 class MemorySpec:
-    """A memory to record, and the size of its pictures where it is known (else 0 x 0)."""
+    """A memory to record, and the size of its pictures if it is known (else 0 x 0)."""
 
     name: str
     width: int = 0

@@ -1,7 +1,7 @@
 """A binary space partition: which faces and which places come first, seen from anywhere.
 
 Fuchs, Kedem and Naylor 1980. Each node divides space by the plane of a face; faces that cross it are
-cut in two, so that drawing from back to front is right even where boxes touch or intersect.
+cut in two, so that drawing from back to front is right even if boxes touch or intersect.
 """
 
 from collections.abc import Iterator, Sequence

@@ -146,7 +146,7 @@ FASTEST = 50.0
 TYPICAL_DEPTH = 0.3
 """The distance, in m, by which the blur's length in the picture is estimated."""
 FINEST, APART = 3.0, 6.0
-"""Pixels of blur that cannot be told from none, and between two pictures at most."""
+"""Pixels of blur that cannot be distinguished from none, and between two pictures at most."""
 MOST = 7
 
 

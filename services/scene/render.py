@@ -1,8 +1,8 @@
 """Pictures of a scene from anywhere, drawn with OpenCV and numpy.
 
 What was drawn from one place is moved to where it is seen from another close to it. Models move as wholes, by the shift
-and the scale of the middle of each. While a shutter is open that cannot be told from a new drawing, and saves culling,
-shading and sorting once more.
+and the scale of the middle of each. While a shutter is open that cannot be distinguished from a new drawing, and saves
+culling, shading and sorting once more.
 """
 
 import math
@@ -60,7 +60,7 @@ class Renderer:
     """Draws a scene; the same pose, and places of what moves, give the same bytes, whatever was drawn before."""
 
     def __init__(self, scene: Scene, width: int, height: int, fovy: float) -> None:
-        """The picture's size in pixels, the vertical field of view in rad; ValueError where they make no sense."""
+        """The picture's size in pixels, the vertical field of view in rad; ValueError if they make no sense."""
         self.camera = Pinhole(width, height, fovy)
         self.scene = scene
         self._tree = Tree(list(scene.faces))

@@ -152,7 +152,7 @@ class SceneOptions:
     displaced: float = 0.0
     seed: int = 0
     own: int | None = None
-    """Sender stamp of the vehicle itself, which sees no model of its own."""
+    """Sender stamp of the vehicle itself, which does not see its own model."""
 
 
 @dataclass(frozen=True, eq=False)

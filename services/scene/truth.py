@@ -45,7 +45,7 @@ class TruthLimits:
 
 
 def classes_of(written: Iterable[str], models: Iterable[str]) -> dict[str, str]:
-    """Classes by model, of words such as ``cone_yellow=yellow``; each model's own name where nothing is written.
+    """Classes by model, of words such as ``cone_yellow=yellow``; each model's own name if nothing is written.
 
     ValueError names a model that the map does not have.
     """

@@ -24,7 +24,7 @@ from services.scene.textures import picture_bytes
 
 
 def load_with_alpha(path: Path) -> Image:
-    """A picture file as (rows, columns, 4), B, G, R, A, opaque where it has no alpha; MapError otherwise."""
+    """A picture file as (rows, columns, 4), B, G, R, A, opaque if it has no alpha; MapError otherwise."""
     data = picture_bytes(path)
     try:
         picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)

@@ -1,4 +1,4 @@
-// The one cursor in time: who moves it tells it here, and all parts of the page follow.
+// The one cursor in time: whatever moves it reports here, and all parts of the page follow.
 "use strict";
 
 dodo.cursor = (function () {

@@ -35,7 +35,7 @@ dodo.data = (function () {
     at,
     channel: (message, sender) => channels.find((c) => c.message === message && c.sender === sender),
     field: (found, name) => found && found.fields.find((f) => f.name === name),
-    // Messages by the last parts of their names, which tell them apart.
+    // Messages by the last parts of their names, which distinguish them.
     short: (message) => message.slice(message.lastIndexOf(".") + 1),
   };
 })();

@@ -94,11 +94,15 @@ SERVICES = {
     "DODO_SENDERS": "which service may send which message",
     "DODO_SERVICE": "the service's name in the test",
     "DODO_SLOT": "the test's slot, by which what it left behind is found",
+    "DODO_TIME": "of the application: the folder through which its programs get the test's time",
+    "DODO_TIME_SERVICE": "of the application: the number of the service for the same",
     "DODO_TOLD": "messages of the simulation that the application declares to take",
     "DODO_TRUTH": "messages by which evaluators judge",
     "DODO_WORLD": "the services that hear what only a simulation knows",
 }
 _OTHERS = {"DODO_BASE"}  # an argument of image builds
+_ALWAYS = {name for name in SETTINGS if not re.fullmatch(r"DODO_[A-Z_]+", name)}
+"""What a search for ``DODO_...`` does not find; of the others the page has those of the code."""
 
 
 def used() -> set[str]:
@@ -116,9 +120,11 @@ def environment() -> str:
         "What services of a test get": SERVICES,
     }
     known = {*SETTINGS, *PIPELINES, *SERVICES, *INPUTS, *_OTHERS}
-    assert used() <= known, f"describe {used() - known} in {Path(__file__).name}"
+    found = used()
+    assert found <= known, f"describe {found - known} in {Path(__file__).name}"
     told = "".join(
-        f"\n## {title}\n\n| variable | says |\n|---|---|\n" + "".join(f"| `{k}` | {v} |\n" for k, v in rows.items())
+        f"\n## {title}\n\n| variable | says |\n|---|---|\n"
+        + "".join(f"| `{k}` | {v} |\n" for k, v in rows.items() if k in found or k in _ALWAYS)
         for title, rows in tables.items()
     )
     inputs = ", ".join(f"`{name}`" for name in sorted(INPUTS))

@@ -104,3 +104,13 @@ def test_the_site_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
         addresses.feed(page.read_text())
         assert addresses.loaded
         assert [address for address in addresses.loaded if "//" in address] == []
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+def test_the_demo_of_a_report_has_a_failed_test_and_others(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, str(ROOT / "scripts/make-demo"), str(tmp_path / "demo")], check=True)
+    page = (tmp_path / "demo" / "index.html").read_text()
+    assert "1 failed</span>" in page and "8 passed</span>" in page
+    assert page.count('<details class="matrix"') == 1
+    assert all((tmp_path / "demo" / link).is_file() for link in re.findall(r'href="([^"#:]*drive.html)"', page))

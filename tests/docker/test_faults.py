@@ -104,7 +104,7 @@ def test_interrupts(crate: Crate) -> None:
     """One does not wait for a pull, and one takes down what has been started."""
     with BrokenRegistry() as registry:
         pulls = crate.start(crate.job("pulls", image=registry.image))
-        starts = crate.start(crate.job("starts", environment=WAIT))
+        starts = crate.start(crate.job("starts", environment=WAIT), "-v")
         wait_for(pulls, "the connection broke")
         pulls.send_signal(signal.SIGINT)
         assert told(pulls, "ERROR") == "the run was interrupted"

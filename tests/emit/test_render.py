@@ -7,10 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
-from dodo_dsl import compiler
+from dodo_dsl import compiler, source
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs
-from dodo_dsl.emit.render import render_pipeline, render_plan
+from dodo_dsl.emit.render import _templates, render_pipeline, render_plan
 from dodo_dsl.plan.model import Suite
 from tests.emit.readers import ROOT, tree
 
@@ -59,3 +60,17 @@ def test_no_absolute_path_and_nothing_temporary(generated: Path) -> None:
         assert str(generated.parent).encode() not in content, name
     hidden = {path.name for path in generated.rglob(".*")}
     assert hidden == {".env"}
+
+
+_WORDS = "on No null 1e3 0x1 1:20 a: -x --x=1 *a &a !a %a @a << ./a .. .5 /a é 2020-01-01 --x=a,b --path=/a/$$b"
+_TEXTS = ["", " a", "a ", "a b", "a: b", "a #b", "a\nb", "a\u2028b", "--x=[1, {a: b}]", "r.example.org:5/a/b@sha256:12"]
+
+
+def test_every_reader_takes_a_word_for_the_same_string() -> None:
+    """That of YAML 1.1, as of Python and Ruby, and that of 1.2; also within braces."""
+    words = [*_WORDS.split(), *_TEXTS, {"a": "b,c", "source": "./a: b", "c": True}]
+    text = "".join(f"- {_templates().filters['plain'](word)}\n" for word in words)
+    assert yaml.safe_load(text) == words
+    node, problems = source.parse(text, "words")
+    assert not problems and node is not None and source.plain(node) == words
+    assert _templates().filters["plain"]("--x=1") == "--x=1"

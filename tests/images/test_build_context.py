@@ -28,8 +28,24 @@ def test_context_has_the_bus_and_the_services_and_no_more(tmp_path: Path) -> Non
 def test_the_whole_of_dodo_has_what_its_stage_copies(tmp_path: Path) -> None:
     build_context.assemble(tmp_path, None, whole=True)
     copied = re.findall(r"^COPY (\w+) \w+$", stages()["dodo-code"].text, re.MULTILINE)
-    assert sorted(copied) == sorted(path.name for path in tmp_path.iterdir() if path.name != "rig")
+    assert sorted(copied) == sorted(path.name for path in tmp_path.iterdir() if path.name not in ("rig", "time"))
     assert {"dodo_dsl/cli/main.py", "schemas/dodo.schema.json", "templates/report/suite.css"} <= files(tmp_path)
+
+
+def test_what_gives_the_test_s_time_comes_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root, built = tmp_path / "root", tmp_path / "root" / "build" / "time"
+    built.mkdir(parents=True)
+    for name in ("services", "locks"):
+        (root / name).symlink_to(ROOT / name)
+    monkeypatch.setattr(package_data, "root", lambda: root)
+    (built / "dodo-time").touch()
+    (tmp_path / "half").mkdir()
+    build_context.assemble(tmp_path / "half", None)
+    assert not (tmp_path / "half" / "time").exists()
+    (built / "libdodo-time.so").touch()
+    (tmp_path / "whole").mkdir()
+    build_context.assemble(tmp_path / "whole", None)
+    assert files(tmp_path / "whole" / "time") == {"dodo-time", "libdodo-time.so"}
 
 
 def test_the_emulated_rigs_come_along_where_both_builds_of_the_firmware_are(

@@ -2,7 +2,6 @@
 
 import ipaddress
 import itertools
-from collections.abc import Sequence
 
 import pytest
 from hypothesis import given
@@ -18,29 +17,9 @@ NAMES = [f"sil-{number}" for number in range(400)]
 SMALL = ipaddress.IPv4Network("10.213.0.0/24")
 
 
-def on_own(names: Sequence[str]) -> dict[str, int]:
-    return dict(zip(names, cids(names, ["network"] * len(names), RANGE), strict=True))
-
-
-def test_a_test_has_the_same_cid_whatever_is_compiled_beside_it() -> None:
-    alone = {name: on_own([name])[name] for name in NAMES}
-    apart = list({cid: name for name, cid in alone.items()}.values())
-    assert len(apart) > 100
-    assert on_own(apart) == {name: alone[name] for name in apart}
-
-
-def test_of_tests_with_the_same_number_the_first_keeps_it_and_others_get_the_next() -> None:
-    number = on_own(NAMES[:1])[NAMES[0]]
-    same = [name for name in NAMES if on_own([name])[name] == number][:2]
-    assert on_own(same) == {same[0]: number, same[1]: number + 1}
-    reversed_ = on_own(same[::-1])
-    assert reversed_ == {same[1]: number, same[0]: number + 1}
-    assert sorted(on_own(NAMES[:127]).values()) == list(range(128, 255)), "the range is used up to its end"
-
-
-def test_tests_on_the_host_do_not_make_way_for_others() -> None:
-    given_cids = cids(NAMES[:3], ["network", "network", "host"], RANGE)
-    assert given_cids[2] == on_own([NAMES[2]])[NAMES[2]]
+def test_in_order_and_without_the_habitual_ones() -> None:
+    assert cids(["network"] * 3, RANGE) == [128, 129, 130]
+    assert cids(["network"] * 127, RANGE) == list(range(128, 255))
 
 
 @given(st.lists(st.sampled_from(["network", "host"]), min_size=1, max_size=400))
@@ -48,9 +27,9 @@ def test_host_tests_never_share(isolations: list[str]) -> None:
     hosts = isolations.count("host")
     if len(isolations) > len(RANGE) and hosts >= len(RANGE):
         with pytest.raises(OutOfAddresses):
-            cids(NAMES[: len(isolations)], isolations, RANGE)
+            cids(isolations, RANGE)
         return
-    given_cids = cids(NAMES[: len(isolations)], isolations, RANGE)
+    given_cids = cids(isolations, RANGE)
     assert set(given_cids) <= set(RANGE)
     if len(isolations) <= len(RANGE):
         assert len(set(given_cids)) == len(isolations)

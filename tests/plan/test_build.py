@@ -33,13 +33,13 @@ def plan(example: str, folder: Path) -> Plan:
 def test_a_plan(tmp_path: Path) -> None:
     found = plan("", tmp_path)
     assert (found.name, found.slug, found.level, found.clock) == ("example", "example", "sil", "realtime")
-    assert (found.timeout_s, found.cid, found.isolation, found.subnet) == (60.0, 135, "network", "10.213.185.240/28")
+    assert (found.timeout_s, found.cid, found.isolation, found.subnet) == (60.0, 128, "network", "10.213.185.240/28")
     assert (found.tag, found.rig, found.lockstep, found.spec) == ("sil", "", None, "tests/example/example.dodo.yml")
     assert [service.name for service in found.services] == ["dodo-recorder", "camera", "vehicle", "pose", "track"]
     assert [service.judge for service in found.services] == [False, False, False, False, True]
     camera = {flag.name: flag for flag in found.services[1].flags}
     assert camera["map-path"] == Flag("map-path", "maps/plain", "path")
-    assert camera["cid"] == Flag("cid", "135")
+    assert camera["cid"] == Flag("cid", "128")
     assert found.source_map["environment.camera.map-path"] == Place("tests/example/example.dodo.yml", 8, 41)
 
 
@@ -61,8 +61,8 @@ def test_instances_in_the_order_of_their_names(tmp_path: Path) -> None:
     matrix = "matrix: {yaw: [90 deg, 80 deg]}\ndescription: At ${matrix.yaw}.\n"
     compiled, _ = built(matrix, tmp_path)
     assert [(p.slug, p.cid) for p in compiled.suite.plans] == [
-        ("example--yaw-80-deg", 179),
-        ("example--yaw-90-deg", 205),
+        ("example--yaw-80-deg", 128),
+        ("example--yaw-90-deg", 129),
     ]
 
 

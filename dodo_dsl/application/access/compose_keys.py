@@ -11,7 +11,7 @@ from dodo_dsl.application.access.model import KeyRow, Rows
 
 
 def _table(rows: dict[str, KeyRow]) -> dict[str, KeyRow]:
-    """A row for each of the keys, which are words of one text where they have the same row."""
+    """A row for each of the keys, which are words of one text if they have the same row."""
     return {key: row for keys, row in rows.items() for key in keys.split()}
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from dodo_dsl.application import host_access
 
 ASK = "keep it in the repository, or allow it with 'paths' in dodo.yml"
-NUL = "a path has a NUL character, so it can be no file"
+NUL = "a path has a NUL character, so it cannot be a file"
 INSIDE = "put the files themselves in its place"
 
 TO_READ = ("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",

@@ -175,7 +175,7 @@ def diagnostic(finding: AccessFinding, node: Node, key: Span) -> Diagnostic:
 
 
 def place(node: Node, steps: Steps, key: Span, of_key: bool = False) -> Span:
-    """The place of the value that the steps lead to, or of its key: with ``of_key``, and where it has no text."""
+    """The position of the value that the steps lead to, or of its key: with ``of_key``, and if it has no text."""
     span = key
     for number, step in enumerate(steps, 1):
         if isinstance(node, source.Mapping) and step in node.entries:

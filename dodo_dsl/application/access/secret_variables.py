@@ -77,7 +77,7 @@ def is_steering(name: str) -> bool:
 
 
 def visible(variables: Mapping[str, str], passed: Collection[str] = ()) -> dict[str, str]:
-    """The variables that DoDo's own services get: those that are no secrets, and those that ``dodo.yml`` passes."""
+    """The variables that DoDo's own services get: those that are not secrets, and those that ``dodo.yml`` passes."""
     return {
         name: value
         for name, value in variables.items()

@@ -208,7 +208,7 @@ def _is_named(key: str, lines: Sequence[str]) -> bool:
 
 
 def carried(application: ApplicationSource, cid: int, base: str, path_variables: set[str]) -> dict[str, str]:
-    """Those that it uses and that are no secrets, with the test's CID, and paths relative to the test."""
+    """Those that it uses and that are not secrets, with the test's CID, and paths relative to the test."""
     found = {}
     for name in _used(application):
         if is_steering(name) or name in application.secrets:

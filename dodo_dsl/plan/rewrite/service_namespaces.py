@@ -35,7 +35,7 @@ def _own_network(copy: ServiceCopy) -> None:
     mode = service.get("network_mode")
     stays = mode == "none" or host_access.reference(mode)[0] == "service"
     if not stays:
-        copy.remove("network_mode", "the test has a network of its own")
+        copy.remove("network_mode", "the test has its own network")
     _own_names(copy, stays)
     if service.get("ipc") is not None:
         copy.note("ipc is the test's own")
@@ -51,7 +51,7 @@ def _own_names(copy: ServiceCopy, stays: bool) -> None:
     names = list(dict.fromkeys(str(a) for n in about if isinstance(n, dict) for a in n.get("aliases") or ()))
     if names and not stays:
         copy.service["networks"] = {"default": {"aliases": names}}
-    copy.note("networks removed, the test has a network of its own")
+    copy.note("networks removed, the test has its own network")
 
 
 def _host_network(copy: ServiceCopy) -> None:

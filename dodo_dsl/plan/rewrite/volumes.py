@@ -105,7 +105,7 @@ def read_only(volume: Any) -> Any:
 _LONGEST = 255
 """Characters of a volume's name on the engine: it is a folder's."""
 _MARK = "xxxxxx"
-"""In the place of what tells projects of one test apart."""
+"""Stands for what distinguishes projects of one test."""
 
 
 def own_mounts(copy: ServiceCopy) -> None:

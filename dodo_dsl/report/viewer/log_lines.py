@@ -31,7 +31,7 @@ READY = "ready"
 
 
 class LogLine(NamedTuple):
-    """A line at a time in s of the test, before it below zero, None where that is unknown."""
+    """A line at a time in s of the test, before it below zero, None if that is unknown."""
 
     time: float | None
     service: str
@@ -99,7 +99,7 @@ def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:
 
 
 def _test_times(walls: Sequence[int], test: RecordedTest) -> list[float]:
-    """Times of the machine in the test's: within a test as messages tell it, else by the machine's clock."""
+    """Times of the machine in the test's: within a test as messages show it, else by the machine's clock."""
     if not len(test.walls):
         return [(wall - test.begin) / MICROSECONDS if test.begin else 0.0 for wall in walls]
     arrived = np.array(walls, np.float64)

@@ -7,7 +7,7 @@ from typing import Any
 from dodo_dsl.outcome import Outcome
 
 _GAPS = ("gap", "coverage", "unanswered")
-"""Checks that a hole decides, with its begin as evidence."""
+"""Checks that a hole decides, with its start as evidence."""
 END = "the end of the test"
 """What a test has that no verdict decided."""
 
@@ -42,7 +42,7 @@ def _time(evidence: Mapping[str, Any], failed: set[str]) -> tuple[float, str] | 
     if "broken" in failed and broken is not None:
         return broken, "the first sample that is not a number"
     if failed and failed <= {*_GAPS, "samples", "answered"} and gap is not None:
-        return gap, "the begin of the longest silence"
+        return gap, "the start of the longest silence"
     if worst is None:
         return None
     if "obstacle" in evidence:

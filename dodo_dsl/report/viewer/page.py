@@ -57,7 +57,7 @@ class SpecLines:
         self._files: dict[str, list[str]] = {}
 
     def line(self, place: Place) -> str:
-        """The line without its indent; empty where there is no such file any more."""
+        """The line without its indent; empty if there is no such file any more."""
         if place.file not in self._files:
             self._files[place.file] = self._read(place.file)
         lines = self._files[place.file]
@@ -210,7 +210,7 @@ def _bodies(ground: Ground, own: int) -> Iterator[dict[str, Any]]:
         try:
             outline = model.footprint()
         except MapError:
-            continue  # told by the service that draws it
+            continue  # reported by the service that draws it
         yield {"name": shown(name, 80), "sender": stamp, "colour": list(colour_of(model)), "outline": outline[:_MOST]}
 
 

@@ -28,7 +28,7 @@ class NoVideo(ValueError):
 
 @dataclass(frozen=True)
 class Video:
-    """A camera's video: the file beside the page, the size in pixels, and the time of each frame in s of the test."""
+    """A camera's video: the file next to the page, the size in pixels, and the time of each frame in s of the test."""
 
     file: str
     width: int
@@ -108,7 +108,7 @@ def _stands_alone(packet: bytes) -> bool:
 
 
 def _mux(path: Path, packets: Sequence[tuple[int, bytes]]) -> None:
-    """An MP4 of H.264 packets, its first frame at 0 s; raises NoVideo where there is no PyAV."""
+    """An MP4 of H.264 packets, its first frame at 0 s; raises NoVideo if there is no PyAV."""
     try:
         import av
     except ImportError:

@@ -20,7 +20,7 @@ MOST_SAMPLES = 20_000
 """Samples of one channel that are read; of more, every second, third and so on."""
 MOST_CHANNELS = 200
 _FAR = 86_400.0
-"""s from the begin of the test, beyond which a time is of another clock."""
+"""s from the start of the test, beyond which a time is of another clock."""
 PICTURES = "opendlv.proxy.ImageReading"
 """Whose data is not read here."""
 _BEGIN, _END = "dodo.TestBegin", "dodo.RecordingEnd"
@@ -40,7 +40,7 @@ class Channel:
     every: int = 1
 
     def numbers(self, name: str) -> Values:
-        """A field as numbers; all NaN where there is no such field of numbers."""
+        """A field as numbers; all NaN if there is no such field of numbers."""
         values = self.fields.get(name)
         if values is None or isinstance(values, list):
             return np.full(len(self.times), np.nan)

@@ -54,7 +54,7 @@ _OUTPUT = (
     ("test.json", "compose.yaml"),
     ("test.rec", "logs"),
 )
-"""What tells a report, compiled tests, one of them, and a test's part of a report by what they hold."""
+"""What marks a report, compiled tests, one of them, and a test's part of a report by their content."""
 _REMOTE = re.compile(r"[a-z-]+:|git@")
 
 

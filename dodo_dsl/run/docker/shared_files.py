@@ -47,7 +47,7 @@ def _sources(service: Mapping[str, Any]) -> Iterator[str]:
 
 
 def unseen(client: Any, paths: Sequence[Path], project: str = "") -> Path | None:
-    """The first of ``paths`` that the engine's machine has not; None if it has all, or cannot tell.
+    """The first of ``paths`` that the engine's machine has not; None if it has all, or does not show it.
 
     The engine says so when it makes a container, which belongs to ``project`` and never starts.
     """

@@ -221,7 +221,7 @@ def judged_use(uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> Jud
                 continue
             if measure.value is None:
                 notes.append(
-                    f"{measure.check} of service '{use.service}' is not judged: the test was too short to tell"
+                    f"{measure.check} of service '{use.service}' is not judged: the test was too short to measure it"
                 )
                 continue
             ok = measure.value <= measure.limit

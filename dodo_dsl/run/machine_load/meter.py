@@ -74,7 +74,7 @@ class LoadMeter(Meter):
 def add_up(snapshots: Sequence[Snapshot], application: Callable[[str], bool]) -> MachineLoad | None:
     """The load between the first and the last snapshot; None when there are no two of them.
 
-    ``application`` tells which services are the application's. Nothing is put down to others that was so while the
+    ``application`` names the application's services. Nothing is put down to others that was so while the
     machine had free cores, or while the application itself took most of them.
     """
     if len(snapshots) < 2 or snapshots[-1].at_s <= snapshots[0].at_s:
@@ -235,7 +235,7 @@ def growth(points: Sequence[Point], known: Collection[float] | None = None) -> f
     """Bytes a second by which memory grows in the second half of the time, in which programs have warmed up.
 
     It is the median slope of all pairs of points (Theil and Sen), as single points may be anywhere. 0 where memory does
-    not rise by LEAST_RISE, or not in each half of this half. None if there are too few points to tell,
+    not rise by LEAST_RISE, or not in each half of this half. None if there are too few points,
     or too few times that are ``known``: without these all are.
     """
     found = _second_half(points)

@@ -124,7 +124,7 @@ class _Process(NamedTuple):
     parent: int
     session: int
     start: int
-    """Ticks since the machine started, which tells a process from a later one with its number."""
+    """Ticks since the machine started, which distinguishes a process from a later one with its number."""
 
 
 class _Nanoseconds(NamedTuple):
@@ -136,7 +136,7 @@ class ThreadTimes:
     """Adds up, from call to call, what the threads of services ran, and how long each service waited.
 
     A service waits as long as the thread of it that ran the most between two calls, as that does its work: threads that
-    wait side by side do not make its wait longer, and those that only look for something to do are no loss.
+    wait side by side do not make its wait longer, and those that only look for something to do cost nothing.
     """
 
     def __init__(self, proc: Path = Path("/proc")) -> None:

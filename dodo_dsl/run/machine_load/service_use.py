@@ -182,7 +182,7 @@ _OF_2 = ("anon", "shmem")
 
 @dataclass(frozen=True)
 class ControlGroup:
-    """The files that tell memory and processor time; ``tick_s`` is the unit of the latter."""
+    """The files with memory and processor time; ``tick_s`` is the unit of the latter."""
 
     memory: Path
     processor: Path

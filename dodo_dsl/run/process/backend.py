@@ -204,7 +204,7 @@ class ProcessBackend:
                 "clock: virtual needs process namespaces, which this machine refuses: dodo doctor says why"
             )
         for service in self.plan.application.services:
-            with contextlib.suppress(EnvironmentProblem, IndexError):  # it is told when the service is started
+            with contextlib.suppress(EnvironmentProblem, IndexError):  # it is reported when the service is started
                 command = self._commands.of(service)
                 if why := application_time.refusal(service.name, command.argv[0], command.environment, command.folder):
                     raise BackendError(why)

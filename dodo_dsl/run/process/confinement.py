@@ -30,7 +30,7 @@ class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
     With ``isolation`` ``host`` it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
-    ``cid`` says which user id of its own is tried first, where DoDo runs as root.
+    ``cid`` decides which user id is tried first, where DoDo runs as root.
     """
 
     folder: str

@@ -1,7 +1,7 @@
 """The fork server: a process that has loaded what DoDo's services need, and forks the sandboxes of tests.
 
-Loading numpy, OpenCV and similar takes most of the processor time of a short test's set-up. Sandboxes with namespaces
-of their own are forked from here; their services are forks of them in turn.
+Loading numpy, OpenCV and similar takes most of the processor time of a short test's set-up. Sandboxes with their own
+namespaces are forked from here; their services are forks of them in turn.
 
     runner to fork server   {"hold": true} with the descriptor of a lease that the forks hold, too;
                             {"load": [module of a service of DoDo's, ...]};

@@ -75,7 +75,7 @@ def mask(devices: Sequence[str]) -> None:
 
 
 def unshare() -> None:
-    """Leaves the host's namespaces; the next fork is process 1 of its own. Raises OSError where the kernel refuses."""
+    """Leaves the host's namespaces; the next fork is process 1 in them. Raises OSError where the kernel refuses."""
     _unshare(_CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID)
 
 

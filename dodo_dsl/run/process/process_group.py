@@ -19,7 +19,7 @@ _TRIES, _TRY_S = 20, 0.01
 
 
 class ProcessGroup:
-    """A control group of its own, for at most ``limit`` processes and threads; use ``make``.
+    """A separate control group for at most ``limit`` processes and threads; use ``make``.
 
     It counts their processor time, too: in version 1 by ``account``, a group of another tree, where that can be made.
     """

@@ -2,7 +2,7 @@
 
 It is process 1 of its own namespaces (``network``), or their parent on the host (``host``). The runner talks to it
 over a socket; when that closes, for whatever reason, the sandbox ends everything that it started, and itself. If it is
-killed, the kernel sends SIGTERM to what it started. It has one thread, as that signal depends on the starting thread.
+killed, the kernel sends SIGTERM to what it started. It has one thread: that signal depends on the starting thread.
 
     runner to sandbox   {"do": "start", "id", "argv", "env", "cwd", "fork"} with the output's descriptor,
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv

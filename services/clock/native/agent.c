@@ -114,7 +114,7 @@ static long futex(_Atomic uint32_t *word, int operation, uint32_t value, const s
     return syscall(SYS_futex, word, operation, value, timeout, NULL, 0);
 }
 
-/* Text from strangers as it can stand in JSON. */
+/* Text from the application as it can stand in JSON. */
 static void plain(char *to, const char *from, size_t size)
 {
     size_t at = 0;
@@ -200,7 +200,7 @@ static void grant(struct time_slot *slot, uint32_t state)
         write_waker((unsigned)(slot - page->slot));
 }
 
-/* All sleep, so whoever was granted and did not go on has ended. */
+/* All sleep, so a thread that was granted and did not go on has ended. */
 static void free_dead_slots(void)
 {
     for (unsigned at = 0, end = used_slots(); at < end; at++) {
@@ -413,7 +413,7 @@ static unsigned begun_services(void)
     return count;
 }
 
-/* Until each service has a process; then to the begin of the test. */
+/* Until each service has a process; then to the start of the test. */
 static void start(void)
 {
     unsigned known = 0;

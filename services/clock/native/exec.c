@@ -1,6 +1,6 @@
 /* Programs that a process executes get the library and the test's time whatever environment they are given.
  *
- * What cannot be preloaded, a static or set-uid program, is noted for whoever reads the test's result.
+ * What cannot be preloaded, a static or set-uid program, is noted in the test's result.
  */
 #define _GNU_SOURCE
 #include "library.h"

@@ -1,6 +1,6 @@
 /* Waits for file descriptors: the kernel says when one is ready, the agent when the deadline has come and who goes on.
  *
- * Each call is made without waiting first. Only if it would block the thread polls the descriptors and a FIFO of its own,
+ * Each call is made without waiting first. Only if it would block the thread polls the descriptors and its own FIFO,
  * into which the agent writes at the deadline; then the call is made without waiting again.
  */
 #define _GNU_SOURCE

@@ -30,12 +30,12 @@
 enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900, INTERRUPTION = 63 /* a signal of ours */ };
 
 /* Functions of libc that are wrapped here and called there. */
-#define REAL_FUNCTIONS(X)                                                                                               \
-    X(fopen) X(fopen64) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp) X(pthread_barrier_wait)  \
-    X(pthread_cancel) X(pthread_create) X(pthread_join) X(pthread_mutex_lock) X(pthread_mutex_trylock)                    \
-    X(pthread_mutex_unlock) X(pthread_once) X(pthread_rwlock_tryrdlock) X(pthread_rwlock_trywrlock)                       \
-    X(pthread_rwlock_unlock) X(pthread_spin_trylock) X(pthread_tryjoin_np) X(sem_post) X(sem_trywait) X(sigaction)        \
-    X(sigwait) X(system)
+#define REAL_FUNCTIONS(X)                                                                                              \
+    X(fopen) X(fopen64) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp)               \
+    X(pthread_barrier_wait) X(pthread_create) X(pthread_join) X(pthread_mutex_lock) X(pthread_mutex_trylock)           \
+    X(pthread_mutex_unlock) X(pthread_once) X(pthread_rwlock_tryrdlock) X(pthread_rwlock_trywrlock)                    \
+    X(pthread_rwlock_unlock) X(pthread_spin_trylock) X(pthread_tryjoin_np) X(sem_post) X(sem_trywait)                  \
+    X(sigaction) X(system)
 
 struct real_functions {
 #define X(name) __typeof__(&name) name;

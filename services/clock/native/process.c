@@ -1,4 +1,4 @@
-/* Threads and processes: each begins, forks and ends with a slot of its own. */
+/* Threads and processes: each begins, forks and ends with its own slot. */
 #define _GNU_SOURCE
 #include "library.h"
 
@@ -8,6 +8,10 @@
 #include <sys/sem.h>
 #include <sys/wait.h>
 #include <threads.h>
+
+#ifndef SYS_pidfd_open
+#define SYS_pidfd_open 434
+#endif
 
 enum { MOST_CHILDREN = 128, RETRY_NS = 1000000, LOOK_AGAIN_NS = 100000000 };
 

@@ -1,4 +1,4 @@
-/* All threads of the application sleep: how /proc tells (proc_pid_stat(5), the kernel's Documentation/scheduler/sched-stats).
+/* All threads of the application sleep: how /proc shows that (proc_pid_stat(5), the kernel's Documentation/scheduler/sched-stats).
  *
  * Two looks at every thread: how often it got a processor and whether it sleeps, then whether it sleeps and how often. If
  * it slept in both looks and got no processor in between, it did not run between the looks: to run and to sleep again

@@ -173,7 +173,7 @@ PUBLIC int thrd_sleep(const struct timespec *wanted, struct timespec *left)
 PUBLIC int sched_yield(void)
 {
     count_spin();
-    return (int)answer(RAW_1(SYS_sched_yield, 0));
+    return is_managed() ? 0 : (int)answer(RAW_1(SYS_sched_yield, 0)); /* no other thread may run meanwhile */
 }
 
 PUBLIC void thrd_yield(void)

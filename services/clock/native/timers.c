@@ -309,13 +309,6 @@ PUBLIC unsigned alarm(unsigned seconds)
     return before.it_value.tv_usec >= 500000 || (!left && before.it_value.tv_usec) ? left + 1 : left;
 }
 
-PUBLIC useconds_t ualarm(useconds_t value, useconds_t interval)
-{
-    struct itimerval wanted = {{interval / 1000000, interval % 1000000}, {value / 1000000, value % 1000000}}, before;
-    setitimer(ITIMER_REAL, &wanted, &before);
-    return (useconds_t)(before.it_value.tv_sec * 1000000 + before.it_value.tv_usec);
-}
-
 /* -- timer_create --------------------------------------------------------------------------------------------------- */
 
 static struct timer *timer_of(timer_t handle)

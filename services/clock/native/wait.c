@@ -1,4 +1,4 @@
-/* Condition variables, semaphores and futexes: threads wait in queues by address, and whoever wakes them makes them ready.
+/* Condition variables, semaphores and futexes: threads wait in queues by address, and the thread that wakes them makes them ready.
  *
  * What several processes share has no queue here but a key in the waiting slots, made of the address within its page of
  * memory. Others may have the same key; they wake for nothing, which all that wait so allow.

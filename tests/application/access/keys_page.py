@@ -7,7 +7,7 @@ _HEAD = """\
 
 What becomes of each key of the [compose specification](https://github.com/compose-spec/compose-spec) in a test's copy
 of an application's compose file: *kept* as it is, *rewritten*, *removed*, or *refused*, which is an error. A key that
-has no row here is unknown and refused, except those of your own, which begin with `x-`.
+has no row here is unknown and refused, except your own, which begin with `x-`.
 [sandbox.md](sandbox.md#what-it-may-use-of-the-host) says which values may be used.
 
 `make goldens` generates this page from `dodo_dsl/application/access/compose_keys.py`.

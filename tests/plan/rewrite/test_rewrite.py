@@ -86,7 +86,7 @@ def test_own_network(tmp_path: Path) -> None:
         "steering: ports removed, tests publish none",
         "steering: changed for the test: depends_on",
         f"steering: added for the test: {added}",
-        "all services: network_mode removed, the test has a network of its own",
+        "all services: network_mode removed, the test has its own network",
         "left out: version",
     )
 

@@ -72,7 +72,7 @@ def test_elsewhere_there_is_no_pipeline(variable: str, value: str, said: str, tm
 @pytest.mark.parametrize("answer", [b"", b'{"message": 1}', b"[3]", b'[{"downstream_pipeline": {"id": "../x"}}]'])
 def test_an_answer_that_is_no_list_of_jobs_is_said(api: Api, tmp_path: Path, answer: bytes) -> None:
     api.changed["bridges"] = answer
-    with pytest.raises(NoChildJobs, match=r"GitLab's answer is no list of jobs"):
+    with pytest.raises(NoChildJobs, match=r"GitLab's answer lists no jobs"):
         fetched(api, tmp_path / "target")
 
 

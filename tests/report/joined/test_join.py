@@ -129,7 +129,7 @@ def test_no_slug_leaves_its_report(tmp_path: Path, slug: str) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
     (folder / "results.json").write_text(results.to_json([named("x", outcome="failed")]).replace('"x"', f'"{slug}"'))
-    with pytest.raises(results.ResultsError, match=re.escape(f"{folder}/results.json: '{slug[:60]}' is no slug")):
+    with pytest.raises(results.ResultsError, match=re.escape(f"{folder}/results.json: '{slug[:60]}' is not a slug")):
         joined(tmp_path / "out", folder)
     assert not (tmp_path / "out").exists()
 

@@ -87,4 +87,4 @@ def test_what_cannot_be_judged_is_said() -> None:
     limits = ResourceLimits(max_memory_growth=1.0)
     assert judged_use([], limits).notes == (UNSEEN_USE,)
     (note,) = judged_use([replace(QUIET, memory_growth_bytes_per_s=None)], limits).notes
-    assert note == "memory-growth of service 'steering' is not judged: the test was too short to tell"
+    assert note == "memory-growth of service 'steering' is not judged: the test was too short to measure it"

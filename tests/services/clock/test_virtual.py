@@ -253,11 +253,13 @@ def test_the_way_of_one_who_acts_by_a_timer_is_as_computed_by_hand(tmp_path: Pat
     """Also what it sends at the time of a frame, which counts from then on."""
     every = 3 * STEP // 10
     toys = Toys(cid, readers=0, seconds=1.0)
-    went = [EPOCH]
+    went, sent = [EPOCH], cast(list[int], [])
     with Session(cid) as session:
         request = session.messages.type(STEER)
 
         def answer(until: int) -> list[object]:
+            while (heard := session.receive(0.0)) is not None:
+                sent.append(heard.sent - EPOCH)
             if until > went[-1]:
                 with SharedMemory.attach(toys.memory_name()) as memory, memory.lock():
                     (place,) = struct.unpack("<d", memory.buffer[:8])
@@ -273,3 +275,6 @@ def test_the_way_of_one_who_acts_by_a_timer_is_as_computed_by_hand(tmp_path: Pat
             way, stepper = toys.run()
     assert [(at, round(place, 4)) for at, place in way] == [(at, round(x, 4)) for at, x in expected(11, every)]
     assert stepper.application.frames == 11
+    places = [at for at in sent if 0 <= at <= 11 * STEP]
+    assert places == [at for at, _ in way][: len(places)], "services send at the test's time, too"
+    assert len(places) > 50

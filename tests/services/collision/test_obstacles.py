@@ -154,9 +154,9 @@ def test_no_block_at_the_height_of_the_vehicle_is_said(tmp_path: Path) -> None:
     write(tmp_path, {"block": BLOCKS[:2]})
     within = "block between 0.01 and 0.15 m above the ground in the map"
     for name in ("blocks", "floor"):
-        with pytest.raises(ObstaclesError, match=f"^--walls: '{name}' is no {within}"):
+        with pytest.raises(ObstaclesError, match=f"^--walls: '{name}' names no {within}"):
             pick_walls({}, [name], (), tmp_path, 0.15)
-    with pytest.raises(ObstaclesError, match=r"^--walls: '\*' is no obstacle in the map"):
+    with pytest.raises(ObstaclesError, match=r"^--walls: '\*' names no obstacle in the map"):
         pick_walls({}, ["*"], (), tmp_path, 0.15)
     with pytest.raises(ObstaclesError, match="has no obstacle 'hedge'"):
         pick_walls({}, ["hedge"], (), tmp_path, 0.15)

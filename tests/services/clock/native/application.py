@@ -21,9 +21,9 @@ PATIENCE_S = 60.0
 NAMESPACES = ["unshare", *(["-U", "-r"] if os.getuid() else []), "-n", "-i", "-p", "-f", "--mount-proc", "--kill-child"]
 
 
-def compiled(folder: Path) -> Path:
+def compiled(folder: Path, optimization: str = "-O0") -> Path:
     """The folder with the library, the agent and the tests' programs."""
-    words = ["make", "-s", "-C", str(SOURCES), f"BUILD={folder}", "CFLAGS=-O0"]
+    words = ["make", "-s", "-C", str(SOURCES), f"BUILD={folder}", f"CFLAGS={optimization}"]
     subprocess.run(words, check=True, timeout=PATIENCE_S)
     programs = Path(__file__).with_name("programs.c")
     subprocess.run(["cc", "-pthread", "-o", folder / "programs", programs], check=True, timeout=PATIENCE_S)
@@ -63,7 +63,11 @@ class Application:
                 f"(env DODO_TIME_SERVICE={number} {ours} {command} > {self._outputs}/out{number} 2>&1; {done}) &"
             )
         self._shell = subprocess.Popen([*NAMESPACES, "sh", "-c", "\n".join([*lines, "wait"])], stdin=subprocess.DEVNULL)
-        self._await(self.folder / "ready")
+        try:
+            self._await(self.folder / "ready")
+        except AssertionError:
+            self._end()
+            raise
         self._command = (self.folder / "command").open("wb", buffering=0)
         self._reply = (self.folder / "reply").open("rb", buffering=0)
 
@@ -73,10 +77,13 @@ class Application:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._shell.kill()
-        self._shell.wait(PATIENCE_S)
         self._command.close()
         self._reply.close()
+        self._end()
+
+    def _end(self) -> None:
+        self._shell.kill()
+        self._shell.wait(PATIENCE_S)
         self._scratch.cleanup()
 
     def run(self, seconds: float) -> dict[str, Any]:

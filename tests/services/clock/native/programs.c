@@ -482,9 +482,26 @@ static void garbage(void)
 
 static void ticks(void)
 {
-    for (int at = 0; at < 1000; at++)
+    for (int at = 0; at < 2000; at++)
         usleep(10000);
     say("ticks", 0);
+}
+
+/* Prints the processor time of a read of the clock in ns. */
+static void reads(void)
+{
+    enum { ROUNDS = 200, READS = 900 /* not yet a spin */ };
+    struct timespec from, to, at;
+    double ns = 0;
+    for (int round = 0; round < ROUNDS; round++) {
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &from);
+        for (int read = 0; read < READS; read++)
+            clock_gettime(CLOCK_MONOTONIC, &at);
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &to);
+        ns += (double)(to.tv_sec - from.tv_sec) * 1e9 + (double)(to.tv_nsec - from.tv_nsec);
+        usleep(100);
+    }
+    printf("%g\n", ns / ROUNDS / READS);
 }
 
 int main(int count, char **words)
@@ -493,7 +510,7 @@ int main(int count, char **words)
         {"sleeps", sleeps}, {"day", day}, {"conds", conds}, {"semaphores", semaphores}, {"locks", locks}, {"futexes", futexes},
         {"workers", workers}, {"files", files}, {"datagrams", datagrams}, {"timers", timers}, {"signals", signals},
         {"system_v", system_v}, {"forks", forks}, {"nap", nap}, {"shares", shares}, {"spins", spins},
-        {"randoms", randoms}, {"garbage", garbage}, {"ticks", ticks}};
+        {"randoms", randoms}, {"garbage", garbage}, {"ticks", ticks}, {"reads", reads}};
     own = words[0];
     for (size_t at = 0; count > 1 && at < sizeof programs / sizeof *programs; at++)
         if (!strcmp(programs[at].name, words[1])) {
