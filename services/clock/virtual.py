@@ -181,7 +181,7 @@ def _opened(path: Path, access: int) -> int:
     descriptor = os.open(path, access | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOFOLLOW)
     if not stat.S_ISFIFO(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise OSError(f"{path} is no FIFO")
+        raise OSError(f"{path} is not a FIFO")
     return descriptor
 
 

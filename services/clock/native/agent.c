@@ -50,7 +50,7 @@ static struct options {
 
 static struct time_page *page;
 static int folder_file = -1, command_file = -1, reply_file = -1, wakers[TIME_SLOTS];
-static int64_t now_ns; /* the page tells it, and is written to by strangers */
+static int64_t now_ns; /* the page shows it, and the application can write there */
 static bool is_overwritten, has_begun[TIME_SERVICES];
 static uint32_t waits_unseen[TIME_SLOTS]; /* one more than `wake` of a thread that was found to wait elsewhere, or has ended */
 static uint64_t grants;
