@@ -60,7 +60,7 @@ def test_a_name_changes_in_the_whole_file(
 @pytest.mark.parametrize(
     ("word", "new", "why"),
     [
-        ("pose:", "Pose", "'Pose' is no name, expected lower-case"),
+        ("pose:", "Pose", "'Pose' is not a name, expected lower-case"),
         ("pose:", "vehicle", "'action' has 'vehicle' already"),
         ("integrator", "x", "only services of this file"),
         ("timeout", "x", "only services of this file"),

@@ -321,7 +321,7 @@ SLIPS = {
     ),
     "indent-missing-body": Wrong(
         {9: "camera: {uses: virtual-camera, with: {map-path: maps/plain, freq: 10 Hz}}"},
-        "9:1 unknown-key: 'camera' stands beside 'environment', which is empty",
+        "9:1 unknown-key: 'camera' is next to 'environment', which is empty",
         "indent what belongs to 'environment'",
     ),
     "indent-one-too-few": Wrong(

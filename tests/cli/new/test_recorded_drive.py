@@ -90,7 +90,7 @@ def test_pictures_that_the_application_waits_for_and_the_recording_lacks(empty: 
     assert warning not in dodo("new", "seeing", "--rec", "seen.rec")[1]
     assert warning in dodo("new", "mine", "--rec", "drive.rec")[1]
     code, out, _ = dodo("compile", "--check")
-    message = "the application's 'car' reads pictures from 'video0.argb', and 'drive.rec' has none"
+    message = "the application's 'car' reads frames from 'video0.argb', and 'drive.rec' has none"
     assert (code, out.splitlines()[-1]) == (0, "3 tests checked: 1 warning")
     assert f"compose.yml:1:39: warning[application-memory]: {message}" in out
 
