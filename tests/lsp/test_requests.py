@@ -35,7 +35,10 @@ def hover(editor: Editor, path: Path, text: str, word: str) -> str:
         ),
         ("pose:", ["**integrator**:", "- `opendlv.sim.Frame/0` to camera, track", "from vehicle"]),
         ("vehicle:", ["opendlv.proxy.GroundSteeringRequest` from the application"]),
-        ("clock:", ["**clock**: Clock of the test", "One of `realtime`, `lockstep`, `virtual`.", "Default: `realtime`."]),
+        (
+            "clock:",
+            ["**clock**: Clock of the test", "One of `realtime`, `lockstep`, `virtual`.", "Default: `realtime`."],
+        ),
         ("uses: collision", ["**uses**"]),
         ("environment:", ["**environment**"]),
     ],
