@@ -199,9 +199,9 @@ def test_it_reports_that_it_was_late(firmware: None) -> None:
         ([], "expected options"),
         (["--start", "here", str(ELF)], "expected options"),
         (["--boot", "-1", str(ELF)], "expected options"),
-        (["/dev/null"], "is no firmware"),
-        (["missing.elf"], "is no firmware"),
-        ([__file__], "is no firmware"),
+        (["/dev/null"], "is not a firmware"),
+        (["missing.elf"], "is not a firmware"),
+        ([__file__], "is not a firmware"),
         (["--link", "/nowhere/rig", str(ELF)], "no link"),
     ],
 )
