@@ -503,9 +503,13 @@ def test_the_page_s_inputs_are_those_of_the_templates() -> None:
         name = re.search(r"(\w+)(\.gitlab-ci\.yml|@[\d.]+)$", entry.get("local", entry.get("component")))
         included(package_data.templates() / name[1] / "template.yml", **entry.get("inputs", {}))  # type: ignore[index]
     rows = re.findall(
-        r"^\| `([\w-]+)` \| .*? \| (all|pipelines|application|run|application, run) \| ", PAGE.read_text(), re.MULTILINE
+        r"^\| `([\w-]+)` \| .*? \| (all|(?:`\w+`, )?`(?:application|run)`) \| ", PAGE.read_text(), re.MULTILINE
     )
-    columns = {"all": TEMPLATES, "pipelines": [APPLICATION, DEPLOYMENT], "application": [APPLICATION], "run": [RUN]}
-    columns["application, run"] = [APPLICATION, RUN]
+    columns = {
+        "all": TEMPLATES,
+        "`deployment`, `application`": [APPLICATION, DEPLOYMENT],
+        "`application`": [APPLICATION],
+    }
+    columns |= {"`run`": [RUN], "`application`, `run`": [APPLICATION, RUN]}
     for template in TEMPLATES:
         assert {name for name, of in rows if template in columns[of]} == specified(template).keys()
