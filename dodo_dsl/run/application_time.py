@@ -27,6 +27,8 @@ LIBRARY, AGENT = "libdodo-time.so", "dodo-time"
 PAGE_DESTROYED = 3
 """The exit code of the agent when the application destroyed the page that both share."""
 _BUILD_S = 120.0
+_OF_MAKE = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
+"""Variables by which a make that has started DoDo would speak to this one."""
 _WAY_OUT = "run it with --clock lockstep or --clock realtime"
 
 
@@ -90,8 +92,9 @@ def _build(sources: Path, folder: Path) -> None:
     if not shutil.which("make") or not shutil.which(os.environ.get("CC", "cc")):
         raise BackendError("clock: virtual needs a C compiler and make: apt-get install gcc make, or run scripts/setup")
     words = ["make", "--silent", "-C", str(sources), f"BUILD={folder}"]
+    environment = {name: value for name, value in os.environ.items() if name not in _OF_MAKE}
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=_BUILD_S)
+        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=_BUILD_S, env=environment)
         said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
     except (OSError, subprocess.TimeoutExpired) as error:
         raise BackendError(f"clock: virtual cannot be built: {error}") from None
