@@ -67,8 +67,9 @@ _SHARED = (
 
 def _application(compose: dict[str, Any]) -> str:
     """The application's copy in block style; what several services share stands once."""
-    blocks = {name: {k: _dumped({k: v}) for k, v in each.items()} for name, each in compose["services"].items()}
-    first, *others = blocks.values()
+    services = compose.get("services") or {}
+    blocks = {name: {k: _dumped({k: v}) for k, v in each.items()} for name, each in services.items()}
+    first, *others = blocks.values() or [{}]
     shared = {k: first[k] for k in _SHARED if others and k in first and all(o.get(k) == first[k] for o in others)}
     if not shared:
         return _yaml_block(compose)
