@@ -168,12 +168,15 @@ class ToyApplication:
 
 @dataclass
 class Filter:
-    """An application without a camera: answers each place as soon as it hears it."""
+    """An application without a camera: answers each place as soon as it hears it, and hears from the start."""
 
     cid: int
 
+    def __post_init__(self) -> None:
+        self._session = Session(self.cid)
+
     def run(self, stopped: Callable[[], bool]) -> None:
-        with Session(self.cid) as session:
+        with self._session as session:
             place, request = session.messages.id(PLACE), session.messages.type(STEER)
             while not stopped():
                 envelope = session.receive(0.05)
