@@ -48,7 +48,7 @@ def in_the_drive(memory: str, folder: Path) -> dict[str, list[str]]:
     """Services and programs of the drive with their flags; evaluators that do not end within it."""
     long = "--max-time=3600"
     return {
-        "collision": [MAP, "--walls=left,right", long],
+        "collision": [MAP, "--walls=left,right", "--min-distance=0", long],
         "continuous_signal": [
             f"--message={REQUEST}", "--field=groundSteering", "--target=tests_registry/targets/left-curve.csv",
             "--max-mean=1", long,

@@ -27,6 +27,7 @@ RULES: tuple[Rule, ...] = (
     service_rules.check_messages,
     file_rules.check_references,
     file_rules.check_files,
+    file_rules.check_starts,
     file_rules.check_limits,
     spec_rules.check_goals,
     spec_rules.check_baseline,
@@ -74,7 +75,7 @@ def check(
 
 def forget_files() -> None:
     """What is kept of the files that tests name, which may have changed."""
-    read = (file_rules.entries, file_rules.problems, baseline.results)
+    read = (file_rules.entries, file_rules.problems, file_rules.fault_of_start, baseline.results)
     for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()
 

@@ -4,15 +4,19 @@
 has no format is JSON of the shape that the manifest names.
 ``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
 ``short-timeout``: the test's timeout leaves room for the longest time that an evaluator waits.
+``wrong-start``: the vehicle starts clear of the walls and on their side of the goal.
 ``no-limit``: an evaluator has something to judge by; ``empty-file``: so has the file that it judges by. A test that can
 only pass shows nothing about the application.
 """
 
 import functools
 import json
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import known_ids
@@ -24,6 +28,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.registry import SUFFIX
 
 RULE = "wrong-file"
+STATE = "opendlv.sim.KinematicState"
 _TEXT = (".json", ".csv", ".obj", ".txt", ".yml", ".yaml")
 """Endings of files whose lines can be shown."""
 
@@ -171,6 +176,35 @@ def _within(context: RuleContext, service: ResolvedService, seconds: str, entry:
         message = f"'{service.use.name}' waits up to {written}, but the test's timeout of {timeout:g} s ends it first"
         hint = "use a longer timeout, so that the evaluator can judge"
         yield Diagnostic(entry.value.span, "short-timeout", message, hint, "warning")
+
+
+def check_starts(context: RuleContext) -> Iterator[Diagnostic]:
+    for judge in context.services:
+        given = {name: each.value for name, each in judge.arguments.items() if each.value}
+        flags = tuple((name, judge.arguments[name].parameter.type, str(v.path or v.text)) for name, v in given.items())
+        for mover in context.services if "walls" in judge.arguments else ():
+            pose, origin = ([mover.texts.get(f"{of}{name}") for name in ("x", "y", "yaw")] for of in ("", "origin-"))
+            is_it = f"{STATE}/{{frame-id}}" in mover.messages.inputs and not {*origin} - {"0", None}
+            if not is_it or None in pose or mover.texts.get("frame-id") != judge.texts.get("frame-id"):
+                continue
+            if fault := fault_of_start(flags, *map(float, filter(None, pose))):
+                entry = next((e for name in ("x", "y", "yaw") if (e := mover.arguments[name].entry)), None)
+                hint = f"choose x, y and yaw of '{mover.use.name}' between the walls"
+                yield Diagnostic(entry.value.span if entry else mover.use.span, "wrong-start", fault, hint)
+
+
+@functools.lru_cache(maxsize=1024)
+def fault_of_start(flags: tuple[tuple[str, str, str], ...], x: float, y: float, yaw: float) -> str | None:
+    """What is wrong with a vehicle's start (m, deg) by its judge's parameters; None if these are wrong themselves."""
+    from dodo_dsl.opendlv.assets import track
+
+    read: Mapping[str, Callable[[str], Any]] = {"list": lambda text: text.split(",") if text else [], "number": float}
+    values = defaultdict[str, Any](lambda: None, {name: read.get(kind, str)(text) for name, kind, text in flags})
+    try:
+        course, box = track.track(values), track.VehicleBox(values["length"], values["width"])
+    except (TypeError, ValueError):
+        return None
+    return track.fault_of_start(course, track.VehiclePose(x, y, math.radians(yaw)), box)
 
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:

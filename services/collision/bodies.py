@@ -13,7 +13,7 @@ from typing import NamedTuple
 import shapely
 
 from dodo_dsl.opendlv.assets.map_file import bodies, read_map
-from services.collision.track import TURN, VehicleBox, VehiclePose, between, corners
+from dodo_dsl.opendlv.assets.track import TURN, VehicleBox, VehiclePose, between, corners
 
 MICROSECONDS = 1_000_000
 HELD = 2 * MICROSECONDS

@@ -11,10 +11,9 @@ from typing import Literal
 
 import shapely
 
-from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
-from services.collision.bodies import Approach, Footprints, OtherBody
-from services.collision.track import (
+from dodo_dsl.opendlv.assets.track import (
     Gates,
+    Goal,
     Track,
     VehicleBox,
     VehiclePose,
@@ -28,6 +27,8 @@ from services.collision.track import (
     told,
     touched,
 )
+from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.collision.bodies import Approach, Footprints, OtherBody
 
 MICROSECONDS = 1_000_000
 
@@ -54,41 +55,28 @@ class DriveMeasures:
         """The vehicle came this close to a wall, in m; touching is a margin of zero."""
         self.wall_margin = margin if self.wall_margin is None else min(self.wall_margin, margin)
 
-    def goal_check(self, max_time: float) -> Check:
-        """The time to the goal; null, and not ok, when it was not reached."""
-        is_reached = self.time_to_goal is not None
-        return Check(
-            "time-to-goal", self.time_to_goal, {"max": max_time}, "s", is_reached, parameters=("max-time", "goal")
-        )
-
-    @staticmethod
-    def rest_check(rest: float) -> Check:
-        """The distance left to the goal in m; it says how far a drive that failed came, and decides nothing."""
-        return Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0, parameters=("goal", "gates"))
-
-    def wall_check(self, limit: float) -> Check:
-        """The margin, at least its limit, or more than a limit of zero: a wall touched is a wall hit."""
-        return _margin_check("wall-margin", self.wall_margin, limit, ("min-margin", "walls"))
-
-    def body_check(self, limit: float) -> Check:
-        """The same of other bodies."""
-        return _margin_check("body-margin", self.body_margin, limit, ("min-body-margin", "bodies"))
-
-    @staticmethod
-    def gate_check(crossed: int, gates: int) -> Check:
-        """The gates crossed in order; all of them are required."""
-        return Check("gates", crossed, {"min": gates}, "", crossed == gates)
-
-    def drive_checks(self, max_speed: float | None = None) -> tuple[Check, Check]:
-        """The distance, and the speed with its limit in m/s, if there is one."""
-        speed = {} if max_speed is None else {"max": max_speed}
-        is_kept = max_speed is None or (self.max_speed is not None and self.max_speed <= max_speed)
-        return Check("distance", self.distance, {}, "m", True), Check(
-            "max-speed", self.max_speed, speed, "m/s", is_kept
-        )
+    def checks(self, track: Track, crossed: int, rest: float | None, has_bodies: bool) -> Iterator[Check]:
+        """Those of a track; the ``rest`` in m to the goal decides nothing, but shows how far a drive came."""
+        arrived, gates, fast = self.time_to_goal, len(track.gates), track.max_speed
+        if track.goal or gates:
+            limit = {"max": track.max_time}
+            yield Check("time-to-goal", arrived, limit, "s", arrived is not None, parameters=("max-time", "goal"))
+            if rest is not None:
+                yield Check("to-goal", rest, {"max": 0.0}, "m", rest <= 0.0, parameters=("goal", "gates"))
+        if gates:
+            yield Check("gates", crossed, {"min": gates}, "", crossed == gates)
+        if track.walls:
+            yield _margin_check("wall-margin", self.wall_margin, track.min_margin, ("min-margin", "walls"))
+        if has_bodies:
+            yield _margin_check("body-margin", self.body_margin, track.min_body_margin, ("min-body-margin", "bodies"))
+        least = {"min": track.min_distance} if track.min_distance else {}
+        yield Check("distance", self.distance, least, "m", self.distance >= track.min_distance)
+        is_kept = fast is None or (self.max_speed is not None and self.max_speed <= fast)
+        yield Check("max-speed", self.max_speed, {} if fast is None else {"max": fast}, "m/s", is_kept)
 
 
 def _margin_check(name: str, margin: float | None, limit: float, flags: tuple[str, ...]) -> Check:
+    """The margin, at least its limit, or more than a limit of zero: a wall touched is a wall hit."""
     is_kept = margin is not None and margin >= limit and margin > 0.0
     return Check(name, margin, {"min": limit}, "m", is_kept, exclusive=limit <= 0.0, parameters=flags)
 
@@ -178,6 +166,8 @@ class TrackEvaluator(Evaluator):
         self._measures = DriveMeasures()
         self._gates = Gates(track.gates)
         self._early = False
+        self._begin: VehiclePose | None = None
+        self._goal: Goal | None = None
         self._requests = requests or Requests()
         self._last: tuple[int, VehiclePose] | None = None
         self._closest: dict[str, float | str | None] = {}
@@ -220,9 +210,9 @@ class TrackEvaluator(Evaluator):
         for body in self._bodies.values():
             body.take_vehicle(time, pose)
         if start is None:
-            fault = fault_of_start(self.track, outline(pose, self.box))
+            fault = fault_of_start(self.track, pose, self.box)
             if fault is not None:
-                raise UnjudgeableError(f"{fault}, {place(pose)}")
+                raise UnjudgeableError(fault)
         elif self.is_overdue(time):
             self.time_is_over()
         elif self.elapsed(time) >= 0:
@@ -270,6 +260,7 @@ class TrackEvaluator(Evaluator):
         return self.verdict is not None
 
     def _judge(self, start: tuple[int, VehiclePose], time: int, pose: VehiclePose) -> None:
+        self._begin = self._begin or start[1]
         area, when = swept(start[1], pose, self.box), f"after {self.elapsed(time):.2f} s"
         self._speeds.add(time, self._measures.move(start, (time, pose)))
         margin, near = self._approach(area)
@@ -293,12 +284,17 @@ class TrackEvaluator(Evaluator):
 
     def _arrived(self, reason: str, time: int) -> Verdict:
         """The goal was reached: by the application only if it went on with its requests."""
-        fault = self._requests.fault(time, self.zero)
+        fault = self._requests.fault(time, self.zero) or self._short()
         if self._requests.is_silent:
             fault = f"the application sent no {' and no '.join(self._requests.missing)}"
         if fault is None:
             return self._verdict("passed", reason)
         return self._verdict("failed", f"{fault}, although the vehicle {reason}", self._requests.is_silent)
+
+    def _short(self) -> str | None:
+        """That the vehicle has not driven as far as it has to."""
+        least, driven = self.track.min_distance, self._measures.distance
+        return None if driven >= least else f"drove {told(driven, least)} m, expected at least {least:g} m"
 
     def _approach(self, area: shapely.Geometry) -> tuple[float, str]:
         near = nearest(self.track.walls, area)
@@ -311,15 +307,19 @@ class TrackEvaluator(Evaluator):
 
     def _reached(self, start: VehiclePose, end: VehiclePose, area: shapely.Geometry) -> str | None:
         """That the goal was reached after all gates, or the last gate if there is no goal; None when it was not."""
-        share = self._gates.move(start, end)
+        share, goal = self._gates.move(start, end), self.track.goal
         if share is None:
-            self._early = self._early or touched(self.track.goal, area) is not None
+            self._early = self._early or touched(goal, area) is not None
             return None
-        if self.track.gates and not self.track.goal:
-            return f"crossed the last gate, {self.track.gates[-1][0]},"
+        last = self.track.gates[-1][0] if self.track.gates else ""
+        if last and not goal:
+            return f"crossed the last gate, {last},"
         rest = area if share == 0.0 else swept(between(start, end, share), end, self.box)
-        name = touched(self.track.goal, rest)
-        return name and f"reached {name}"
+        begin, name = between(start, end, share), touched(goal, rest)
+        if name is None:
+            return None
+        self._goal = self._goal or Goal(self.track, begin if last else self._begin or begin, self.box)
+        return f"reached {name}" if self._goal.move(begin, end, rest) or last in goal else None
 
     def decide(self, span: JudgedTime) -> Verdict:
         if self._last is None:
@@ -335,25 +335,31 @@ class TrackEvaluator(Evaluator):
             return self._verdict("failed", f"{self._missed(self._last[1], span.within)}{aside}")
         if self._has_failed_by_bodies(span.within) and self.verdict is not None:
             return self.verdict
+        if short := self._short():
+            return self._verdict("failed", f"{short} {span.within}{aside}")
         clear = " and ".join([*self.track.walls, *(body.name for body in self._bodies.values())])
-        return self._verdict("passed", f"stayed clear of {clear} {span.throughout}{aside}")
+        did = f"stayed clear of {clear}" if clear else f"drove {self._measures.distance:.2f} m"
+        return self._verdict("passed", f"{did} {span.throughout}{aside}")
 
     def _missed(self, pose: VehiclePose, within: str) -> str:
         name, lines = self._gates.next or next(iter(self.track.goal.items()))
         away = f"the vehicle is {place(pose)}, {shapely.distance(lines, outline(pose, self.box)):.2f} m from"
         if self._gates.next is None:
-            return f"did not reach {name} {within}: {away} it"
+            behind = (
+                "; it came to it from behind, which does not count"
+                if self._goal and self._goal.came_from_behind
+                else ""
+            )
+            return f"did not reach {name} {within}: {away} it{behind}"
         early = f"; {next(iter(self.track.goal))} does not count before the gates" if self._early else ""
         return f"crossed {self._gates.crossed} of {len(self._gates)} gates {within}: {away} {name}, the next{early}"
 
-    def _rest(self) -> Iterator[Check]:
+    def _rest(self) -> float | None:
         """How far it is from the newest pose to the goal, by straight lines from gate to gate."""
-        if self._measures.time_to_goal is not None:
-            yield self._measures.rest_check(0.0)
-        elif self._last is not None:
-            left = [lines for _, lines in self.track.gates[self._gates.crossed :]]
-            area = outline(self._last[1], self.box)
-            yield self._measures.rest_check(length_through(area, [*left, *self.track.goal.values()]))
+        if self._measures.time_to_goal is not None or self._last is None:
+            return None if self._last is None else 0.0
+        left = [lines for _, lines in self.track.gates[self._gates.crossed :]]
+        return length_through(outline(self._last[1], self.box), [*left, *self.track.goal.values()])
 
     def _moment(self, prefix: str = "") -> dict[str, float | str | None]:
         """Time (s) and place (m) of the newest pose."""
@@ -365,12 +371,7 @@ class TrackEvaluator(Evaluator):
     def _verdict(
         self, outcome: Literal["passed", "failed"], reason: str, silent: bool = False, obstacle: str | None = None
     ) -> Verdict:
-        track, measures = self.track, self._measures
-        goal = (measures.goal_check(track.max_time), *self._rest()) if track.goal or track.gates else ()
-        gates = (measures.gate_check(self._gates.crossed, len(self._gates)),) if track.gates else ()
-        walls = (measures.wall_check(track.min_margin),) if track.walls else ()
-        bodies = (measures.body_check(track.min_body_margin),) if self._bodies else ()
-        drive = measures.drive_checks(track.max_speed)
-        checks = (*goal, *gates, *walls, *bodies, *drive, *self._requests.checks())
+        measured = self._measures.checks(self.track, self._gates.crossed, self._rest(), bool(self._bodies))
+        checks = (*measured, *self._requests.checks())
         named = {} if obstacle is None else {"obstacle": obstacle}
         return Verdict(outcome, reason, checks, silent, {**self._moment(), **named, **self._closest, **self._nearest})

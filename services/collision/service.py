@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.opendlv.assets.map_file import HIGHEST, NO_BODIES
+from dodo_dsl.opendlv.assets.map_file import NO_BODIES
+from dodo_dsl.opendlv.assets.track import VehicleBox, VehiclePose, track
 from dodo_dsl.opendlv.attitude import heading_of
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from services.base import Context, Flags, Handler, UnjudgeableError
 from services.collision.bodies import Footprints, load_footprints
 from services.collision.model import Requests, TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick, pick_walls
 
 FRAME = "opendlv.sim.Frame"
 SILENCE, GAPS = 2.0, 3.0
@@ -107,33 +107,6 @@ def _label(name: str, stamp: int | None, requests: Sequence[tuple[str, int | Non
     """How a request is called: with its sender stamp where others have the same name."""
     is_one = sum(other == name for other, _ in requests) == 1
     return name if is_one or stamp is None else f"{name}/{stamp}"
-
-
-def track(flags: Flags) -> Track:
-    """The obstacles that the flags name, from the map; raises MapError, and ValueError for flags that make no track."""
-    path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
-    if not goal and not walls and not gates:
-        raise ValueError("nothing to judge: give --goal, --gates or --walls")
-    if goal in walls:
-        raise ValueError(f"--goal={goal} is one of the --walls too")
-    for name in gates:
-        if name in walls:
-            raise ValueError(f"{name} of --gates is one of the --walls too")
-    if flags["min-margin"] and not walls:
-        raise ValueError("--min-margin needs --walls")
-    if not flags["requests"]:
-        raise ValueError("--requests is empty: a drive is the application's only if it sends something")
-    obstacles = load_obstacles(path)
-    picked = pick(obstacles, gates, "gates", path)
-    return Track(
-        walls=pick_walls(obstacles, walls, {goal, *gates}, path, flags["height"] or HIGHEST),
-        goal=pick(obstacles, [goal] if goal else [], "goal", path),
-        max_time=flags["max-time"],
-        gates=tuple((name, picked[name]) for name in gates),
-        min_margin=flags["min-margin"],
-        max_speed=flags["max-speed"],
-        min_body_margin=flags["min-body-margin"] or 0.0,
-    )
 
 
 def build(context: Context) -> Collision:

@@ -6,25 +6,18 @@ A cell counts with its centre. Metres and rad, world frame.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.assets.track import VehiclePose, between
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 
 MOST_CELLS = 4_000_000
 _STEPS = 100_000
 """Of a path between two frames, at most: a vehicle that jumps farther covers less of it."""
-
-
-class Pose(NamedTuple):
-    """Where the centre is, and the heading counter-clockwise from the x axis."""
-
-    x: float
-    y: float
-    heading: float
 
 
 @dataclass(frozen=True)
@@ -82,7 +75,7 @@ class CoverageGrid:
         """The share of the area that is covered."""
         return (self.cells - self.left) / self.cells
 
-    def cover(self, pose: Pose) -> None:
+    def cover(self, pose: VehiclePose) -> None:
         """The vehicle is here."""
         reach = self._footprint.reach
         columns, rows = (
@@ -98,7 +91,7 @@ class CoverageGrid:
         part &= ~covered
         self.left -= int(covered.sum())
 
-    def move(self, start: Pose, end: Pose) -> None:
+    def move(self, start: VehiclePose, end: VehiclePose) -> None:
         """The vehicle went straight from one pose to the next, and turned evenly the shorter way round.
 
         It is looked at where no point of it has moved by more than half a cell, or half of what is thinner than that.
@@ -106,9 +99,8 @@ class CoverageGrid:
         turn = math.remainder(end.heading - start.heading, math.tau)
         way = math.hypot(end.x - start.x, end.y - start.y) + abs(turn) * self._footprint.reach
         steps = min(_STEPS, max(1, math.ceil(2 * way / min(self._cell, self._footprint.thickness))))
-        for share in (step / steps for step in range(1, steps + 1)):
-            x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
-            self.cover(Pose(x, y, start.heading + share * turn))
+        for step in range(1, steps + 1):
+            self.cover(between(start, end, step / steps))
 
 
 class CoverageEvaluator(Evaluator):
@@ -119,13 +111,13 @@ class CoverageEvaluator(Evaluator):
     def __init__(self, name: str, grid: CoverageGrid, least: float, max_time: float) -> None:
         super().__init__(max_time)
         self._name, self._grid, self._least, self._limit = name, grid, least, max_time
-        self._last: tuple[int, Pose] | None = None
+        self._last: tuple[int, VehiclePose] | None = None
         self._distance, self._reached = 0.0, None
         self.plot = self.judged.series(f"Share of {name} passed over", low=least)
 
     _reached: float | None
 
-    def look(self, pose: Pose, time: int) -> None:
+    def look(self, pose: VehiclePose, time: int) -> None:
         """The vehicle is at a pose; one that is not newer than the last, or of before the test, is ignored."""
         before = self._last
         if self.verdict is not None or (before is not None and time <= before[0]):
@@ -140,7 +132,7 @@ class CoverageEvaluator(Evaluator):
             self._grid.cover(pose)
         else:
             self._grid.move(before[1], pose)
-            self._distance += math.dist(before[1][:2], pose[:2])
+            self._distance += math.hypot(pose.x - before[1].x, pose.y - before[1].y)
         self.plot.add(time, self._grid.share, mark=0)
         if self._grid.share >= self._least:
             self._reached = self.elapsed(time)
@@ -168,6 +160,6 @@ class CoverageEvaluator(Evaluator):
         )
 
     def _verdict(self, outcome: Literal["passed", "failed"], reason: str) -> Verdict:
-        time, pose = self._last or (self.zero, Pose(0, 0, 0))
+        time, pose = self._last or (self.zero, VehiclePose(0, 0, 0))
         evidence = {"time": self.elapsed(time), "x": pose.x, "y": pose.y}
         return Verdict(outcome, reason, self.checks(), evidence=evidence)

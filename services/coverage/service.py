@@ -7,9 +7,10 @@ from typing import Any
 import shapely
 
 from dodo_dsl.opendlv.assets import map_file
+from dodo_dsl.opendlv.assets.track import VehiclePose
 from dodo_dsl.opendlv.attitude import heading_of
 from services.base import Context, Flags
-from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint, Pose, enclosed
+from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint, enclosed
 
 _SIDES = ("x-min", "x-max", "y-min", "y-max")
 
@@ -30,7 +31,7 @@ class Coverage(CoverageEvaluator):
     def _take_frame(self, frame: Any, sample_time: int) -> None:
         heading = heading_of(frame.qx, frame.qy, frame.qz, frame.qw)
         if heading is not None and math.isfinite(frame.x + frame.y):
-            self.look(Pose(frame.x, frame.y, heading), sample_time)
+            self.look(VehiclePose(frame.x, frame.y, heading), sample_time)
             return
         self._rejected += 1
         if self._rejected == 1:

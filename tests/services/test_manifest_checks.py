@@ -7,6 +7,7 @@ from pathlib import Path
 import shapely
 import yaml
 
+from dodo_dsl.opendlv.assets.track import Track
 from services.base import Check
 from services.collision.model import DriveMeasures, Requests
 from services.continuous_signal.measures import SignalLimits, SignalMeasures
@@ -34,9 +35,9 @@ def compare(service: str, checks: Iterable[Check]) -> None:
 
 
 def test_collision() -> None:
-    measures = DriveMeasures()
-    goals = (measures.goal_check(1.0), measures.rest_check(0.0), measures.gate_check(0, 1))
-    drive = (*goals, measures.wall_check(0.0), measures.body_check(0.0), *measures.drive_checks())
+    point = {"it": shapely.Point(0, 0)}
+    track = Track(point, point, 1.0, gates=(("gate", shapely.MultiLineString()),))
+    drive = DriveMeasures().checks(track, 0, 0.0, has_bodies=True)
     compare("collision", (*drive, *Requests(max_silence=2.0).checks()))
 
 

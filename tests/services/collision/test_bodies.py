@@ -9,10 +9,10 @@ import pytest
 import shapely
 import shapely.affinity
 
+from dodo_dsl.opendlv.assets.track import Track, VehicleBox, VehiclePose, between, outline
 from services.base import UnjudgeableError, Verdict
 from services.collision.bodies import OtherBody, least_distance, load_footprints
 from services.collision.model import TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, between, outline
 
 BOX = VehicleBox(0.36, 0.16)
 WEDGE = "v 0.1 0.2 0\nv -0.1 0.2 0\nv 0 -0.3 0\nv 0 0.2 0.3\nv 9 9 9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from services.collision.track import Gate, Gates, VehiclePose, crossings
+from dodo_dsl.opendlv.assets.track import Gate, Gates, VehiclePose, crossings
 
 # The path has its corners at whole numbers and the gates theirs aside, so that none lies on the other.
 corners = st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=2, max_size=12)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
-from services.collision.track import VehicleBox, VehiclePose, outline, swept
+from dodo_dsl.opendlv.assets.track import VehicleBox, VehiclePose, outline, swept
 
 KIWI = VehicleBox(0.36, 0.16)
 places = st.floats(-2, 2)

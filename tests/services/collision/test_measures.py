@@ -1,12 +1,14 @@
 import math
 
 import pytest
+import shapely
 
+from dodo_dsl.opendlv.assets.track import Track, VehiclePose
 from services.base import Check
 from services.collision.model import DriveMeasures
-from services.collision.track import VehiclePose
 
 SECOND = 1_000_000
+BARE = Track({}, {}, 1.0)
 
 
 def at(seconds: float, x: float, y: float = 0.0) -> tuple[int, VehiclePose]:
@@ -17,13 +19,13 @@ def test_distance_and_speed_add_up_over_moves() -> None:
     measures = DriveMeasures()
     measures.move(at(0, 0), at(2, 3, 4))
     measures.move(at(2, 3, 4), at(3, 3, 6))
-    distance, speed = measures.drive_checks()
+    distance, speed = measures.checks(BARE, 0, None, False)
     assert (distance.value, speed.value) == (pytest.approx(7), pytest.approx(2.5))
     assert distance.ok and speed.ok and not distance.limit
 
 
 def test_without_a_move_there_is_no_speed() -> None:
-    assert [check.value for check in DriveMeasures().drive_checks()] == [0.0, None]
+    assert [check.value for check in DriveMeasures().checks(BARE, 0, None, False)] == [0.0, None]
 
 
 @pytest.mark.parametrize(
@@ -44,11 +46,14 @@ def test_the_smallest_margin_keeps_its_limit_and_is_above_zero(
         measures.approach(margin)
     smallest = min(margins, default=None)
     check = Check("wall-margin", smallest, {"min": limit}, "m", is_kept, exclusive=limit == 0.0)
-    assert measures.wall_check(limit) == check
+    assert (
+        next(measures.checks(Track({"wall": shapely.Point(0, 0)}, {}, 1.0, min_margin=limit), 0, None, False)) == check
+    )
 
 
-def test_goal_and_gates() -> None:
-    assert DriveMeasures().goal_check(40) == Check("time-to-goal", None, {"max": 40}, "s", False)
-    assert DriveMeasures(time_to_goal=3.5).goal_check(40) == Check("time-to-goal", 3.5, {"max": 40}, "s", True)
-    assert DriveMeasures.gate_check(2, 3) == Check("gates", 2, {"min": 3}, "", False)
-    assert DriveMeasures.gate_check(3, 3).ok
+@pytest.mark.parametrize(("time", "crossed"), [(None, 2), (3.5, 3)])
+def test_goal_and_gates(time: float | None, crossed: int) -> None:
+    track, is_done = Track({}, {}, 40, gates=(("gate", shapely.MultiLineString()),) * 3), time is not None
+    goal, gates, *_ = DriveMeasures(time_to_goal=time).checks(track, crossed, None, False)
+    assert goal == Check("time-to-goal", time, {"max": 40}, "s", is_done)
+    assert gates == Check("gates", crossed, {"min": 3}, "", is_done)

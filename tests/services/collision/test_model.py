@@ -11,9 +11,9 @@ import shapely.affinity
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv.assets.track import Track, VehicleBox, VehiclePose, told
 from services.base import UnjudgeableError, Verdict
 from services.collision.model import REQUESTS, Requests, TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, told
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND

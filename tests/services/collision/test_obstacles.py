@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 import shapely
 
-from services.collision.track import ObstaclesError, load_obstacles, pick, pick_walls
+from dodo_dsl.opendlv.assets.track import load_obstacles, pick, pick_walls
 
 
 def write(folder: Path, document: Any) -> Path:
@@ -47,14 +47,14 @@ def test_walls_of_a_text_file(tmp_path: Path) -> None:
 def test_what_is_no_wall(wrong: str, tmp_path: Path) -> None:
     file = tmp_path / "room.txt"
     file.write_text(f"0,0,1,1;\n{wrong}\n", encoding="latin-1")
-    with pytest.raises(ObstaclesError, match=r"room\.txt:2: expected a wall x1,y1,x2,y2; in m, found "):
+    with pytest.raises(ValueError, match=r"room\.txt:2: expected a wall x1,y1,x2,y2; in m, found "):
         load_obstacles(file)
 
 
 def test_a_text_file_without_walls_is_no_map(tmp_path: Path) -> None:
     file = tmp_path / "room.txt"
     file.write_text("\n ;\n")
-    with pytest.raises(ObstaclesError, match="the file is empty, expected a wall"):
+    with pytest.raises(ValueError, match="the file is empty, expected a wall"):
         load_obstacles(file)
 
 
@@ -96,13 +96,13 @@ def test_a_map_may_have_none(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_map_is_said_with_its_place(tmp_path: Path, document: Any, message: str) -> None:
-    with pytest.raises(ObstaclesError) as caught:
+    with pytest.raises(ValueError) as caught:
         load_obstacles(write(tmp_path, document))
     assert str(caught.value) == f"{tmp_path / 'map.json'}{message}"
 
 
 def test_a_missing_map(tmp_path: Path) -> None:
-    with pytest.raises(ObstaclesError) as caught:
+    with pytest.raises(ValueError) as caught:
         load_obstacles(tmp_path / "nowhere")
     assert str(caught.value) == f"there is no file '{tmp_path / 'nowhere' / 'map.json'}'"
 
@@ -112,13 +112,13 @@ def test_unknown_names_are_said_with_what_there_is(tmp_path: Path) -> None:
     write(tmp_path, {"obstacles": [{"name": name, "lines": [0, 0, 1, 1]} for name in names]})
     obstacles = load_obstacles(tmp_path)
     assert list(pick(obstacles, ["right", "left"], "walls", tmp_path)) == ["right", "left"]
-    with pytest.raises(ObstaclesError) as caught:
+    with pytest.raises(ValueError) as caught:
         pick(obstacles, ["left", "rigth"], "walls", tmp_path)
     assert str(caught.value) == f"--walls: the map {tmp_path} has no obstacle 'rigth'; did you mean 'right'?"
-    with pytest.raises(ObstaclesError) as caught:
+    with pytest.raises(ValueError) as caught:
         pick(obstacles, ["xyz"], "goal", tmp_path)
     assert str(caught.value) == f"--goal: the map {tmp_path} has no obstacle 'xyz'; it has finish, left, right"
-    with pytest.raises(ObstaclesError, match="has no obstacle 'xyz'; it has none"):
+    with pytest.raises(ValueError, match="has no obstacle 'xyz'; it has none"):
         pick({}, ["xyz"], "goal", tmp_path)
 
 
@@ -154,9 +154,9 @@ def test_no_block_at_the_height_of_the_vehicle_is_said(tmp_path: Path) -> None:
     write(tmp_path, {"block": BLOCKS[:2]})
     within = "block between 0.01 and 0.15 m above the ground in the map"
     for name in ("blocks", "floor"):
-        with pytest.raises(ObstaclesError, match=f"^--walls: '{name}' names no {within}"):
+        with pytest.raises(ValueError, match=f"^--walls: '{name}' names no {within}"):
             pick_walls({}, [name], (), tmp_path, 0.15)
-    with pytest.raises(ObstaclesError, match=r"^--walls: '\*' names no obstacle in the map"):
+    with pytest.raises(ValueError, match=r"^--walls: '\*' names no obstacle in the map"):
         pick_walls({}, ["*"], (), tmp_path, 0.15)
-    with pytest.raises(ObstaclesError, match="has no obstacle 'hedge'"):
+    with pytest.raises(ValueError, match="has no obstacle 'hedge'"):
         pick_walls({}, ["hedge"], (), tmp_path, 0.15)

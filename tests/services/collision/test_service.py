@@ -51,6 +51,7 @@ def service(lane: Path, wall: Callable[[], float] = time.monotonic, on_rig: bool
         "max-speed": None,
         "bodies": None,
         "min-body-margin": None,
+        "min-distance": None,
         "height": None,
     }
     return Collision(
@@ -149,7 +150,8 @@ def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"goal": None, "walls": []}, "nothing to judge: give --goal, --gates or --walls"),
+        ({"goal": None, "walls": []}, "a vehicle that stands would pass: give --goal, --gates or --min-distance"),
+        ({"goal": None}, "a vehicle that stands would pass: give --goal, --gates or --min-distance"),
         ({"goal": "left"}, "--goal=left is one of the --walls too"),
         ({"gates": ["finish", "left"]}, "left of --gates is one of the --walls too"),
         ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
@@ -248,7 +250,7 @@ def test_the_end_of_the_input_of_a_silent_application(lane: Path) -> None:
 
 
 def test_no_frame_is_an_error_and_no_verdict(lane: Path) -> None:
-    with built("collision", f"--map-path={lane}", "--walls=left", "--max-time=0.05") as judge:
+    with built("collision", f"--map-path={lane}", "--walls=left", "--min-distance=1", "--max-time=0.05") as judge:
         judge.begin(START)
         with pytest.raises(UnjudgeableError, match=r"no opendlv\.sim\.Frame of the vehicle came within 0\.05 s"):
             judge.update(START + 60_000)

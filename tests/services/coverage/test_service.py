@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 import shapely
 
+from dodo_dsl.opendlv.assets.track import VehiclePose
 from services.base import UnjudgeableError, Verdict
-from services.coverage.model import CoverageGrid, Footprint, Pose
+from services.coverage.model import CoverageGrid, Footprint
 from tests.services.built import built, hand, refusal
 
 FRAME, S = "opendlv.sim.Frame", 1_000_000
@@ -70,8 +71,8 @@ def test_turning_and_passing_twice_count_once() -> None:
     """A thin bar of 2 m that turns by a third of a circle around its centre covers two sectors, however often."""
     grid = CoverageGrid(shapely.box(-2, -2, 2, 2), 0.05, Footprint(2.0, 0.02))
     for _ in range(2):
-        grid.move(Pose(0, 0, 0), Pose(0, 0, math.tau / 3))
-        grid.move(Pose(0, 0, math.tau / 3), Pose(0, 0, 0))
+        grid.move(VehiclePose(0, 0, 0), VehiclePose(0, 0, math.tau / 3))
+        grid.move(VehiclePose(0, 0, math.tau / 3), VehiclePose(0, 0, 0))
         assert grid.share * 16 == pytest.approx(2 * math.pi / 3 + 0.02, abs=0.05)
 
 
@@ -79,10 +80,10 @@ def test_a_way_against_shapely() -> None:
     """A disc along a curve, in an area with a bay: the share that a buffered line covers."""
     area = shapely.Polygon([(0, 0), (5, 0), (5, 3), (3, 3), (2.5, 1.5), (2, 3), (0, 3)])
     grid = CoverageGrid(area, 0.02, Footprint(0.6, 0.0))
-    poses = [Pose(t, 1.5 + math.sin(2 * t), 0.0) for t in (step / 50 for step in range(300))]
+    poses = [VehiclePose(t, 1.5 + math.sin(2 * t), 0.0) for t in (step / 50 for step in range(300))]
     for start, end in pairwise(poses):
         grid.move(start, end)
-    swept = shapely.LineString([pose[:2] for pose in poses]).buffer(0.3, quad_segs=64)
+    swept = shapely.LineString([(pose.x, pose.y) for pose in poses]).buffer(0.3, quad_segs=64)
     assert grid.share == pytest.approx(shapely.intersection(area, swept).area / area.area, abs=0.003)
 
 

@@ -10,12 +10,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import shapely
 
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.opendlv.assets.json_file import MapError
 
 TURN = math.radians(5)  # within a turn of this size a hull is as good as the area driven over
 
@@ -140,6 +139,7 @@ class Track:
 
     Obstacles by name in m, `max_time` in s. The vehicle keeps ``min_margin`` m away from walls; with 0 it only
     must not touch them. ``min_body_margin`` is the same of other bodies. ``max_speed`` in m/s, None for no limit.
+    ``min_distance`` m have to be driven.
     """
 
     walls: Obstacles
@@ -149,6 +149,73 @@ class Track:
     min_margin: float = 0.0
     max_speed: float | None = None
     min_body_margin: float = 0.0
+    min_distance: float = 0.0
+
+
+THIN = 1e-6
+"""m: how wide a line is that divides the ground."""
+
+
+def _free_ground(track: Track, pose: VehiclePose, box: VehicleBox) -> tuple[shapely.Geometry, shapely.Geometry]:
+    """Where the centre may be, half the vehicle's width from walls: with a way around all of the map, and without."""
+    known = [outline(pose, box), *track.walls.values(), *track.goal.values(), *(lines for _, lines in track.gates)]
+    hull = shapely.convex_hull(shapely.union_all(known))
+    walls = shapely.union_all([*track.walls.values()]).buffer(min(box.length, box.width) / 2, quad_segs=2)
+    around = shapely.box(*hull.bounds).buffer(box.length + box.width, quad_segs=1)
+    return shapely.difference(around, walls), shapely.difference(hull, walls)
+
+
+def _part_at(ground: shapely.Geometry, place: shapely.Point) -> shapely.Geometry:
+    return min(shapely.get_parts(ground), key=place.distance, default=ground)
+
+
+class Goal:
+    """The lines to be reached, each from the sides to which the vehicle can come without crossing any of them.
+
+    If a way around the track leads to both sides of a line, the course's is that between the walls, forwards from where
+    the vehicle starts: across the lane, a line through its centre is closed, as a lap begins past its finish. If the
+    goal is not found so, or comes after gates, both sides count.
+    """
+
+    def __init__(self, track: Track, start: VehiclePose, box: VehicleBox) -> None:
+        self.came_from_behind = False
+        self._past = 0
+        self._lines = [each for lines in track.goal.values() for line in lines.geoms for each in _segments(line)]
+        ground, between_walls = _free_ground(track, start, box)
+        here = shapely.Point(start.x, start.y)
+        self._sides = self._reached(ground, here)
+        if not any(map(any, self._sides)):
+            self._sides = [(True, True) for _ in self._lines]
+        elif any(map(all, self._sides)) and not track.gates:
+            cos, sin = math.cos(start.heading), math.sin(start.heading)
+            far = between_walls.length
+            across = shapely.LineString((start.x - f * sin, start.y + f * cos) for f in (-far, far))
+            across = _part_at(shapely.intersection(between_walls, across), here).buffer(THIN)
+            ahead = shapely.Point(start.x + 3 * THIN * cos, start.y + 3 * THIN * sin)
+            course = self._reached(shapely.difference(between_walls, across), ahead)
+            self._sides = course if any(map(any, course)) else self._sides
+
+    def _reached(self, ground: shapely.Geometry, place: shapely.Point) -> list[tuple[bool, bool]]:
+        """Whether the left and the right side of each line can be reached from a place."""
+        lines = [shapely.LineString(line) for line in self._lines]
+        part = _part_at(shapely.difference(ground, shapely.union_all(lines).buffer(THIN)), place)
+        left, right = (shapely.intersects(part, shapely.offset_curve(lines, 3 * f * THIN)).tolist() for f in (1, -1))
+        return list(zip(left, right, strict=True))
+
+    def move(self, start: VehiclePose, end: VehiclePose, area: shapely.Geometry) -> bool:
+        """Whether the vehicle, which covers this area, comes to a line from a side that counts.
+
+        What crossed it the other way has to go back first.
+        """
+        found, past = False, self._past
+        for ((x1, y1), (x2, y2)), sides in zip(self._lines, self._sides, strict=True):
+            line = shapely.MultiLineString([[(x1, y1), (x2, y2)]])
+            if area.intersects(line):
+                counts = sides[0 if (x2 - x1) * (start.y - y1) - (y2 - y1) * (start.x - x1) >= 0 else 1]
+                found, self.came_from_behind = found or (counts and not past), self.came_from_behind or not counts
+                if not all(sides) and any(crossings(line, start, end)):
+                    self._past = max(0, self._past - 1) if counts else self._past + 1
+        return found
 
 
 def touched(obstacles: Obstacles, area: shapely.Geometry) -> str | None:
@@ -166,17 +233,20 @@ def length_through(area: shapely.Geometry, lines: Sequence[shapely.Geometry]) ->
     return sum(float(shapely.distance(start, end)) for start, end in pairwise([area, *lines]))
 
 
-def fault_of_start(track: Track, area: shapely.Geometry) -> str | None:
-    """What is wrong with a test whose vehicle covers this area at first; None if nothing."""
-    ends = {} if track.gates else track.goal  # a lap may begin on the line where it ends
+def fault_of_start(track: Track, pose: VehiclePose, box: VehicleBox) -> str | None:
+    """What is wrong with a test whose vehicle starts at a pose; None if nothing."""
+    ends, area, least = {} if track.gates else track.goal, outline(pose, box), track.min_margin  # laps may end there
     for kind, obstacles in (("wall", track.walls), ("goal", ends)):
-        name = touched(obstacles, area)
-        if name is not None:
-            return f"the vehicle stands on {kind} {name} from the start"
-    near = nearest(track.walls, area)
-    if near is not None and near[0] < track.min_margin:
-        limit = f"expected at least {track.min_margin:g} m"
-        return f"the vehicle stands {told(near[0], track.min_margin)} m from wall {near[1]} from the start, {limit}"
+        if name := touched(obstacles, area):
+            return f"the vehicle stands on {kind} {name} from the start, {place(pose)}"
+    if (near := nearest(track.walls, area)) and near[0] < least:
+        far = f"{told(near[0], least)} m from wall {near[1]} from the start, expected at least {least:g} m"
+        return f"the vehicle stands {far}, {place(pose)}"
+    ground, _ = _free_ground(track, pose, box)
+    here = _part_at(ground, shapely.Point(pose.x, pose.y)).buffer(THIN)
+    for name, lines in [*track.gates, *track.goal.items()]:
+        if lines.intersects(ground) and not lines.intersects(here):
+            return f"walls are between the vehicle and {name} from the start, {place(pose)}"
     return None
 
 
@@ -191,31 +261,17 @@ def place(pose: VehiclePose) -> str:
     return f"at x = {pose.x:z.2f} m, y = {pose.y:z.2f} m"
 
 
-class ObstaclesError(ValueError):
-    """A map that cannot be read, or that lacks an obstacle; the message names file and place."""
-
-
 def load_obstacles(path: Path) -> dict[str, shapely.MultiLineString]:
     """The obstacles of the map in a folder (its `map.json`) or of the map file itself, by name, in metres.
 
-    Obstacles of one name are one. Raises ObstaclesError.
+    Obstacles of one name are one. Raises MapError.
     """
-    try:
-        found = map_file.read_obstacles(path)
-    except MapError as error:
-        raise ObstaclesError(str(error)) from None
-    return {name: shapely.MultiLineString(lines) for name, lines in found.items()}
+    return {name: shapely.MultiLineString(lines) for name, lines in map_file.read_obstacles(path).items()}
 
 
 def load_blocks(path: Path, height: float) -> dict[str, shapely.Geometry]:
-    """The ground that the blocks of each name stand on, as far as a vehicle of ``height`` m may touch them.
-
-    Raises ObstaclesError.
-    """
-    try:
-        found = map_file.read_footprints(path, height)
-    except MapError as error:
-        raise ObstaclesError(str(error)) from None
+    """The ground that the blocks of each name stand on, as far as a vehicle of ``height`` m may touch them."""
+    found = map_file.read_footprints(path, height)
     return {name: shapely.union_all([shapely.Polygon(each) for each in outlines]) for name, outlines in found.items()}
 
 
@@ -223,11 +279,11 @@ Shape = TypeVar("Shape", bound=shapely.Geometry)
 
 
 def pick(known: Mapping[str, Shape], names: Sequence[str], parameter: str, path: Path) -> dict[str, Shape]:
-    """Those obstacles that a parameter names, prepared for many queries; MapError for an unknown name."""
+    """Those obstacles that a parameter names, prepared for many queries; ValueError for an unknown name."""
     chosen = {}
     for name in names:
         if name not in known:
-            raise ObstaclesError(f"--{parameter}: {_unknown(name, list(known), path)}")
+            raise ValueError(f"--{parameter}: {_unknown(name, list(known), path)}")
         shapely.prepare(known[name])
         chosen[name] = known[name]
     return chosen
@@ -242,7 +298,7 @@ def pick_walls(
 ) -> dict[str, shapely.Geometry]:
     """Obstacles, and blocks by their names, that a vehicle of ``height`` m must not touch; ``others`` are not walls.
 
-    Raises ObstaclesError for a name that is neither, and if nothing stands in the vehicle's path.
+    Raises ValueError for a name that is neither, and if nothing stands in the vehicle's path.
     """
     blocks = {} if all(name in known or name == EVERY for name in names) else load_blocks(path, height)
     standing = {name: area for name, area in blocks.items() if not area.is_empty}
@@ -253,7 +309,7 @@ def pick_walls(
             what = (
                 "obstacle" if name == EVERY else f"block between {map_file.LOWEST:g} and {height:g} m above the ground"
             )
-            raise ObstaclesError(f"--walls: {name!r} names no {what} in the map {path}")
+            raise ValueError(f"--walls: {name!r} names no {what} in the map {path}")
     found = [each for name in names for each in ([name] if name in shapes else groups.get(name, [name]))]
     return pick(shapes, found, "walls", path)
 
@@ -262,3 +318,32 @@ def _unknown(name: str, known: list[str], path: Path) -> str:
     close = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(sorted(known)) or 'none'}"
     return f"the map {path} has no obstacle {name!r}; {hint}"
+
+
+def track(flags: Mapping[str, Any]) -> Track:
+    """The obstacles that the flags name, from the map; raises MapError, and ValueError for flags that make no track."""
+    path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
+    least = flags["min-distance"]
+    if not goal and not gates and (least is None or not (walls or least)):
+        raise ValueError("a vehicle that stands would pass: give --goal, --gates or --min-distance")
+    if goal in walls:
+        raise ValueError(f"--goal={goal} is one of the --walls too")
+    for name in gates:
+        if name in walls:
+            raise ValueError(f"{name} of --gates is one of the --walls too")
+    if flags["min-margin"] and not walls:
+        raise ValueError("--min-margin needs --walls")
+    if not flags["requests"]:
+        raise ValueError("--requests is empty: a drive is the application's only if it sends something")
+    obstacles = load_obstacles(path)
+    picked = pick(obstacles, gates, "gates", path)
+    return Track(
+        walls=pick_walls(obstacles, walls, {goal, *gates}, path, flags["height"] or map_file.HIGHEST),
+        goal=pick(obstacles, [goal] if goal else [], "goal", path),
+        max_time=flags["max-time"],
+        gates=tuple((name, picked[name]) for name in gates),
+        min_margin=flags["min-margin"],
+        max_speed=flags["max-speed"],
+        min_body_margin=flags["min-body-margin"] or 0.0,
+        min_distance=least or 0.0,
+    )
