@@ -44,13 +44,13 @@ class Call(NamedTuple):
 
 def write_specs(folder: Path, name: str, number: int, matrix: bool) -> None:
     """A registry of so many instances; each has its own yaw, within the range that the spec varies it in."""
-    yaws = [f"{80 + 8 * i / number:.6f} deg" for i in range(number)]
+    yaws = [f"{66 + 8 * i / number:.6f} deg" for i in range(number)]
     text = SPEC.read_text()
     specs = {}
     if matrix:
-        specs[name] = text.replace("84 deg", '"${matrix.yaw}"') + f"matrix: {{yaw: [{', '.join(yaws)}]}}\n"
+        specs[name] = text.replace("70 deg", '"${matrix.yaw}"') + f"matrix: {{yaw: [{', '.join(yaws)}]}}\n"
     else:
-        specs = {f"{name}-{i}": text.replace("84 deg", yaw) for i, yaw in enumerate(yaws)}
+        specs = {f"{name}-{i}": text.replace("70 deg", yaw) for i, yaw in enumerate(yaws)}
     for spec, body in specs.items():
         path = folder / "tests" / spec / f"{spec}.dodo.yml"
         path.parent.mkdir(parents=True)

@@ -167,7 +167,7 @@ def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
     (tmp_path / "map.json").write_text(text)
     (tmp_path / "cone.obj").touch()
     ground = read_ground(tmp_path)
-    assert [name for name, _ in ground.lines] == ["left", "right", "finish"]
+    assert [name for name, _ in ground.lines] == ["left", "right", "behind", "beyond", "finish"]
     assert [len(points) for _, points in ground.models] == [2]
 
 

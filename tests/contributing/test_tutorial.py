@@ -1,5 +1,8 @@
 """The tutorial and the page for existing projects are what happens."""
 
+import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +17,29 @@ DOCS = Path(__file__).parents[2] / "docs"
 @pytest.mark.parametrize("page", ["tutorial/python.md", "how-to/existing-project.md"])
 def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
     follow(DOCS / page, tmp_path, Path(sys.executable).parent)
+
+
+EXAMPLES = ["README.md", "docs/reference/language.md", "docs/reference/maps.md"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", EXAMPLES)
+def test_the_sample_application_passes_the_test_on_a_page(page: str, tmp_path: Path) -> None:
+    """That of docs/reference/maps.md has no head."""
+    root = DOCS.parent
+    example = next(
+        text for text in re.findall(r"```yaml\n(.*?)```", (root / page).read_text(), re.S) if "collision" in text
+    )
+    head = "dodo: 1\nname: sil-it\ndescription: Drive.\nlevel: sil\nkind: closed-loop\ntimeout: 60 s\nclock: lockstep\n"
+    spec = example if example.startswith("dodo: 1") else head + example
+    (name,) = re.findall("^name: ([a-z-]+)", spec, re.M)
+    (tmp_path / "tests" / name).mkdir(parents=True)
+    (tmp_path / "tests" / name / f"{name}.dodo.yml").write_text(spec)
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\n")
+    shutil.copytree(root / "tests_registry" / "maps", tmp_path / "tests" / "maps")
+    command = ["-m", "dodo_dsl", "run", "--application", root / "examples" / "kiwi" / "docker-compose.yml"]
+    done = subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "1 passed" in done.stdout, done.stdout + done.stderr
 
 
 def test_a_page_is_read_as_its_reader_does() -> None:

@@ -151,7 +151,7 @@ def lines(map_name: str, *names: str) -> shapely.MultiLineString:
 @pytest.mark.parametrize(("slug", "map_name"), [(STRAIGHT, "straight"), (CURVE, "left-curve")])
 def test_a_drive_is_that_of_shapely(runs: Runs, slug: str, map_name: str) -> None:
     frames = runs.messages(slug, "opendlv.sim.Frame")
-    finish, walls = lines(map_name, "finish"), lines(map_name, "left", "right")
+    finish, walls = lines(map_name, "finish"), lines(map_name, "left", "right", "behind", "beyond")
     margin, distance, time, last = math.inf, 0.0, 0.0, frames[0][2]
     for seconds, _, frame in frames[1:]:
         time = seconds

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.opendlv.assets.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
 from services.base import Verdict
 from services.collision.model import TrackEvaluator
-from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
 from services.dynamic_model.model import Vehicle
 from services.integrator.model import BodyPose as Attitude
 from services.integrator.model import Integrator, Twist, quaternion

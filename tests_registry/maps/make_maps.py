@@ -3,8 +3,9 @@
 Yellow cones stand on the left of a track, blue ones on its right, and two large red ones next to the
 finish. Obstacles: ``left`` and ``right`` are walls through the cones, ``finish`` is the line across the
 lane. An open track starts at x = 0, y = 0 along +y, or elsewhere where it names another start; its rows begin behind
-the start and go on past the finish, so that a car sees cones all the way. A lap begins at the finish;
-the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that backs up to the finish.
+the start and go on past the finish, so that a car sees cones all the way, and ``behind`` and ``beyond`` close its ends.
+A lap begins at the finish; the car starts LEAD m past it, and ``behind``, between the two, is what a car hits that
+backs up to the finish.
 An oval has ``far`` instead, the line half-way round.
 ``two-cars`` is the straight track with another car, at the frames of sender stamp 1; the car of the test
 has stamp 0. ``static-rig`` is not a track but a board with eight cones, seen from x = 0, y = 0 along +x.
@@ -96,7 +97,7 @@ def kiwi_track() -> list[Section]:
 
 TRACKS = {
     "straight": Track([Section(3.0)]),
-    "left-curve": Track([Section(1.0), Section(1.5 * math.pi / 2, math.pi / 2), Section(0.5)]),
+    "left-curve": Track([Section(1.0), Section(1.5 * math.pi / 2, math.pi / 2), Section(2.0)]),
     "kiwi-track": Track(kiwi_track(), y=-LEAD, lap=True),
     "rig-oval": Track(oval(), x=-0.2, y=-0.6, heading=0.0, lap=True, far=True),
     "rig-straight": Track([Section(1.3)], x=-0.75, heading=0.0),
@@ -177,10 +178,14 @@ def track_map(track: Track) -> dict[str, object]:
     rows = {side: row([*driven, *beyond], side * LANE / 2, begin) for side in (1, -1)}
     *_, finish = poses(driven, 0.0, begin)
     lines = [wall("left", rows[1]), wall("right", rows[-1]), wall("finish", across(finish, LANE / 2))]
-    if track.far:
+    if not track.lap:
+        *_, end = poses([*driven, *beyond], 0.0, begin)
+        behind = [rows[1][0], *across(ahead(begin, -BEHIND), LANE / 2), rows[-1][0]]
+        lines += [wall("behind", behind), wall("beyond", across(end, LANE / 2))]
+    elif track.far:
         *_, half = poses(track.sections[: len(track.sections) // 2], 0.0, begin)
         lines.append(wall("far", across(ahead(half, track.sections[0].length / 2), LANE / 2)))
-    elif track.lap:
+    else:
         lines.append(wall("behind", across(ahead(track.start, LEAD - BACK), LANE / 2)))
         rows = {side: places[:-1] for side, places in rows.items()}
     red = model("cone_red", "finish-cone.obj", [0.9, 0.05, 0.05], across(finish, LANE / 2 + BESIDE))

@@ -116,6 +116,8 @@ def test_lines_of_the_map_have_roles(tmp_path: Path) -> None:
     assert {line["name"]: line["role"] for line in shown["lines"]} == {
         "left": "wall",
         "right": "wall",
+        "behind": "wall",
+        "beyond": "wall",
         "finish": "goal",
     }
     assert (shown["length"], shown["width"], shown["frame"]["sender"]) == (0.36, 0.16, 0)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import shapely
 
-from services.collision.track import VehicleBox, VehiclePose, load_obstacles, outline
+from dodo_dsl.opendlv.assets.track import VehicleBox, VehiclePose, load_obstacles, outline
 from tests.report.viewer import drives, failures
 from tests.report.viewer.chromium import Chromium, Page
 from tests.report.viewer.hostile import HOSTILE
