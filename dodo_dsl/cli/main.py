@@ -37,7 +37,7 @@ COMMANDS = {
     "rank": Subcommand("rank", "rank applications by the goals of their tests"),
     "stats": Subcommand("stats", "show how many services the tests share"),
     "rec": Subcommand("rec", "inspect, cut and export recordings"),
-    "lsp": Subcommand("lsp", "check and complete tests in an editor while they are written"),
+    "lsp": Subcommand("lsp", "check tests in an editor while they are written"),
     "completion": Subcommand(
         "completion", "print a script that lets a shell complete commands, options, tests, services and rigs"
     ),
