@@ -21,6 +21,7 @@
 #include <stdlib.h>
 #include <sys/syscall.h>
 #include <sys/types.h>
+#include <threads.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -31,7 +32,7 @@ enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900, INT
 
 /* Functions of libc that are wrapped here and called there. */
 #define REAL_FUNCTIONS(X)                                                                                              \
-    X(fopen) X(fopen64) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp)               \
+    X(fopen) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp)               \
     X(pthread_barrier_wait) X(pthread_create) X(pthread_join) X(pthread_mutex_lock) X(pthread_mutex_trylock)           \
     X(pthread_mutex_unlock) X(pthread_once) X(pthread_rwlock_tryrdlock) X(pthread_rwlock_trywrlock)                    \
     X(pthread_rwlock_unlock) X(pthread_spin_trylock) X(pthread_tryjoin_np) X(sem_post) X(sem_trywait)                  \
@@ -122,7 +123,8 @@ void files_after_fork(void);
 int interrupt_at(int64_t deadline_ns);
 void interrupt_end(int timer);
 void timers_after_fork(void);
-void forget_timer_file(int file);
+/* Before the application closes a descriptor: false if it is ours. */
+bool forget_timer_file(int file);
 
 /* -- signals.c, process.c, random.c --------------------------------------------------------------------------------- */
 
@@ -130,7 +132,6 @@ void processes_start(void);
 void processes_after_fork(void);
 void draw(void *bytes, size_t size);
 bool is_random_file(int file);
-void forget_random_file(int file);
 
 /* -- raw system calls: -errno, or the result ------------------------------------------------------------------------ */
 
@@ -180,6 +181,11 @@ static inline int fail_with(int error)
 {
     errno = error;
     return -1;
+}
+
+static inline int in_c11(int error)
+{
+    return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
 }
 
 static inline int64_t now_ns(void)

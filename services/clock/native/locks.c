@@ -6,7 +6,6 @@
 #define _GNU_SOURCE
 #include "library.h"
 
-#include <threads.h>
 
 enum { MUTEX_KINDS = 3, MUTEX_ROBUST = 16, MUTEX_SHARED = 128, ONCE_RUNS = 1, ONCE_DONE = 2 }; /* glibc's bits */
 enum { LOOK_AGAIN_NS = 10000000, RETRY_NS = 100000 };
@@ -96,11 +95,6 @@ PUBLIC int pthread_mutex_clocklock(pthread_mutex_t *restrict mutex, clockid_t cl
 PUBLIC int pthread_mutex_timedlock(pthread_mutex_t *restrict mutex, const struct timespec *restrict until)
 {
     return pthread_mutex_clocklock(mutex, CLOCK_REALTIME, until);
-}
-
-static int in_c11(int error)
-{
-    return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
 }
 
 PUBLIC int mtx_lock(mtx_t *mutex)

@@ -2,12 +2,12 @@
 #define _GNU_SOURCE
 #include "library.h"
 
+#include <aio.h>
 #include <string.h>
 #include <sys/msg.h>
 #include <sys/resource.h>
 #include <sys/sem.h>
 #include <sys/wait.h>
-#include <threads.h>
 
 #ifndef SYS_pidfd_open
 #define SYS_pidfd_open 434
@@ -276,6 +276,22 @@ PUBLIC int semtimedop(int id, struct sembuf *operations, size_t count, const str
     leave_kernel();
     interrupt_end(timer);
     return (int)answer(result == -EINTR && now_ns() >= deadline ? -EAGAIN : result);
+}
+
+/* Threads of libc read and write meanwhile, unseen. */
+PUBLIC int aio_suspend(const struct aiocb *const list[], int count, const struct timespec *timeout)
+{
+    int64_t deadline = timeout && is_managed() ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
+    for (;;) {
+        for (int at = 0; at < count; at++)
+            if (list[at] && __atomic_load_n(&list[at]->__error_code, __ATOMIC_ACQUIRE) != EINPROGRESS)
+                return 0;
+        int64_t again = later(now_ns(), RETRY_NS);
+        if (now_ns() >= deadline)
+            return fail_with(EAGAIN);
+        if (sleep_until(again < deadline ? again : deadline) == EINTR)
+            return fail_with(EINTR);
+    }
 }
 
 PUBLIC int semop(int id, struct sembuf *operations, size_t count)

@@ -221,11 +221,15 @@ static struct timer *timer_of_file(int file)
     return NULL;
 }
 
-void forget_timer_file(int file)
+bool forget_timer_file(int file)
 {
     struct timer *timer = timer_of_file(file);
     if (timer)
         free_timer(timer);
+    for (int at = 0; at < MOST_TIMERS; at++)
+        if (timers[at].use == OF_FILE && timers[at].kept_file == file)
+            return false;
+    return true;
 }
 
 PUBLIC int timerfd_create(clockid_t clock, int flags)
@@ -235,6 +239,7 @@ PUBLIC int timerfd_create(clockid_t clock, int flags)
     if (flags & ~(TFD_CLOEXEC | TFD_NONBLOCK))
         return fail_with(EINVAL);
     int file = (int)answer(RAW_2(SYS_eventfd2, 0, flags));
+    forget_timer_file(file); /* that libc has closed without a word */
     struct timer *timer = file < 0 ? NULL : new_timer(OF_FILE, clock);
     if (!timer) {
         if (file >= 0)

@@ -7,7 +7,6 @@
 #include "library.h"
 
 #include <linux/futex.h>
-#include <threads.h>
 
 /* One a slot: this process's thread there waits for `address`. */
 struct waiter {
@@ -206,11 +205,6 @@ PUBLIC int pthread_cond_broadcast(pthread_cond_t *cond)
     if (is_managed())
         queue_wake(cond, is_shared_cond(cond), INT_MAX, FUTEX_BITSET_MATCH_ANY);
     return 0;
-}
-
-static int in_c11(int error)
-{
-    return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
 }
 
 PUBLIC int cnd_wait(cnd_t *cond, mtx_t *mutex)
