@@ -407,7 +407,14 @@ class DockerBackend:
 
     def _take_down(self) -> None:
         report = (writers(self.plan), self.report)
-        self.left_behind = not take_down(self._client, self.project, self._containers, report, self._note)
+        self.left_behind = not take_down(
+            self._client, self.project, self._containers, report, self._note, self._ended
+        )
+
+    def _ended(self, name: str, code: int) -> None:
+        """Reports a signal; an exit code may be due to a world that has ended before."""
+        if code > _KILLED - signal.SIGKILL:
+            self._watch.call_in_loop(self._events.put_nowait, Exited(name, code))
 
     def _note(self, text: str) -> None:
         """Reports a sentence at once, and with the outcome; may be called from any thread."""
