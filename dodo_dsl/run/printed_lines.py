@@ -36,6 +36,12 @@ _NUMBER = re.compile(rb"[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?|nan|inf(
 _BOOLEANS = {b"1": True, b"true": True, b"0": False, b"false": False}
 _END_OF_TIME = 1_000_000 << 31
 """Microseconds; an envelope's seconds have 32 bits with a sign."""
+_FOR_TERMINALS = re.compile(
+    rb"\x1b(\[[0-?]*[ -/]*[@-~]"  # CSI, such as colours
+    rb"|[]PX^_][^\x07\x1b]*(\x07|\x1b\\)?"  # OSC and other strings, such as titles and links
+    rb"|[ -/]*[0-Z\\^-~])"
+)
+"""Control sequences of ECMA-48."""
 _GROUP = re.compile(r"\(\?P<[^>]*>|[][()?*+|^$\\]|\{[0-9,]*\}")
 
 
@@ -135,7 +141,25 @@ class ServiceLines:
     said: set[str] = field(default_factory=set)
 
     def take(self, line: bytes, note: Callable[[str], None]) -> list[Printed]:
-        """The messages of a line, as many as patterns match; what cannot be converted is said once."""
+        """The messages of a line, as many as patterns match; what cannot be converted is said once.
+
+        Where the terminal made a program colour it, or write over it, it is matched as without, then as it is.
+        """
+        lines = [line]
+        if len(line) <= MAX_LINE and (b"\x1b" in line or b"\r" in line):
+            lines = [part for part in _FOR_TERMINALS.sub(b"", line).split(b"\r") if part.strip()]
+        found = [printed for part in lines for printed in self._printed(part, note)] or (
+            self._printed(line, note) if lines != [line] else []
+        )
+        if found:
+            self.matched += 1
+            self.last = lines[-1][:_WIDTH]
+            self.unmatched.clear()
+        else:
+            self.unmatched.extend(part[:_WIDTH] for part in lines if part.strip())
+        return found
+
+    def _printed(self, line: bytes, note: Callable[[str], None]) -> list[Printed]:
         found = []
         for pattern in self.patterns if len(line) <= MAX_LINE else ():
             try:
@@ -148,12 +172,6 @@ class ServiceLines:
                 continue
             if printed is not None:
                 found.append(printed)
-        if found:
-            self.matched += 1
-            self.last = line[:_WIDTH]
-            self.unmatched.clear()
-        elif line.strip():
-            self.unmatched.append(line[:_WIDTH])
         return found
 
     def silence(self, unfinished: bytes = b"") -> str:

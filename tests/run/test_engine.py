@@ -510,7 +510,9 @@ def test_how_the_application_ends_is_noted_and_no_verdict(code: int, how: str) -
     for lockstep, after in ((0.0, "5.0 s"), (60.0, "4.0 s of test time")):
         begin = [(0.5, Time(4.0, last=True)), *drives()["begin"]]
         found = outcome(
-            ScriptedBackend(plan(lockstep=lockstep), {**drives(), "begin": begin, "close": [(0.0, Exited("app", code))]})
+            ScriptedBackend(
+                plan(lockstep=lockstep), {**drives(), "begin": begin, "close": [(0.0, Exited("app", code))]}
+            )
         )
         told = (f"application service 'app' {how} as the test ended, after {after}",) if how else ()
         assert (found.outcome, found.notes) == ("passed", told)

@@ -407,9 +407,7 @@ class DockerBackend:
 
     def _take_down(self) -> None:
         report = (writers(self.plan), self.report)
-        self.left_behind = not take_down(
-            self._client, self.project, self._containers, report, self._note, self._ended
-        )
+        self.left_behind = not take_down(self._client, self.project, self._containers, report, self._note, self._ended)
 
     def _ended(self, name: str, code: int) -> None:
         """Reports a signal; an exit code may be due to a world that has ended before."""
