@@ -26,6 +26,7 @@
 #include <unistd.h>
 
 #define PUBLIC __attribute__((visibility("default")))
+#define ALIAS(name, of) PUBLIC __typeof__(of) name __attribute__((alias(#of)))
 #define NANOSECONDS INT64_C(1000000000)
 
 enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900, INTERRUPTION = 63 /* a signal of ours */ };
@@ -56,6 +57,13 @@ struct self {
 extern __thread struct self self __attribute__((tls_model("initial-exec")));
 extern struct time_page *page;
 
+/* Which process of which service this is, where the page lies and the library. */
+struct process {
+    uint32_t service, number;
+    char folder[256], library[PATH_MAX];
+};
+extern struct process process;
+
 /* -- preload.c ------------------------------------------------------------------------------------------------------ */
 
 /* Whether this thread has a slot, after making sure of it: false while the library begins and when a thread ends. */
@@ -69,6 +77,7 @@ int pass_gate_as_ready(void);
 /* Around a wait that the kernel ends. */
 void enter_kernel(void);
 void leave_kernel(void);
+void begin_as_ready(void);
 void announce(void);
 void note(uint32_t kind, const char *name);
 unsigned own_index(void);
@@ -78,13 +87,13 @@ void adopt_slot(unsigned at);
 void release_slot(void);
 uint32_t next_thread_number(void);
 uint32_t next_process_number(void);
-const char *library_path(void);
-const char *time_folder(void);
-uint32_t own_service(void), own_process(void);
 void before_fork(void);
 void in_forked_child(void);
 void block_signals(uint64_t *before);
 void restore_signals(const uint64_t *before);
+/* A lock for a moment, which no signal's handler of its holder can want. */
+void take_lock(_Atomic uint32_t *lock, uint64_t *signals);
+void give_lock(_Atomic uint32_t *lock, const uint64_t *signals);
 
 /* -- time.c --------------------------------------------------------------------------------------------------------- */
 
@@ -187,6 +196,13 @@ static inline int in_c11(int error)
 {
     return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
 }
+
+/* What C11 calls otherwise. */
+#define IN_C11(name, type, of)                                                                                         \
+    PUBLIC int name(type *object)                                                                                      \
+    {                                                                                                                  \
+        return in_c11(of((void *)object));                                                                             \
+    }
 
 static inline int64_t now_ns(void)
 {

@@ -46,11 +46,7 @@ static void *begin(void *given)
     free(given);
     adopt_slot(beginning.slot);
     pthread_setspecific(at_end, &at_end);
-    if (self.slot) {
-        self.slot->state = TIME_READY;
-        announce();
-        pass_gate();
-    }
+    begin_as_ready();
     return beginning.routine(beginning.argument);
 }
 
@@ -62,7 +58,7 @@ PUBLIC int pthread_create(pthread_t *restrict thread, const pthread_attr_t *rest
     struct beginning *beginning = malloc(sizeof *beginning);
     if (!beginning)
         return EAGAIN;
-    unsigned slot = take_slot(own_process(), next_thread_number());
+    unsigned slot = take_slot(process.number, next_thread_number());
     *beginning = (struct beginning){routine, argument, slot};
     int error = real.pthread_create(thread, attributes, begin, beginning);
     if (error) {
@@ -172,10 +168,7 @@ PUBLIC pid_t fork(void)
 }
 
 /* The parent of a vfork waits until the child executes a program; that of a fork need not. */
-PUBLIC pid_t vfork(void)
-{
-    return fork();
-}
+ALIAS(vfork, fork);
 
 /* Until a child may have ended: 0 or EINTR. In wait4 itself, a thread seems to sleep while it takes the child's status,
  * and the agent would let time go on. */

@@ -19,7 +19,7 @@ static uint64_t mixed(uint64_t value)
 
 static uint64_t next(void)
 {
-    uint64_t who = (uint64_t)own_service() << 48 | (uint64_t)own_process() << 24 | (self.slot ? self.slot->thread : 0);
+    uint64_t who = (uint64_t)process.service << 48 | (uint64_t)process.number << 24 | (self.slot ? self.slot->thread : 0);
     uint64_t seed = mixed(page->seed + UINT64_C(0x9e3779b97f4a7c15)) ^ mixed(who + 1);
     return mixed(seed + UINT64_C(0x9e3779b97f4a7c15) * ++self.drawn);
 }
@@ -155,7 +155,6 @@ PUBLIC FILE *fopen(const char *restrict path, const char *restrict how)
 }
 
 /* With 64 bits these are the same. */
-#define ALIAS(name, of) PUBLIC __typeof__(of) name __attribute__((alias(#of)))
 ALIAS(open64, open);
 ALIAS(openat64, openat);
 ALIAS(__open64_2, __open_2);

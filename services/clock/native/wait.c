@@ -23,19 +23,6 @@ static _Atomic uint32_t queue_lock;
 
 /* -- queues --------------------------------------------------------------------------------------------------------- */
 
-static void lock_queues(uint64_t *signals)
-{
-    block_signals(signals);
-    for (uint32_t free = 0; !atomic_compare_exchange_strong(&queue_lock, &free, 1); free = 0)
-        RAW_1(SYS_sched_yield, 0);
-}
-
-static void unlock_queues(const uint64_t *signals)
-{
-    queue_lock = 0;
-    restore_signals(signals);
-}
-
 void queues_after_fork(void)
 {
     queue_lock = 0;
@@ -56,14 +43,14 @@ void queue_join(const void *address, bool is_shared, uint32_t bits)
         self.slot->key = key_of(address);
         return;
     }
-    lock_queues(&signals);
+    take_lock(&queue_lock, &signals);
     *own = (struct waiter){.slot = self.slot, .address = address, .bits = bits, .is_queued = true};
     struct waiter **end = &first;
     while (*end)
         end = &(*end)->next;
     *end = own;
     queued++;
-    unlock_queues(&signals);
+    give_lock(&queue_lock, &signals);
 }
 
 /* Whether nobody has woken this thread before. */
@@ -72,7 +59,7 @@ bool queue_leave(void)
     struct waiter *own = &waiters[own_index()];
     bool was_waiting = atomic_exchange(&self.slot->key, 0) != 0;
     uint64_t signals;
-    lock_queues(&signals);
+    take_lock(&queue_lock, &signals);
     for (struct waiter **each = &first; own->is_queued && *each; each = &(*each)->next)
         if (*each == own) {
             *each = own->next;
@@ -81,7 +68,7 @@ bool queue_leave(void)
             break;
         }
     own->is_queued = false;
-    unlock_queues(&signals);
+    give_lock(&queue_lock, &signals);
     return was_waiting;
 }
 
@@ -117,7 +104,7 @@ int queue_wake(const void *address, bool is_shared, int most, uint32_t bits)
         return wake_shared(address);
     if (!queued)
         return 0;
-    lock_queues(&signals);
+    take_lock(&queue_lock, &signals);
     for (struct waiter **each = &first; *each && count < most;) {
         struct waiter *found = *each;
         if (found->address != address || !(found->bits & bits)) {
@@ -130,7 +117,7 @@ int queue_wake(const void *address, bool is_shared, int most, uint32_t bits)
         found->is_queued = false;
         make_ready(found->slot);
     }
-    unlock_queues(&signals);
+    give_lock(&queue_lock, &signals);
     return count;
 }
 
@@ -217,15 +204,8 @@ PUBLIC int cnd_timedwait(cnd_t *restrict cond, mtx_t *restrict mutex, const stru
     return in_c11(pthread_cond_timedwait((pthread_cond_t *)cond, (pthread_mutex_t *)mutex, until));
 }
 
-PUBLIC int cnd_signal(cnd_t *cond)
-{
-    return in_c11(pthread_cond_signal((pthread_cond_t *)cond));
-}
-
-PUBLIC int cnd_broadcast(cnd_t *cond)
-{
-    return in_c11(pthread_cond_broadcast((pthread_cond_t *)cond));
-}
+IN_C11(cnd_signal, cnd_t, pthread_cond_signal)
+IN_C11(cnd_broadcast, cnd_t, pthread_cond_broadcast)
 
 /* -- semaphores ----------------------------------------------------------------------------------------------------- */
 
