@@ -148,7 +148,7 @@ class Engine:
         return await self.backend.close(keep)
 
     async def _collect_losses(self) -> None:
-        """Losses, lateness, notes, ends and the clock's time as reported in teardown; other events no longer count then.
+        """Losses, lateness, notes, ends and the clock's time as reported in teardown; other events do not count then.
 
         But for what the application must not send: only when all is read is it known that nothing was.
         """

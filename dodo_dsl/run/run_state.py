@@ -195,11 +195,10 @@ class RunState:
         self.end("failed" if self.is_unanswered else "error", reason, service)
 
     def note_end(self, event: Exited, is_asked: bool) -> None:
-        """Notes an end of the application's that decides nothing, unless it ended well or by the SIGTERM that it was sent."""
+        """Notes an end of the application's that decides nothing, unless it is a good one or by SIGTERM."""
         if self.layer_of.get(event.service) != "application" or event.code in (0, *_ASKED):
             return
-        is_left = is_asked and event.code in _KILLED
-        how = "did not end upon SIGTERM and was killed" if is_left else _how(event)
+        how = "did not end upon SIGTERM and was killed" if is_asked and event.code in _KILLED else _how(event)
         when = "as the test ended" if is_asked else "when all was judged"
         at = self._when() or (f"after {self.time.seconds:.1f} s of test time" if self.time else "")
         self._remember(Noted(f"application service '{event.service}' {how} {when}, {at}".rstrip(", ")))

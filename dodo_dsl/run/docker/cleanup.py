@@ -90,11 +90,8 @@ def _filters(project: str) -> dict[str, str]:
     return {"label": f"{PROJECT_LABEL}={project}"}
 
 
-def stop_project(client: Any, project: str, ended: Callable[[str, int], None]) -> None:
-    """SIGTERM to all containers at once, SIGKILL to those that do not end within 2 s.
-
-    ``ended`` is called with the service and the exit code of each.
-    """
+def stop_project(client: Any, project: str) -> None:
+    """SIGTERM to all containers at once, SIGKILL to those that do not end within 2 s."""
     from docker.errors import DockerException
 
     containers = client.containers.list(filters=_filters(project))
@@ -103,9 +100,6 @@ def stop_project(client: Any, project: str, ended: Callable[[str, int], None]) -
         contextlib.suppress(DockerException, OSError),
     ):
         list(pool.map(lambda c: c.stop(timeout=_STOP_S), containers))
-        for container in containers:
-            container.reload()
-            ended(container.labels[SERVICE_LABEL], int(container.attrs["State"]["ExitCode"]))
 
 
 def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_S) -> int:
@@ -205,16 +199,13 @@ def take_down(
     containers: Mapping[str, Any],
     report: tuple[Collection[str], Path],
     note: Callable[[str], None],
-    ended: Callable[[str, int], None] = lambda _service, _code: None,
 ) -> bool:
     """Whether everything was removed; ``report`` are the services that write it, and its folder.
-
-    ``ended`` is called as by ``stop_project``.
 
     The next run removes what cannot be removed now, as when the engine has stopped.
     """
     try:
-        stop_project(client, project, ended)
+        stop_project(client, project)
         for name in report[0]:
             if name in containers:
                 _copy_report(containers[name], name, report[1], note)
