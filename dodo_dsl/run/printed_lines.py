@@ -165,14 +165,19 @@ class ServiceLines:
             try:
                 printed = pattern.printed(line)
             except NoValue as error:
-                key = f"{pattern.line.message} {str(error).partition(' ')[0]}"
-                if key not in self.said:
-                    self.said.add(key)
-                    note(f"a line of '{self.service}' is not a valid {pattern.line.message}: {error}: '{_shown(line)}'")
+                key, _, _ = str(error).partition(" ")
+                what = f"is not a valid {pattern.line.message}"
+                self.say_once(f"{what} {key}", f"{what}: {error}: '{_shown(line)}'", note)
                 continue
             if printed is not None:
                 found.append(printed)
         return found
+
+    def say_once(self, key: str, what: str, note: Callable[[str], None]) -> None:
+        """What is wrong with a line, unless the same is said already, by its ``key``."""
+        if key not in self.said:
+            self.said.add(key)
+            note(f"a line of '{self.service}' {what}")
 
     def silence(self, unfinished: bytes = b"") -> str:
         """What it printed instead of a match since the last one, in words."""
@@ -226,17 +231,12 @@ class PrintedLines:
         for printed in self.services[service].take(line.rstrip(b"\r"), self._note):
             frame = frame_of(printed.message, self._messages, printed.sample_time, printed.sender)
             if len(frame) > MAX_FRAME:
-                self._note_once(service)
+                what = f"makes a message of more than {MAX_FRAME} bytes, which is not sent"
+                self.services[service].say_once(what, what, self._note)
                 continue
             if time.monotonic() - self._told_s > _AGAIN_S:
                 self._tell()
             self._send(frame)
-
-    def _note_once(self, service: str) -> None:
-        said, key = self.services[service].said, f"more than {MAX_FRAME} bytes"
-        if key not in said:
-            said.add(key)
-            self._note(f"a line of '{service}' makes a message of {key}, which is not sent")
 
     def _tell(self) -> None:
         self._told_s = time.monotonic()

@@ -217,25 +217,16 @@ PUBLIC int execle(const char *path, const char *first, ...)
     return execve(path, words, environment);
 }
 
-PUBLIC int posix_spawn(pid_t *restrict pid, const char *restrict path,
-                       const posix_spawn_file_actions_t *restrict actions, const posix_spawnattr_t *restrict attributes,
-                       char *const words[restrict], char *const environment[restrict])
-{
-    if (!is_managed())
-        return EAGAIN;
-    inspect(path);
-    WITH_OURS(environment, next_process_number(), 0);
-    return real.posix_spawn(pid, path, actions, attributes, words, complete);
-}
-
-PUBLIC int posix_spawnp(pid_t *restrict pid, const char *restrict name,
-                        const posix_spawn_file_actions_t *restrict actions,
-                        const posix_spawnattr_t *restrict attributes, char *const words[restrict],
-                        char *const environment[restrict])
-{
-    if (!is_managed())
-        return EAGAIN;
-    inspect_in_path(name);
-    WITH_OURS(environment, next_process_number(), 0);
-    return real.posix_spawnp(pid, name, actions, attributes, words, complete);
-}
+#define SPAWN(name, look)                                                                                               \
+    PUBLIC int name(pid_t *restrict pid, const char *restrict program,                                                 \
+                    const posix_spawn_file_actions_t *restrict actions, const posix_spawnattr_t *restrict attributes,  \
+                    char *const words[restrict], char *const environment[restrict])                                    \
+    {                                                                                                                  \
+        if (!is_managed())                                                                                             \
+            return EAGAIN;                                                                                             \
+        look(program);                                                                                                 \
+        WITH_OURS(environment, next_process_number(), 0);                                                              \
+        return real.name(pid, program, actions, attributes, words, complete);                                          \
+    }
+SPAWN(posix_spawn, inspect)
+SPAWN(posix_spawnp, inspect_in_path)

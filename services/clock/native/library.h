@@ -57,8 +57,9 @@ struct self {
 extern __thread struct self self __attribute__((tls_model("initial-exec")));
 extern struct time_page *page;
 
-/* Which process of which service this is, where the page lies and the library. */
+/* Which process of which service this is, how many threads it has had, where the page lies and the library. */
 struct process {
+    _Atomic uint32_t threads;
     uint32_t service, number;
     char folder[256], library[PATH_MAX];
 };
@@ -85,7 +86,6 @@ unsigned own_index(void);
 unsigned take_slot(uint32_t process, uint32_t thread);
 void adopt_slot(unsigned at);
 void release_slot(void);
-uint32_t next_thread_number(void);
 uint32_t next_process_number(void);
 void before_fork(void);
 void in_forked_child(void);

@@ -24,7 +24,6 @@ struct time_page *page;
 struct process process;
 
 static _Atomic int stage;
-static _Atomic uint32_t threads_so_far;
 
 /* -- what this process is ------------------------------------------------------------------------------------------- */
 
@@ -36,11 +35,6 @@ bool is_starting(void)
 unsigned own_index(void)
 {
     return (unsigned)(self.slot - page->slot);
-}
-
-uint32_t next_thread_number(void)
-{
-    return threads_so_far++;
 }
 
 uint32_t next_process_number(void)
@@ -310,7 +304,7 @@ static void start(void)
     given = getenv("DODO_TIME_SERVICE");
     process.service = given ? (uint32_t)strtoul(given, NULL, 10) % TIME_SERVICES : 0;
     take_process_number();
-    adopt_slot(take_slot(process.number, next_thread_number()));
+    adopt_slot(take_slot(process.number, process.threads++));
     processes_start();
     begin_as_ready();
     stage = STARTED;
@@ -326,7 +320,7 @@ bool is_managed(void)
     if (stage == NEW)
         start();
     else /* not begun by pthread_create */
-        adopt_slot(take_slot(process.number, next_thread_number()));
+        adopt_slot(take_slot(process.number, process.threads++));
     return self.slot != NULL;
 }
 
@@ -384,7 +378,7 @@ void before_fork(void)
 void in_forked_child(void)
 {
     process.number = child_process;
-    threads_so_far = 1;
+    process.threads = 1;
     queues_after_fork();
     files_after_fork();
     timers_after_fork();

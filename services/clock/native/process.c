@@ -58,7 +58,7 @@ PUBLIC int pthread_create(pthread_t *restrict thread, const pthread_attr_t *rest
     struct beginning *beginning = malloc(sizeof *beginning);
     if (!beginning)
         return EAGAIN;
-    unsigned slot = take_slot(process.number, next_thread_number());
+    unsigned slot = take_slot(process.number, process.threads++);
     *beginning = (struct beginning){routine, argument, slot};
     int error = real.pthread_create(thread, attributes, begin, beginning);
     if (error) {
