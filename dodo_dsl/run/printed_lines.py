@@ -145,18 +145,20 @@ class ServiceLines:
 
         Where the terminal made a program colour it, or write over it, it is matched as without, then as it is.
         """
-        lines = [line]
-        if len(line) <= MAX_LINE and (b"\x1b" in line or b"\r" in line):
-            lines = [part for part in _FOR_TERMINALS.sub(b"", line).split(b"\r") if part.strip()]
-        found = [printed for part in lines for printed in self._printed(part, note)] or (
-            self._printed(line, note) if lines != [line] else []
-        )
+        parts, found = [line], list[Printed]()
+        if (b"\x1b" in line or b"\r" in line) and len(line) <= MAX_LINE:
+            parts = _FOR_TERMINALS.sub(b"", line).split(b"\r")
+            for part in parts:
+                found += self._printed(part, note)
+        found = found or self._printed(line, note)
         if found:
             self.matched += 1
-            self.last = lines[-1][:_WIDTH]
+            self.last = parts[-1][:_WIDTH]
             self.unmatched.clear()
-        else:
-            self.unmatched.extend(part[:_WIDTH] for part in lines if part.strip())
+            return found
+        for part in parts:
+            if part.strip():
+                self.unmatched.append(part[:_WIDTH])
         return found
 
     def _printed(self, line: bytes, note: Callable[[str], None]) -> list[Printed]:

@@ -13,10 +13,6 @@
 #include <sys/time.h>
 #include <sys/timerfd.h>
 
-#ifndef SYS_futex_waitv
-#define SYS_futex_waitv 449
-#endif
-
 static bool is_ours(int futex_operation)
 {
     int command = futex_operation & FUTEX_CMD_MASK;
@@ -69,7 +65,7 @@ PUBLIC long syscall(long number, ...)
         int error = clock_nanosleep((clockid_t)a[0], (int)a[1], P(2), P(3));
         return error ? fail_with(error) : 0;
     }
-    case SYS_futex_waitv: /* programs then wait for one word each */
+    case 449: /* futex_waitv: programs then wait for one word each */
         return fail_with(ENOSYS);
     case SYS_futex:
         if (is_ours((int)a[1]))
