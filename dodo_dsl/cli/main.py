@@ -90,6 +90,9 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     """Runs one command. What it cannot do is one sentence here, and an exit code; so is argparse's SystemExit."""
     stdout, stderr = harmless_stream(stdout), harmless_stream(stderr)
     os.environ.pop("DODO_SEARCH_STORAGE", None)  # jobs of a pipeline have it for their command line alone
+    if not argv:
+        parser(()).print_help(sys.stderr)
+        return Exit.USAGE
     try:
         options = parser(argv[:1]).parse_args(argv)
     except SystemExit as stop:

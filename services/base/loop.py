@@ -4,6 +4,7 @@ It counts how late a service is against its schedule in real time, and which sen
 another stamp than its own is easily taken for silence.
 """
 
+import functools
 import json
 import logging
 import time
@@ -101,6 +102,7 @@ TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
 REPORT_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
+_warn_once = functools.cache(_log.warning)
 
 
 @dataclass
@@ -224,7 +226,7 @@ class Loop:
                 try:
                     message = self.session.messages.decode(envelope.data_type, envelope.payload)
                 except MessageError as error:
-                    _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
+                    _warn_once("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, str(error))
                     return
                 handler(message, envelope.sample_time)
 
