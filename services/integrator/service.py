@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv import odvd
@@ -12,7 +11,7 @@ from services.base import Context, Flags, Output, Service, period_of
 from services.integrator.model import BodyPose, Integrator, Twist, angles, quaternion
 
 FRAME, RESET = "opendlv.sim.Frame", "reset"
-OLD_FRAME = Path(__file__).with_name("frame-0.9.odvd")
+OLD_FRAME = odvd.STANDARD_0_9
 
 
 class Integration(Service):

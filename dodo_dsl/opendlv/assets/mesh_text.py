@@ -20,37 +20,10 @@ _THREE = 3
 
 Vertex = tuple[float, ...]
 Triangle = tuple[int, int, int]
-Problem = tuple[int, str, str]
-"""The line from 1, 0 for the whole file; what is wrong; and a hint."""
 
 
 class _Wrong(Exception):
-    """Carries a Problem."""
-
-
-def check(path: Path, data: bytes) -> None:
-    """Raises MapError for a file that is not a mesh, or unfolds to more than a mesh may have."""
-    problem = problem_of(data)
-    if problem is not None:
-        line, what, hint = problem
-        raise MapError(path, what, line=line, hint=hint)
-
-
-@functools.lru_cache(maxsize=4)
-def problem_of(data: bytes) -> Problem | None:
-    """The first problem of an OBJ file's text."""
-    if len(data) > MAX_BYTES:
-        return 0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}", ""
-    for pattern, what, most in ((_FACE, "triangles", MAX_TRIANGLES), (_VERTEX, "vertices", MAX_VERTICES)):
-        count = sum(1 for _ in pattern.finditer(data))
-        if count > most:
-            return 0, f"{count} {what}, expected at most {most}", "save a simpler mesh"
-    try:
-        _checked(_parsed(data))
-    except _Wrong as wrong:
-        line, what, hint = wrong.args
-        return line, what, hint
-    return None
+    """Carries the line from 1, 0 for the whole file, what is wrong, and a hint."""
 
 
 class Face(NamedTuple):
@@ -89,10 +62,33 @@ class Mesh:
 
 
 def read(path: Path) -> Mesh:
-    """An OBJ file; raises MapError."""
-    data = read_bytes(path)
-    check(path, data)
-    return _parsed(data)
+    """An OBJ file; raises MapError for one that is not a mesh, or has more than a mesh may have."""
+    try:
+        return _mesh(read_bytes(path))
+    except _Wrong as wrong:
+        line, what, hint = wrong.args
+        raise MapError(path, what, line=line, hint=hint) from None
+
+
+@functools.lru_cache(maxsize=4)
+def _mesh(data: bytes) -> Mesh:
+    """Raises _Wrong."""
+    if len(data) > MAX_BYTES:
+        raise _Wrong(0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}", "")
+    for pattern, what, most in ((_FACE, "triangles", MAX_TRIANGLES), (_VERTEX, "vertices", MAX_VERTICES)):
+        count = sum(1 for _ in pattern.finditer(data))
+        if count > most:
+            raise _Wrong(0, f"{count} {what}, expected at most {most}", "save a simpler mesh")
+    mesh = _parsed(data)
+    triangles, _ = mesh.triangles()
+    if not triangles:
+        hint = "save the mesh as Wavefront OBJ with its faces, lines that begin with f"
+        raise _Wrong(0, "the OBJ file has no faces", hint)
+    if len(triangles) > MAX_TRIANGLES:
+        raise _Wrong(0, f"{len(triangles)} triangles, expected at most {MAX_TRIANGLES}", "save a simpler mesh")
+    if not any(_has_area([mesh.vertices[corner] for corner in each]) for each in triangles):
+        raise _Wrong(0, "no face of the OBJ file has an area", "save the mesh again: all its triangles are lines")
+    return mesh
 
 
 def has_materials(path: Path) -> bool:
@@ -154,18 +150,6 @@ def _parsed(data: bytes) -> Mesh:
     for number, words, material, *before in faces:
         mesh.faces.append(_face(number, words, material, mesh, before))
     return mesh
-
-
-def _checked(mesh: Mesh) -> None:
-    triangles, _ = mesh.triangles()
-    if not triangles:
-        raise _Wrong(
-            0, "the OBJ file has no faces", "save the mesh as Wavefront OBJ with its faces, lines that begin with f"
-        )
-    if len(triangles) > MAX_TRIANGLES:
-        raise _Wrong(0, f"{len(triangles)} triangles, expected at most {MAX_TRIANGLES}", "save a simpler mesh")
-    if not any(_has_area([mesh.vertices[corner] for corner in each]) for each in triangles):
-        raise _Wrong(0, "no face of the OBJ file has an area", "save the mesh again: all its triangles are lines")
 
 
 def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
