@@ -31,7 +31,7 @@ _PREFIX = "opendlv.logic.perception.Detection"
 _KINDS = ("BoundingBox", "Property", "Type")
 _SLACK = 1e-6
 """Part of a frame by which rounded fractions may reach over its edge."""
-_CLASSES = ("yellow", "blue", "red", "orange", "car", "object")
+_CLASSES = ("blue", "yellow", "red", "orange", "car", "object")
 """Classes with the numbers from 1; others have the CRC-32 of their names, without its uppermost bit."""
 
 
@@ -90,7 +90,7 @@ class DataSet:
             }
             for number, (image, name, box) in enumerate(self.boxes, 1)
         ]
-        categories = [{"id": number, "name": name, "supercategory": ""} for number, name in sorted(by_number.items())]
+        categories = [{"id": number, "name": name, "supercategory": ""} for name, number in sorted(numbers.items())]
         content = {"images": self.images, "annotations": annotations, "categories": categories}
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
