@@ -71,6 +71,6 @@ def test_messages_of_the_deployment_that_services_of_dodo_use_otherwise(
 @pytest.mark.parametrize("takes", [FRAME, STEERING])
 def test_an_application_of_set_0_9_gets_its_frames(takes: str, tmp_path: Path) -> None:
     example = f"# dodo.yml\nmessages: [my.odvd]\n# my.odvd\n{STANDARD_0_9.read_text()}\n"
-    test = resolved(example.replace("// ", "//") + DECLARED.format(key="in", name=takes), tmp_path)
+    test = resolved(example + DECLARED.format(key="in", name=takes), tmp_path)
     (pose,) = (service for service in test.services if service.manifest.name == "integrator")
     assert pose.texts["euler"] == ("true" if takes == FRAME else "false")
