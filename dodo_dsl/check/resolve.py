@@ -212,12 +212,9 @@ def _driven(
 ) -> tuple[tuple[ResolvedService, ...], Wiring]:
     """Services and wiring where the messages that drive the vehicle have taken the place of defaults."""
     messages = ",".join(driving(wiring))
-    found = tuple(_with_default(each, messages, _is_driving) for each in services) if messages else services
+    is_driving = operator.attrgetter("parameter.driving")
+    found = tuple(_with_default(each, messages, is_driving) for each in services) if messages else services
     return (services, wiring) if all(map(operator.is_, found, services)) else (found, wire(found, declared))
-
-
-def _is_driving(argument: Argument) -> bool:
-    return argument.parameter.driving
 
 
 def _with_default(service: ResolvedService, text: str, is_meant: Callable[[Argument], bool]) -> ResolvedService:

@@ -226,9 +226,7 @@ def _messages(manifest: Mapping[str, Any], folder: Path) -> MessageSet:
     """The standard messages and those of the test's own ODVD files, which replace none that DoDo's services name."""
     own = (Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p)
     choices = [each.get("choices") for each in manifest.get("parameters", {}).values()]
-    named = str(
-        [LOG_MESSAGE, manifest.get("messages"), choices] if folder.resolve().parent == _BASE.parent else [LOG_MESSAGE]
-    )
+    named = LOG_MESSAGE + str([manifest.get("messages"), choices] * (folder.resolve().parent == _BASE.parent))
     kept = {name for name in MessageSet.standard().names() if is_of_the_world(name) or name in named}
     return MessageSet.load(*own, kept=kept)
 

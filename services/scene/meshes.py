@@ -9,7 +9,7 @@ from dodo_dsl.opendlv.assets import mesh_text
 from dodo_dsl.opendlv.assets.json_file import MapError
 from services.scene.camera import Array
 from services.scene.raster import Image
-from services.scene.textures import halved, load_picture
+from services.scene.textures import Texture, load_picture
 
 Indices = npt.NDArray[np.intp]
 
@@ -107,18 +107,13 @@ def load_painted(path: Path, folder: Path) -> tuple[Array, Indices, Array]:
     mesh = mesh_text.read(path)
     vertices, triangles, faces = _loaded(path, mesh)
     paints = mesh_text.paints(path, mesh, folder)
-    pictures = {paint: _small(load_picture(paint)) for paint in set(paints) if isinstance(paint, Path)}
+    tiles = {paint: Texture(load_picture(paint), 0).tiles for paint in set(paints) if isinstance(paint, Path)}
+    pictures = {file: next(each for each in tiles[file] if max(each.shape) <= _PIXELS)[:, :, :3] for file in tiles}
     colours = [
         _shown(pictures[paint], mesh, face) if isinstance(paint, Path) else np.array(paint[::-1]) * 255.0
         for paint, face in zip(paints, mesh.faces, strict=True)
     ]
     return vertices, triangles, np.array(colours)[faces]
-
-
-def _small(picture: Image) -> Image:
-    while max(picture.shape[:2]) > _PIXELS:
-        picture = halved(picture)
-    return picture
 
 
 def _shown(picture: Image, mesh: mesh_text.Mesh, face: mesh_text.Face) -> Array:

@@ -132,7 +132,7 @@ def _model(node: Node) -> ModelEntry | None:
     if not instances and not frames:
         return None
     file = node.required("file").resource()
-    has_materials = not (_has(node, "color") or _has(node, "textureFile")) and mesh_text.has_materials(file)
+    has_materials = not (_has(node, "color") or _has(node, "textureFile")) and b"usemtl" in read_bytes(file)
     paint = None if has_materials else _paint(node)
     return ModelEntry(node.required("name").text(), file, paint, instances, frames)
 

@@ -91,11 +91,6 @@ def _mesh(data: bytes) -> Mesh:
     return mesh
 
 
-def has_materials(path: Path) -> bool:
-    """Whether an OBJ file says which materials its faces have; raises MapError for what cannot be read."""
-    return any(words[0] == b"usemtl" for _, words in _lines(read_bytes(path)))
-
-
 def outline(path: Path) -> list[tuple[float, float]]:
     """The convex outline of an OBJ file's faces from above, counter-clockwise in m; raises MapError."""
     mesh = read(path)
@@ -207,9 +202,8 @@ def _has_area(corners: Sequence[Vertex]) -> bool:
 
 Paint = tuple[float, float, float] | Path
 """A colour as r, g, b from 0 to 1, or the file of a texture."""
-_IS_VALUE = re.compile(rb"on|off|[-+]?[0-9.]+")
-_OPTIONS = {b"-imfchan": 2, b"-type": 2}
-"""Options of textures whose words are no numbers."""
+_OPTION = re.compile(rb"-[a-z]+|on|off|[-+]?[0-9.]+|[rgbmlz]|sphere|cube_[a-z]+")
+"""What may stand before the file of a texture."""
 
 
 def paints(path: Path, mesh: Mesh, folder: Path) -> list[Paint]:
@@ -227,7 +221,7 @@ def paints(path: Path, mesh: Mesh, folder: Path) -> list[Paint]:
 
 
 def _name(name: bytes) -> str:
-    return name.decode(errors="replace").replace("\\", "/").replace("\0", "")
+    return name.decode(errors="replace").replace("\\", "/").replace("\0", "")[:250]
 
 
 def _inside(folder: Path, file: Path, line: int, name: bytes) -> Path:
@@ -245,25 +239,18 @@ def _materials(file: Path, folder: Path) -> Iterator[tuple[bytes, Paint | None]]
     """The materials of an MTL file: a texture (map_Kd), the colour without one (Kd), or None; raises MapError."""
     name, is_texture = b"", False
     for line, words in _lines(read_bytes(file)):
-        key, at = words[0].lower(), 1
+        key = words[0].lower()
         if key == b"newmtl":
             name, is_texture = b" ".join(words[1:]), False
             yield name, None
-        elif key == b"kd" and not is_texture:
-            yield name, _colour(file, line, words)
         elif key == b"map_kd":
-            while words[at : at + 1] and words[at].startswith(b"-"):
-                at += _OPTIONS.get(words[at], 1)
-                while words[at : at + 1] and _IS_VALUE.fullmatch(words[at]):
-                    at += 1
             is_texture = True
-            yield name, _inside(folder, file, line, b" ".join(words[at:]))
-
-
-def _colour(file: Path, line: int, words: Sequence[bytes]) -> Paint:
-    try:
-        red, green, blue = (min(max(float(word), 0.0), 1.0) for word in words[1:4])
-    except ValueError:
-        what = f"'{_text(words)}' is not a colour, expected Kd and three numbers from 0 to 1"
-        raise MapError(file, what, line=line, hint="for example 'Kd 1 0.85 0'") from None
-    return red, green, blue
+            texture = itertools.dropwhile(_OPTION.fullmatch, words[1:])
+            yield name, _inside(folder, file, line, b" ".join(texture))
+        elif key == b"kd" and not is_texture:
+            try:
+                red, green, blue = (min(max(0.0, float(word)), 1.0) for word in words[1:4])
+            except ValueError:
+                what = f"'{_text(words)}' is not a colour, expected Kd and three numbers from 0 to 1"
+                raise MapError(file, what, line=line, hint="for example 'Kd 1 0.85 0'") from None
+            yield name, (red, green, blue)
