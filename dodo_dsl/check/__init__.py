@@ -25,6 +25,7 @@ RULES: tuple[Rule, ...] = (
     service_rules.check_layers,
     service_rules.check_parameters,
     service_rules.check_messages,
+    service_rules.check_own_messages,
     file_rules.check_references,
     file_rules.check_files,
     file_rules.check_limits,

@@ -379,9 +379,10 @@ class _Builder:
 
     def _file_flag(self, parameter: Parameter, value: Value, span: Span) -> Flag:
         path = value.path or Path()
+        needed = path.parent if parameter.format == "map" and path.suffix == ".json" else path  # meshes stand beside it
         root = self.spec.location.root.resolve()
         try:
-            found = self.shared.tree(path, root)
+            found = self.shared.tree(needed, root)
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         else:

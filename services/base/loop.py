@@ -16,7 +16,8 @@ from fractions import Fraction
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.message_set import MessageError
+from dodo_dsl.opendlv.message_set import MessageError, decode
+from dodo_dsl.opendlv.protobuf_classes import Layout
 from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
@@ -124,7 +125,7 @@ class Loop:
     sender_stamp: int
     members: Members | None = None
     """In real time: the services of the test, whose messages others must not send."""
-    _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
+    _handlers: dict[int, list[tuple[int | None, Handler, Layout]]] = field(default_factory=dict)
     _stamps: HeardStamps = field(init=False)
     _has_begun: bool = False
     _reported: int = 0
@@ -136,7 +137,8 @@ class Loop:
     def __post_init__(self) -> None:
         ids = self.session.messages.id
         for (name, stamp), handler in self.service.inputs.items():
-            self._handlers.setdefault(ids(name), []).append((stamp, handler))
+            entry = (stamp, handler, self.session.messages.layout(name))
+            self._handlers.setdefault(ids(name), []).append(entry)
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
         self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)
@@ -221,10 +223,10 @@ class Loop:
             self._lateness.begin()
         elif envelope.data_type == self._end:
             self.service.end_of_input(self.clock.now())
-        for stamp, handler in self._handlers.get(envelope.data_type, ()):
+        for stamp, handler, layout in self._handlers.get(envelope.data_type, ()):
             if stamp is None or stamp == envelope.sender_stamp:
                 try:
-                    message = self.session.messages.decode(envelope.data_type, envelope.payload)
+                    message = decode(layout, envelope.payload)
                 except MessageError as error:
                     _warn_once("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, str(error))
                     return

@@ -2,17 +2,17 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.attitude import quaternion
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context, Flags, Output, Service, period_of
-from services.integrator.model import BodyPose, Integrator, Twist, angles, quaternion
+from services.integrator.model import BodyPose, Integrator, Twist, angles
 
 FRAME, RESET = "opendlv.sim.Frame", "reset"
-OLD_FRAME = Path(__file__).with_name("frame-0.9.odvd")
+OLD_FRAME = odvd.STANDARD_0_9
 
 
 class Integration(Service):

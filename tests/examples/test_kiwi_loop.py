@@ -10,12 +10,13 @@ from typing import Any
 
 import pytest
 
+from dodo_dsl.opendlv.attitude import quaternion
 from services.base import Verdict
 from services.collision.model import TrackEvaluator
 from services.collision.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
 from services.dynamic_model.model import Vehicle
 from services.integrator.model import BodyPose as Attitude
-from services.integrator.model import Integrator, Twist, quaternion
+from services.integrator.model import Integrator, Twist
 from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import load_scene

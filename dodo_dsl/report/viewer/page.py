@@ -220,7 +220,7 @@ def _sources() -> Path:
 
 def _messages(plan: Plan, compiled: Path) -> MessageSet:
     try:
-        return MessageSet.load(*(compiled / FILES / path for path in plan.messages))
+        return MessageSet.load(*(compiled / FILES / path for path in plan.messages), kept=MessageSet.standard().names())
     except OdvdError:
         return MessageSet.standard()
 

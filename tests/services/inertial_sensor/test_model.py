@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.attitude import quaternion
 from services.dynamic_model.drives import SPEED, BicycleDrive, SingleTrack
 from services.dynamic_model.model import STEERING, Vehicle
 from services.inertial_sensor.model import (
@@ -20,7 +21,7 @@ from services.inertial_sensor.model import (
     mounted,
     turned,
 )
-from services.integrator.model import BodyPose, Integrator, Twist, angles, quaternion
+from services.integrator.model import BodyPose, Integrator, Twist, angles
 
 SECOND = 1_000_000
 G = 9.81

@@ -72,7 +72,9 @@ def test_the_command_reset_and_no_other() -> None:
         assert output.message.y == pytest.approx(y)
 
 
-def test_on_the_bus(cid: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("own", [[], [OLD_FRAME]])
+def test_on_the_bus(cid: int, own: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DODO_ODVD", ":".join(map(str, own)))
     flags = (f"--cid={cid}", "--frame-id=4", "--x=1", "--yaw=180")
     with Session(cid) as session, running("integrator", tmp_path, *flags):
         _, frame = receive(session, "opendlv.sim.Frame", 4)
