@@ -21,7 +21,7 @@ from dodo_dsl.source import Mapping, Scalar, parse
 from dodo_dsl.spec import matrix, quantity, vary
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import ANY, LAYERS
-from dodo_dsl.spec.rig import EMULATED_RIGS
+from dodo_dsl.spec.rig import EMULATED_RIGS, KIND_TAGS
 
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _MARK = "xCursorx"
@@ -224,7 +224,7 @@ def _rigs(scene: DocumentContext, below: Steps) -> Iterator[Offer]:
         kinds = dict.fromkeys(rig.kind for rig in rigs.values())
         yield from ((kind, _VALUE, "kind of rigs", "") for kind in kinds)
     else:
-        yield from ((name, _VALUE, "rig", "") for name in (*(() if below else EMULATED_RIGS), *rigs))
+        yield from ((name, _VALUE, "rig", "") for name in (*(() if below else (*KIND_TAGS, *EMULATED_RIGS)), *rigs))
 
 
 def _services(scene: DocumentContext, layer: str) -> Iterator[Offer]:
