@@ -141,6 +141,9 @@ def load(
             files, access(deployment), deployment.sandbox, reader, deployment.declarations
         )
         found = [*found, *of_application, *(unseen_problems(source, deployment) if source else ())]
+    if settings.emulate:
+        rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
+        deployment = replace(deployment, rigs=rigs)
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
@@ -187,7 +190,7 @@ def _at(checked: Checked, spec: Spec, label: str, values: Mapping[str, Values]) 
 def access(deployment: Deployment) -> Access:
     """What the deployment allows its application."""
     roots = (str(deployment.root),) if deployment.file else ()
-    ports = tuple(port for rig in deployment.rigs.values() if (port := rig.text(PORT)))
+    ports = tuple(port.text for rig in deployment.rigs.values() if isinstance(port := rig.node.get(PORT), Scalar))
     return Access(roots, tuple(deployment.paths), deployment.environment, deployment.outside, ports=ports)
 
 

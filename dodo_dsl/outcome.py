@@ -10,6 +10,7 @@ from typing import Any, Literal
 from dodo_dsl.spec.model import BASELINE, Goal, RecordedValue
 
 Result = Literal["passed", "failed", "error"]
+ON_EMULATED = "on an emulated rig: no hardware took part"
 NEXT_REPORT = ".next-"
 """How the name of a folder inside a report's begins in which the next report is written."""
 

@@ -21,7 +21,7 @@ from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService, resolved
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import Rig
+from dodo_dsl.spec.rig import KIND_TAGS, Rig, emulated
 
 FORMAT = "recording"
 ONLY, WITHOUT = "messages", "without"
@@ -193,7 +193,7 @@ def resolve(
     found: list[ResolvedTest] = []
     for spec in specs:
         previous = found[-1] if found and found[-1].spec.path == spec.path else None
-        rig = deployment.rig(spec.rig) if spec.rig else None
+        rig = deployment.rig(spec.rig) or (emulated(spec.rig) if spec.rig in KIND_TAGS else None) if spec.rig else None
         services = tuple(
             resolved(spec, use, manifest, rig, _arguments(previous, use.layer, use.name))
             for use in spec.uses

@@ -32,7 +32,7 @@ from dodo_dsl.diagnostics import Diagnostic, format_text, shown_path
 from dodo_dsl.spec.deployment import FILE_NAME, Deployment
 from dodo_dsl.spec.model import KINDS, LEVEL_WORDS, LEVELS, Spec
 
-_LEVELS = {**LEVEL_WORDS, "hil": f"{LEVEL_WORDS['hil']}, on a rig, at first the emulated one"}
+_LEVELS = {**LEVEL_WORDS, "hil": f"{LEVEL_WORDS['hil']}, on a rig"}
 _KINDS = {
     "closed-loop": "the application drives",
     "open-loop": "the application is carried along, and its signals are judged",
@@ -225,7 +225,7 @@ def _lack(file: New) -> str:
 EXAMPLES = """examples:
   dodo new                                             asks, or lists what a test can start from
   dodo new sil-my-curve                                a closed-loop simulation that compiles
-  dodo new hil-my-curve --level hil                    the same on a rig, at first the emulated one
+  dodo new hil-my-curve --level hil                    the same on a rig, or emulated by dodo run --emulate
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
   dodo new dil-mine --level dil --rec drive.rec        your own recording, and its signal as the target
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files

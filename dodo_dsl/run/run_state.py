@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.check.senders import told_in_words
-from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse, against_baseline
+from dodo_dsl.outcome import ON_EMULATED, MachineLoad, Outcome, Response, Result, ServiceUse, against_baseline
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
@@ -325,6 +325,7 @@ class RunState:
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
             notes=(
+                *([ON_EMULATED] if plan.rig and not plan.is_real else []),
                 *self.notes,
                 *self._printed_notes(finding),
                 *self._shortage_notes(),

@@ -82,7 +82,7 @@ environment: {camera: {uses: camera}}
 evaluation: {track: {uses: collision, with: {map-path: ../maps/plain, goal: finish}}}
 """
     found = plan(example, tmp_path)
-    assert (found.isolation, found.tag) == ("network", "sil")
+    assert (found.isolation, found.tag, found.is_real, found.lacks_rig) == ("network", "hil-dynamic", False, False)
     assert [s.uses for s in found.services if s.name == "camera"] == ["virtual-camera"]
     assert "environment.camera.source" not in found.source_map
 

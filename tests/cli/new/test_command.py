@@ -274,7 +274,7 @@ def test_a_copy_is_the_same_test(repository: Path) -> None:
     copies = load([repository / "tests"]).specs
     assert [spec.name for spec in copies] == ["further", "mine"]
     for copy in copies:
-        assert (copy.level, copy.kind, copy.rig, copy.timeout_s) == ("hil", "closed-loop", "emulated", 60.0)
+        assert (copy.level, copy.kind, copy.rig, copy.timeout_s) == ("hil", "closed-loop", "dynamic", 60.0)
         assert [(u.name, u.uses.text, list(u.parameters)) for u in copy.uses] == [
             (u.name, u.uses.text, list(u.parameters)) for u in shipped.uses
         ]
