@@ -7,10 +7,13 @@
 import dataclasses
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Union
+
+import msgspec
 
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import did_you_mean
@@ -60,6 +63,7 @@ class RunRecord:
 FILE_NAME = "results.json"
 VERSION = 1
 _MAX_PROBLEM_TEXT = 200
+_MOST_PROBLEMS, _MOST_COUNTED = 3, 1000
 _MOST_DIGITS = 300
 
 
@@ -88,9 +92,9 @@ class Results:
 
 
 def to_json(outcomes: Sequence[Outcome], circumstances: Circumstances = NO_CIRCUMSTANCES) -> str:
-    tests = [_rounded(dataclasses.asdict(outcome)) for outcome in outcomes]
+    tests = [_rounded(test) for test in msgspec.to_builtins(outcomes)]
     head = {"dodo": "results", "version": VERSION}
-    besides = {key: value for key, value in dataclasses.asdict(circumstances).items() if value}
+    besides = {key: value for key, value in msgspec.to_builtins(circumstances).items() if value}
     return json.dumps({**head, **besides, "tests": tests}, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -157,8 +161,6 @@ def load(path: Path) -> list[Outcome]:
 
 def read_results(path: Path) -> Results:
     """A ``results.json`` that its schema accepts; raises ResultsError."""
-    import msgspec
-
     try:
         document = json.loads(regular_file.text(path), parse_int=_whole)
         if document["dodo"] != "results" or document["version"] != VERSION:
@@ -182,15 +184,57 @@ def _whole(digits: str) -> int | float:
 
 
 def _validate(document: Any) -> None:
-    """Raises ValueError with the place of the most relevant problem, or for strings that UTF-8 cannot encode."""
-    from jsonschema import Draft202012Validator
-    from jsonschema.exceptions import best_match
-
+    """Raises ValueError with the places of the first problems, or for strings that UTF-8 cannot encode."""
     schema = json.loads((package_data.schemas() / "results.schema.json").read_text(encoding="utf-8"))
-    problem = best_match(Draft202012Validator(schema).iter_errors(document))
-    if problem is not None:
-        raise ValueError(_sentence(problem))
+    try:
+        msgspec.convert(document, _checked(schema, schema["$defs"]))
+    except msgspec.ValidationError:
+        if problems := _problems(document, schema):
+            raise ValueError(problems) from None
     json.dumps(document, ensure_ascii=False).encode()
+
+
+_BOUNDS = {
+    "number": {"minimum": "ge", "maximum": "le", "exclusiveMinimum": "gt"},
+    "string": {"pattern": "pattern", "maxLength": "max_length"},
+    "object": {"maxProperties": "max_length"},
+}
+_PLAIN = {"number": float, "integer": int, "string": str, "boolean": bool, "null": None}
+
+
+def _checked(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Any:
+    """What msgspec takes only if the schema does, for files with thousands of tests: jsonschema takes their time."""
+    if "$ref" in schema:
+        return _checked(defs[schema["$ref"].removeprefix("#/$defs/")], defs)
+    if "type" not in schema:
+        return Literal[tuple(schema.get("enum") or [schema["const"]])]
+    kind = schema["type"]
+    if isinstance(kind, list):
+        return Union[tuple(_checked({**schema, "type": each}, defs) for each in kind)]  # noqa: UP007  (computed)
+    if kind == "array":
+        return list[_checked(schema["items"], defs)]  # type: ignore[misc]
+    if "properties" in schema and kind == "object":
+        parts = {name: _checked(each, defs) for name, each in schema["properties"].items()}
+        optional = parts.keys() - set(schema.get("required", ()))
+        fields = [(name, each, None) if name in optional else (name, each) for name, each in parts.items()]
+        return msgspec.defstruct("Part", fields, forbid_unknown_fields=True, kw_only=True)
+    bounds = _BOUNDS.get("number" if kind == "integer" else kind, {})
+    found = {name: schema[key] for key, name in bounds.items() if key in schema}
+    if kind != "object":
+        return Annotated[_PLAIN[kind], msgspec.Meta(**found)] if found else _PLAIN[kind]
+    key = _checked({"type": "string", **schema["propertyNames"]}, defs)
+    return Annotated[dict[key, _checked(schema["additionalProperties"], defs)], msgspec.Meta(**found)]
+
+
+def _problems(document: Any, schema: Mapping[str, Any]) -> str:
+    """The first problems, those of the whole before those of its parts, and how many more; empty without one."""
+    from jsonschema import Draft202012Validator
+
+    found = list(islice(Draft202012Validator(schema).iter_errors(document), _MOST_COUNTED))
+    first = sorted(found, key=lambda problem: len(problem.absolute_path))[:_MOST_PROBLEMS]
+    more = len(found) - len(first)
+    counted = [f"and {'at least ' if len(found) == _MOST_COUNTED else ''}{more} more"] if more else []
+    return "; ".join([*map(_sentence, first), *counted])
 
 
 def _sentence(problem: Any) -> str:
