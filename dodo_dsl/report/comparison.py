@@ -32,8 +32,8 @@ Check = Mapping[str, Any]
 
 def only_follows(check: Check, checks: Sequence[Check]) -> bool:
     """Whether a check of a test is not met only as another one ended the drive."""
-    ended = any(not other["ok"] and other["name"] in _ENDING for other in checks)
-    return ended and not check["ok"] and check["name"] in _OF_THE_WAY
+    may_follow = not check["ok"] and check["name"] in _OF_THE_WAY
+    return may_follow and any(not other["ok"] and other["name"] in _ENDING for other in checks)
 
 
 def is_exclusive(check: Check) -> bool:
@@ -208,6 +208,9 @@ class TestChange:
     """Of those in both."""
     new_checks: Sequence[str] = ()
     gone_checks: Sequence[str] = ()
+
+    def by_index(self) -> dict[int, CheckChange]:
+        return {check.index: check for check in self.checks}
 
     @property
     def latest(self) -> Outcome:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from dodo_dsl import __version__, atomic, package_data
 from dodo_dsl.opendlv import regular_file
@@ -172,17 +172,12 @@ def urgency(outcome: Outcome) -> int:
 
 def rows(outcomes: Sequence[Outcome]) -> list[Row]:
     """What did not pass first, else in the order of the outcomes; instances of a matrix are one row."""
-    found: list[Row] = []
-    taken = set[int]()
     of = {id(o): grid for grid in grids(outcomes) for row in grid.rows for cell in row.cells for o in cell}
+    found: dict[int, tuple[MatrixGrid | None, list[Outcome]]] = {}
     for outcome in outcomes:
         grid = of.get(id(outcome))
-        if grid is None:
-            found.append(Row([outcome]))
-        elif id(grid) not in taken:
-            taken.add(id(grid))
-            found.append(Row(sorted((o for o in outcomes if of.get(id(o)) is grid), key=urgency), grid))
-    return sorted(found, key=lambda row: row.urgency)
+        found.setdefault(id(grid or outcome), (grid, []))[1].append(outcome)
+    return sorted((Row(sorted(each, key=urgency), grid) for grid, each in found.values()), key=lambda row: row.urgency)
 
 
 _BREAKS = re.compile(r"(?=\[)|(?<=,)")
@@ -285,7 +280,7 @@ def breakable(name: str) -> Markup:
 
 def unbroken(text: str) -> Markup:
     """Values whose units stay in the line of their numbers."""
-    return Markup("\u00a0").join(_UNITS.split(_harmless(text)))
+    return Markup(_UNITS.sub("\u00a0", escape(_harmless(text))))  # noqa: S704  (escaped)
 
 
 def source_hash(text: str) -> str:

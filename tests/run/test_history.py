@@ -16,7 +16,7 @@ from tests.run.scripted import plan
 
 LINE = {
     "when": 1, "spec": "s", "test": "t", "level": "sil", "backend": "process", "clock": "realtime",
-    "outcome": "passed", "setup_s": 1.0, "execution_s": 2.0,
+    "outcome": "passed", "setup_s": 1.0, "execution_s": 2.0, "repository": history._repository(),
 }  # fmt: skip
 
 
