@@ -4,6 +4,7 @@ Source: https://docs.gitlab.com/api/jobs/ and https://docs.gitlab.com/api/job_ar
 """
 
 import json
+import lzma
 import shutil
 import stat
 import urllib.error
@@ -16,6 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from dodo_dsl.report.join import MOST_BYTES
+from dodo_dsl.report.results import FILE_NAME, GivenReport, ResultsError, read_given
 
 VARIABLE = "DODO_API_TOKEN"
 """The variable with a token of scope ``read_api``; without it the job's own is used."""
@@ -23,8 +25,9 @@ FOLDER = "dodo-report"
 """Of a job's report among its artifacts."""
 _NEEDED = ("CI_API_V4_URL", "CI_PROJECT_ID", "CI_PIPELINE_ID")
 _PATIENCE_S = 60.0
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError)
-"""Raised by zipfile for damage, and the last for what is encrypted or compressed in a way that it does not know."""
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, RuntimeError, ValueError, OSError)
+"""Raised by zipfile for damage, what is encrypted or compressed in ways that it does not know, and impossible names."""
+_SHOWN_NAME = 60
 _MOST_JSON = 16 << 20
 _MOST_PAGES = 100
 
@@ -78,48 +81,68 @@ def of_job(environment: Mapping[str, str]) -> ParentPipeline:
     return ParentPipeline(f"{api}/projects/{project}", number, header)
 
 
-def fetch(pipeline: ParentPipeline, folder: Path) -> Iterator[tuple[str, Path | None]]:
-    """The jobs of all child pipelines by name, each with its report in ``folder``, or None; raises NoChildJobs."""
+def fetch(pipeline: ParentPipeline, folder: Path) -> tuple[list[GivenReport], list[str]]:
+    """The reports of the jobs of all child pipelines, kept in ``folder``, and sentences on those without a whole one.
+
+    Raises NoChildJobs where GitLab does not list them.
+    """
+    reports, sentences = list[GivenReport](), list[str]()
     try:
         children = [each.get("downstream_pipeline") for each in pipeline.json(f"pipelines/{pipeline.number}/bridges")]
         jobs = [job for child in children if child for job in pipeline.json(f"pipelines/{int(child['id'])}/jobs")]
         for job in sorted(jobs, key=lambda each: int(each["id"])):
             name, number = str(job["name"]), int(job["id"])
-            if job.get("artifacts_file"):
-                yield name, _fetched(pipeline, number, folder / str(number))
-            elif job.get("status") != "success":
-                yield name, None
+            place = folder / str(number)
+            try:
+                outside = _fetch(pipeline, number, place) if job.get("artifacts_file") else []
+                if (place / FOLDER).is_dir():
+                    reports.append(read_given(place / FOLDER))
+                elif job.get("artifacts_file") or job.get("status") != "success":
+                    sentences.append(f"job '{name}' has no report")
+                if outside:
+                    more = f" and {len(outside) - 1} more" if len(outside) > 1 else ""
+                    sentences.append(
+                        f"job '{name}': '{outside[0]}'{more} of its artifacts are left out: outside {FOLDER}"
+                    )
+            except (NoChildJobs, ResultsError) as problem:
+                sentences.append(f"job '{name}' is left out: {str(problem).replace(f'{place}/', '')}")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise error if isinstance(error, NoChildJobs) else NoChildJobs("GitLab's answer lists no jobs") from error
+    return reports, sentences
 
 
-def _fetched(pipeline: ParentPipeline, number: int, folder: Path) -> Path | None:
+def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> list[str]:
+    """Writes the report among a job's artifacts; returns the names of those that would have been written elsewhere."""
     folder.mkdir()
     archive = folder / "artifacts.zip"
-    with pipeline.opened(f"jobs/{number}/artifacts") as response, archive.open("xb") as file:
-        _copy(response, file, MOST_BYTES)
     try:
+        with pipeline.opened(f"jobs/{number}/artifacts") as response, archive.open("xb") as file:
+            _copy(response, file, MOST_BYTES)
         with zipfile.ZipFile(archive) as opened:
-            _extract(opened, folder)
+            return list(_extract(opened, folder))
     except _UNREADABLE as error:
-        raise NoChildJobs(f"the artifacts of job {number} cannot be read: {error}") from None
-    archive.unlink()
-    return folder / FOLDER if (folder / FOLDER).is_dir() else None
+        if isinstance(error, NoChildJobs):
+            raise
+        said = f"its artifacts, job {number}, cannot be read ({error})"
+        raise NoChildJobs(f"{said}, expected a zip archive with {FOLDER}/{FILE_NAME}") from None
+    finally:
+        archive.unlink(missing_ok=True)
 
 
-def _extract(archive: zipfile.ZipFile, folder: Path) -> None:
-    """The regular files of the report, by names that stay inside."""
+def _extract(archive: zipfile.ZipFile, folder: Path) -> Iterator[str]:
+    """Writes the regular files of the report; yields the names that do not stay inside."""
     left = MOST_BYTES
     for entry in archive.infolist():
         path = PurePosixPath(entry.filename)
         mode = entry.external_attr >> 16
         is_file = not entry.is_dir() and (stat.S_ISREG(mode) or not stat.S_IFMT(mode))
-        if not is_file or path.parts[:1] != (FOLDER,) or ".." in path.parts:
-            continue
-        target = folder / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with archive.open(entry) as content, target.open("xb") as file:
-            left -= _copy(content, file, left)
+        if ".." in path.parts or path.is_absolute():
+            yield entry.filename[:_SHOWN_NAME]
+        elif is_file and path.parts[:1] == (FOLDER,):
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(entry) as content, target.open("xb") as file:
+                left -= _copy(content, file, left)
 
 
 def _copy(source: IO[bytes], target: IO[bytes], most: int) -> int:

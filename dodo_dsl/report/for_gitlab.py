@@ -152,7 +152,7 @@ def _number(value: float) -> str:
     if not math.isfinite(value):
         return {math.inf: "+Inf", -math.inf: "-Inf"}.get(value, "NaN")
     whole, dot, part = repr(value).partition(".")
-    is_large = value > 0 and dot and len(whole) > 6  # noqa: PLR2004
+    is_large = value > 0 and dot and len(whole) > 6
     return f"{f'{whole[0]}.{whole[1:]}{part}'.rstrip('0.')}e+{len(whole) - 1:02d}" if is_large else repr(value)
 
 
