@@ -25,7 +25,9 @@ FOLDER = "dodo-report"
 """Of a job's report among its artifacts."""
 _NEEDED = ("CI_API_V4_URL", "CI_PROJECT_ID", "CI_PIPELINE_ID")
 _PATIENCE_S = 60.0
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, RuntimeError, ValueError, OSError)
+_UNREADABLE = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, RuntimeError, ValueError, LookupError, OSError
+)  # fmt: skip
 """Raised by zipfile for damage, what is encrypted or compressed in ways that it does not know, and impossible names."""
 _SHOWN_NAME = 60
 _MOST_JSON = 16 << 20
@@ -123,7 +125,7 @@ def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> list[str]:
     except _UNREADABLE as error:
         if isinstance(error, NoChildJobs):
             raise
-        said = f"its artifacts, job {number}, cannot be read ({error})"
+        said = f"its artifacts, job {number}, cannot be read ({str(error) or type(error).__name__})"
         raise NoChildJobs(f"{said}, expected a zip archive with {FOLDER}/{FILE_NAME}") from None
     finally:
         archive.unlink(missing_ok=True)
