@@ -277,8 +277,10 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
-    if checked.ok and checked.application is not None and checked.specs:
-        made = plan(checked, options.output, _searches(options), pipeline_options.job_options(options))
+    sound = checked if checked.ok else checked.sound()
+    if sound.ok and sound.application is not None and sound.specs:
+        searches = _searches(options) if sound is checked else []
+        made = plan(sound, options.output, searches, pipeline_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)

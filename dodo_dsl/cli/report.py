@@ -51,7 +51,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     from dodo_dsl.report.join import write_other_ways
 
     comparison = compare(outcomes, other) if other else None
-    circumstances = results.joined([results.Results(one.outcomes, one.circumstances) for one in reports])
+    circumstances = results.joined(reports)
     write_summaries(target, outcomes, comparison, circumstances)
     write_other_ways(target, comparison, other)
     if comparison:

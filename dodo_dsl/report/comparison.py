@@ -69,6 +69,8 @@ NEGLIGIBLE = 0.01
 
 Direction = Literal["worse", "better", "different", "unchanged"]
 """``different`` is a change of a value that has no limit, or whose limits say nothing of the direction."""
+DIRECTIONS: tuple[Direction, ...] = ("worse", "better", "different")
+"""Of changes that are shown."""
 
 
 @dataclass(frozen=True)
@@ -321,7 +323,6 @@ _MOST_TEXT = 300
 _SECTION = 3
 """Lines of a section without its items: a blank one, the title, and how many more there are."""
 _TESTS: tuple[Kind, ...] = ("newly failing", "still failing", "new", "gone", "fixed")
-_CHECKS: tuple[Direction, ...] = ("worse", "better", "different")
 
 
 def to_markdown(comparison: Comparison, matrices: Sequence[str] = ()) -> str:
@@ -331,7 +332,7 @@ def to_markdown(comparison: Comparison, matrices: Sequence[str] = ()) -> str:
     """
     sections = [(kind.capitalize(), [_test(test) for test in comparison.of(kind)]) for kind in _TESTS]
     sections.append(("Matrices", [code(line) for line in matrices]))
-    for direction in _CHECKS:
+    for direction in DIRECTIONS:
         items = [_check(test, change_words(check), check.name) for test, check in comparison.checks(direction)]
         sections.append((f"Checks: {direction}", items))
     sections = [(title, items) for title, items in sections if items]
@@ -394,9 +395,6 @@ def _check(test: TestChange, change: str, name: str) -> str:
     return f"{code(test.latest.name)} {code(name)}: {code(change)}"
 
 
-_SHOWN: tuple[Direction, ...] = ("worse", "better", "different")
-
-
 def change_lines(comparison: Comparison) -> Iterator[str]:
     """A line a test that does not pass as before, one a check whose value changed, and counts of the rest."""
     yield f"compared with {printable(comparison.other)}: {comparison.in_words()}"
@@ -408,7 +406,7 @@ def change_lines(comparison: Comparison) -> Iterator[str]:
     for test in comparison.tests:
         for what, names in (("new check", test.new_checks), ("gone check", test.gone_checks)):
             yield from (f"  {what:13}  {printable(test.latest.name)}  {printable(name)}" for name in names)
-    for direction in _SHOWN:
+    for direction in DIRECTIONS:
         for test, check in comparison.checks(direction):
             told = printable(f"{check.name}  {change_words(check)}")
             yield f"  {direction:13}  {printable(test.latest.name)}  {told}"

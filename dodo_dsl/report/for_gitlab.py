@@ -4,6 +4,7 @@ In JUnit failed is a failure, error an error, the class name is the level. The m
 compares between branches.
 """
 
+import json
 import math
 import os
 import re
@@ -112,16 +113,12 @@ def metrics_text(outcomes: Sequence[Outcome]) -> str:
     for outcome in outcomes:
         for name, value, labels in _samples(outcome):
             if value is not None:
-                found[name][",".join(f'{key}="{_label(labels[key])}"' for key in sorted(labels))] = float(value)
-    lines = [
-        line
-        for name, samples in found.items()
-        for line in (
-            f"# HELP {name} {_METRICS[name]}",
-            f"# TYPE {name} gauge",
-            *(f"{name}{{{labels}}} {_number(value)}" for labels, value in samples.items()),
-        )
-    ]
+                texts = (f"{key}={json.dumps(printable(labels[key]), ensure_ascii=False)}" for key in sorted(labels))
+                found[name][",".join(texts)] = float(value)
+    lines = list[str]()
+    for name, samples in found.items():
+        lines += [f"# HELP {name} {_METRICS[name]}", f"# TYPE {name} gauge"]
+        lines += [f"{name}{{{labels}}} {_number(value)}" for labels, value in samples.items()]
     return "\n".join([*lines, "# EOF\n"])
 
 
@@ -140,11 +137,6 @@ def _samples(outcome: Outcome) -> Iterator[tuple[str, float | None, dict[str, st
         labels = {**test, "check": check["name"], "unit": check.get("unit") or ""}
         yield "dodo_check_value", check["value"], labels
         yield "dodo_check_margin", check.get("margin"), labels
-
-
-def _label(text: str) -> str:
-    """A name or unit, which an evaluator has written, or somebody else a file of results, within quotation marks."""
-    return printable(text).replace("\\", r"\\").replace('"', r"\"")
 
 
 def _number(value: float) -> str:

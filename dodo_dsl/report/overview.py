@@ -23,7 +23,7 @@ from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, Outcome, Wait, megabytes, worst_margin
 from dodo_dsl.report import check_display
 from dodo_dsl.report import comparison as report_comparison
-from dodo_dsl.report.comparison import KINDS, Comparison
+from dodo_dsl.report.comparison import DIRECTIONS, KINDS, Comparison
 from dodo_dsl.report.instances import MatrixGrid, decisive, decisive_value, grids, worst_instances
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
 from dodo_dsl.template_cache import compiled_templates
@@ -189,7 +189,6 @@ _MOST_TEXT = 10_000
 _MOST_REPOSITORIES = 4
 _MOST_OF_A_LINE = 56
 """Characters of the reason of a test that passed, which has one line."""
-_DIRECTIONS = ("worse", "better", "different")
 
 
 def render(
@@ -231,9 +230,8 @@ def render(
             comparison=comparison,
             changed=comparison.by_slug() if comparison else {},
             words=report_comparison,
-            check_words=report_comparison,
             kinds=KINDS,
-            directions=_DIRECTIONS,
+            directions=DIRECTIONS,
             script=script,
             style=style(),
             hash=source_hash,

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from types import GenericAlias
 from typing import Annotated, Any, Literal, Union
 
 import msgspec
@@ -71,7 +72,7 @@ class ResultsError(ValueError):
     """A file without results of this version."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Circumstances:
     """What results say besides the outcomes: of which runs they are, the tests that never began, and repetitions."""
 
@@ -83,12 +84,22 @@ class Circumstances:
 NO_CIRCUMSTANCES = Circumstances()
 
 
-@dataclasses.dataclass(frozen=True)
-class Results:
-    """All that a ``results.json`` holds."""
+@dataclass(frozen=True)
+class GivenReport:
+    """The outcomes that a file holds; the files of its tests lie beside it where it is a report's."""
 
+    file: Path
     outcomes: Sequence[Outcome]
-    circumstances: Circumstances
+    circumstances: Circumstances = NO_CIRCUMSTANCES
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it may have files of its tests beside it, and not its outcomes alone."""
+        return self.file.name == FILE_NAME
+
+    @property
+    def folder(self) -> Path:
+        return self.file.parent
 
 
 def to_json(outcomes: Sequence[Outcome], circumstances: Circumstances = NO_CIRCUMSTANCES) -> str:
@@ -98,36 +109,20 @@ def to_json(outcomes: Sequence[Outcome], circumstances: Circumstances = NO_CIRCU
     return json.dumps({**head, **besides, "tests": tests}, indent=2, ensure_ascii=False) + "\n"
 
 
-def writable(outcome: Outcome) -> Outcome:
+def writable(value: Any) -> Any:
     """The same with a question mark for each character that UTF-8 cannot encode, as in the names of some files."""
-    return dataclasses.replace(
-        outcome,
-        name=_written(outcome.name),
-        spec=_written(outcome.spec),
-        description=_written(outcome.description),
-        reason=_written(outcome.reason),
-        last_lines=tuple(map(_written, outcome.last_lines)),
-        notes=tuple(map(_written, outcome.notes)),
-    )
+    if isinstance(value, str):
+        return value.encode(errors="replace").decode()
+    if isinstance(value, dict):
+        return {writable(key): writable(each) for key, each in value.items()}
+    if isinstance(value, tuple):
+        return tuple(map(writable, value))
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return value
+    return dataclasses.replace(value, **{p.name: writable(getattr(value, p.name)) for p in dataclasses.fields(value)})
 
 
-def writable_circumstances(circumstances: Circumstances) -> Circumstances:
-    """The same without characters that UTF-8 cannot encode."""
-    not_run = (
-        dataclasses.replace(test, name=_written(test.name), spec=_written(test.spec)) for test in circumstances.not_run
-    )
-    runs = (
-        dataclasses.replace(run, host=_written(run.host), command=_written(run.command)) for run in circumstances.runs
-    )
-    return Circumstances(tuple(runs), tuple(not_run), tuple(map(_writable_repeated, circumstances.repeated)))
-
-
-def _writable_repeated(repeated: Repeated) -> Repeated:
-    differing = (dataclasses.replace(d, values=tuple(map(_written, d.values))) for d in repeated.differing)
-    return dataclasses.replace(repeated, differing=tuple(differing))
-
-
-def joined(each: Sequence[Results]) -> Circumstances:
+def joined(each: Sequence[GivenReport]) -> Circumstances:
     """Those of several results together; a test that ran in one of them was not left out."""
     ran = {outcome.slug for one in each for outcome in one.outcomes}
     left = {test.slug: test for one in each for test in one.circumstances.not_run if test.slug not in ran}
@@ -135,10 +130,6 @@ def joined(each: Sequence[Results]) -> Circumstances:
     return Circumstances(
         tuple(runs), tuple(left.values()), tuple(known for one in each for known in one.circumstances.repeated)
     )
-
-
-def _written(text: str) -> str:
-    return text.encode(errors="replace").decode()
 
 
 def _rounded(test: dict[str, Any]) -> dict[str, Any]:
@@ -159,7 +150,7 @@ def load(path: Path) -> list[Outcome]:
     return list(read_results(path).outcomes)
 
 
-def read_results(path: Path) -> Results:
+def read_results(path: Path) -> GivenReport:
     """A ``results.json`` that its schema accepts; raises ResultsError."""
     try:
         document = json.loads(regular_file.text(path), parse_int=_whole)
@@ -169,7 +160,7 @@ def read_results(path: Path) -> Results:
         outcomes = msgspec.convert(document["tests"], tuple[Outcome, ...])
         if not all(is_goal(goal) for outcome in outcomes for goal in outcome.goals):
             raise ResultsError(f"{path}: a goal whose numbers make no score")
-        return Results(outcomes, msgspec.convert(document, Circumstances))
+        return GivenReport(path, outcomes, msgspec.convert(document, Circumstances))
     except FileNotFoundError as error:
         raise ResultsError(f"there is no {path}") from error
     except OSError as error:
@@ -222,8 +213,8 @@ def _checked(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Any:
     found = {name: schema[key] for key, name in bounds.items() if key in schema}
     if kind != "object":
         return Annotated[_PLAIN[kind], msgspec.Meta(**found)] if found else _PLAIN[kind]
-    key = _checked({"type": "string", **schema["propertyNames"]}, defs)
-    return Annotated[dict[key, _checked(schema["additionalProperties"], defs)], msgspec.Meta(**found)]
+    names = _checked({"type": "string", **schema["propertyNames"]}, defs)
+    return Annotated[GenericAlias(dict, (names, _checked(schema["additionalProperties"], defs))), msgspec.Meta(**found)]
 
 
 def _problems(document: Any, schema: Mapping[str, Any]) -> str:
@@ -253,24 +244,6 @@ MOST_SLUG = 240
 _SHOWN_PATH = 60
 
 
-@dataclass(frozen=True)
-class GivenReport:
-    """The outcomes that a file holds; the files of its tests lie beside it where it is a report's."""
-
-    file: Path
-    outcomes: Sequence[Outcome]
-    circumstances: Circumstances = NO_CIRCUMSTANCES
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether it may have files of its tests beside it, and not its outcomes alone."""
-        return self.file.name == FILE_NAME
-
-    @property
-    def folder(self) -> Path:
-        return self.file.parent
-
-
 def read_given(path: Path) -> GivenReport:
     """The report in a folder, or of a file; raises ResultsError, also if a slug could leave its folder."""
     is_file = not path.is_dir() and (path.is_file() or path.suffix == ".json")
@@ -280,4 +253,4 @@ def read_given(path: Path) -> GivenReport:
         if len(outcome.slug) > MOST_SLUG or not SLUG.fullmatch(outcome.slug):
             shown = outcome.slug[:_SHOWN_PATH]
             raise ResultsError(f"{file}: '{shown}' is not a slug, expected lower-case letters, digits and hyphens")
-    return GivenReport(file, found.outcomes, found.circumstances)
+    return found

@@ -131,8 +131,8 @@ def test_tests_that_never_began_have_no_outcome_and_are_skipped(tmp_path: Path) 
 
 
 def test_a_test_that_ran_in_one_report_was_not_left_out_of_the_joined_one() -> None:
-    ran = results.Results([replace(OUTCOME, slug=NOT_RUN.slug)], results.NO_CIRCUMSTANCES)
-    left = results.Results([], results.Circumstances(not_run=(NOT_RUN, replace(NOT_RUN, slug="c"))))
+    ran = GivenReport(Path(), [replace(OUTCOME, slug=NOT_RUN.slug)], results.NO_CIRCUMSTANCES)
+    left = GivenReport(Path(), [], results.Circumstances(not_run=(NOT_RUN, replace(NOT_RUN, slug="c"))))
     assert [test.slug for test in results.joined([ran, left, left]).not_run] == ["c"]
 
 
@@ -155,7 +155,7 @@ def test_results_and_page_say_of_which_run_they_are(tmp_path: Path) -> None:
 
 
 def test_joined_results_are_of_all_runs_each_once() -> None:
-    one, other = (results.Results([], results.Circumstances((run,))) for run in (RUN, replace(RUN, host="b")))
+    one, other = (GivenReport(Path(), [], results.Circumstances((run,))) for run in (RUN, replace(RUN, host="b")))
     assert [run.host for run in results.joined([one, other, one]).runs] == ["a-<host>", "b"]
 
 
