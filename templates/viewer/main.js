@@ -5,6 +5,8 @@
   const { moment } = dodo.data.test;
   const part = (id) => document.getElementById(id);
   dodo.header.show(part);
+  // without a recording the log is all there is
+  document.body.classList.toggle("unrecorded", !dodo.data.test.isRecorded);
   if (dodo.data.test.duration > 0) dodo.transport.show(part("transport"));
   dodo.camera.show(part("scene"));
   dodo.map.show(part("scene"));
