@@ -72,28 +72,21 @@ def read_history(folder: Path) -> Past:
 
 
 def curve(past: Past, slug: str, check: Mapping[str, Any]) -> Markup:
-    """A check's values as a picture; empty with fewer than two of them, and for what is not a history."""
+    """A check's values as a picture; empty without two different ones, and for what is not a history."""
     try:
         values = [float(run["checks"][check["name"]]) for run in past.get(slug, ()) if check["name"] in run["checks"]]
         limits = [float(limit) for limit in (check.get("limit") or {}).values()]
     except (TypeError, KeyError, ValueError, AttributeError):
         return Markup()
-    if len(values) < 2 or not all(map(math.isfinite, values)):
+    if len(set(values)) < 2 or not all(map(math.isfinite, values)):
         return Markup()
     return _svg(values, limits)
 
 
 def history(past: Past, slug: str, checks: Sequence[Mapping[str, Any]]) -> list[tuple[Mapping[str, Any], Markup]]:
     """The curves of those checks of a test that have a limit and did not have the same value each time."""
-    drawn = ((check, curve(past, slug, check)) for check in checks if check.get("limit") and _varies(past, slug, check))
+    drawn = ((check, curve(past, slug, check)) for check in checks if check.get("limit"))
     return [(check, picture) for check, picture in drawn if picture]
-
-
-def _varies(past: Past, slug: str, check: Mapping[str, Any]) -> bool:
-    try:
-        return len({run["checks"].get(check["name"]) for run in past.get(slug, ())} - {None}) > 1
-    except (TypeError, KeyError, AttributeError):
-        return False
 
 
 def _svg(values: Sequence[float], limits: Sequence[float]) -> Markup:
@@ -102,8 +95,7 @@ def _svg(values: Sequence[float], limits: Sequence[float]) -> Markup:
     low, high = min([low, *near]), max([high, *near])
 
     def y(value: float) -> int:
-        share = (value - low) / (high - low) if high > low else 0.5
-        return round(_HEIGHT - _EDGE - share * (_HEIGHT - 2 * _EDGE))
+        return round(_HEIGHT - _EDGE - (value - low) / (high - low) * (_HEIGHT - 2 * _EDGE))
 
     step = (_WIDTH - 2 * _EDGE) / (len(values) - 1)
     points = [(round(_EDGE + n * step), y(value)) for n, value in enumerate(values)]

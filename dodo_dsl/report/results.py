@@ -132,14 +132,10 @@ def joined(each: Sequence[GivenReport]) -> Circumstances:
     )
 
 
-def _rounded(test: dict[str, Any]) -> dict[str, Any]:
+def _rounded(value: Any, name: str = "") -> Any:
     """Rounds durations and shares to 0.001, which is more than the precision of the measurement."""
-    return {name: _rounded_value(name, value) for name, value in test.items()}
-
-
-def _rounded_value(name: str, value: Any) -> Any:
     if isinstance(value, dict):
-        return _rounded(value)
+        return {key: _rounded(each, key) for key, each in value.items()}
     if name == "resources":
         return [_rounded(use) for use in value]
     return round(value, 3) if name.endswith(("_s", "_share")) and value is not None else value
