@@ -5,7 +5,6 @@ Source: https://docs.gitlab.com/api/jobs/ and https://docs.gitlab.com/api/job_ar
 
 import json
 import lzma
-import shutil
 import stat
 import urllib.error
 import urllib.request
@@ -30,6 +29,7 @@ _UNREADABLE = (
 )  # fmt: skip
 """Raised by zipfile for damage, what is encrypted or compressed in ways that it does not know, and impossible names."""
 _SHOWN_NAME = 60
+_PART = 1 << 20
 _MOST_JSON = 16 << 20
 _MOST_PAGES = 100
 
@@ -96,16 +96,12 @@ def fetch(pipeline: ParentPipeline, folder: Path) -> tuple[list[GivenReport], li
             name, number = str(job["name"]), int(job["id"])
             place = folder / str(number)
             try:
-                outside = _fetch(pipeline, number, place) if job.get("artifacts_file") else []
+                if job.get("artifacts_file"):
+                    _fetch(pipeline, number, place)
                 if (place / FOLDER).is_dir():
                     reports.append(read_given(place / FOLDER))
                 elif job.get("artifacts_file") or job.get("status") != "success":
                     sentences.append(f"job '{name}' has no report")
-                if outside:
-                    more = f" and {len(outside) - 1} more" if len(outside) > 1 else ""
-                    sentences.append(
-                        f"job '{name}': '{outside[0]}'{more} of its artifacts are left out: outside {FOLDER}"
-                    )
             except (NoChildJobs, ResultsError) as problem:
                 sentences.append(f"job '{name}' is left out: {str(problem).replace(f'{place}/', '')}")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -113,34 +109,33 @@ def fetch(pipeline: ParentPipeline, folder: Path) -> tuple[list[GivenReport], li
     return reports, sentences
 
 
-def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> list[str]:
-    """Writes the report among a job's artifacts; returns the names of those that would have been written elsewhere."""
+def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> None:
+    """Writes the report among a job's artifacts; raises NoChildJobs."""
     folder.mkdir()
     archive = folder / "artifacts.zip"
     try:
         with pipeline.opened(f"jobs/{number}/artifacts") as response, archive.open("xb") as file:
             _copy(response, file, MOST_BYTES)
         with zipfile.ZipFile(archive) as opened:
-            return list(_extract(opened, folder))
+            _extract(opened, folder)
+    except NoChildJobs:
+        raise
     except _UNREADABLE as error:
-        if isinstance(error, NoChildJobs):
-            raise
         said = f"its artifacts, job {number}, cannot be read ({str(error) or type(error).__name__})"
         raise NoChildJobs(f"{said}, expected a zip archive with {FOLDER}/{FILE_NAME}") from None
     finally:
         archive.unlink(missing_ok=True)
 
 
-def _extract(archive: zipfile.ZipFile, folder: Path) -> Iterator[str]:
-    """Writes the regular files of the report; yields the names that do not stay inside."""
+def _extract(archive: zipfile.ZipFile, folder: Path) -> None:
+    """The regular files of the report; a name that would not stay inside is no artifact of GitLab's."""
     left = MOST_BYTES
     for entry in archive.infolist():
         path = PurePosixPath(entry.filename)
         mode = entry.external_attr >> 16
-        is_file = not entry.is_dir() and (stat.S_ISREG(mode) or not stat.S_IFMT(mode))
-        if ".." in path.parts or path.is_absolute():
-            yield entry.filename[:_SHOWN_NAME]
-        elif is_file and path.parts[:1] == (FOLDER,):
+        if path.is_absolute() or ".." in path.parts:
+            raise ValueError(f"'{entry.filename[:_SHOWN_NAME]}' lies outside")
+        if path.parts[:1] == (FOLDER,) and not entry.is_dir() and (stat.S_ISREG(mode) or not stat.S_IFMT(mode)):
             target = folder / path
             target.parent.mkdir(parents=True, exist_ok=True)
             with archive.open(entry) as content, target.open("xb") as file:
@@ -148,19 +143,9 @@ def _extract(archive: zipfile.ZipFile, folder: Path) -> Iterator[str]:
 
 
 def _copy(source: IO[bytes], target: IO[bytes], most: int) -> int:
-    shutil.copyfileobj(_Limited(source, most), target)
-    return target.tell()
-
-
-class _Limited:
-    """A stream of at most ``left`` bytes; raises NoChildJobs beyond them."""
-
-    def __init__(self, stream: IO[bytes], left: int) -> None:
-        self._stream, self._left = stream, left
-
-    def read(self, size: int = -1) -> bytes:
-        data = self._stream.read(size)
-        self._left -= len(data)
-        if self._left < 0:
+    """Copies at most so many bytes, and returns how many; raises NoChildJobs beyond them."""
+    while data := source.read(_PART):
+        if target.tell() + len(data) > most:
             raise NoChildJobs("the artifacts are larger than a report may be")
-        return data
+        target.write(data)
+    return target.tell()
