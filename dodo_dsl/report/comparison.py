@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import Outcome, differs_each_run, with_margin
+from dodo_dsl.outcome import Outcome, differs_each_run, numbered, with_margin
 from dodo_dsl.report.results import GivenReport
 from dodo_dsl.terminal import printable
 
@@ -260,7 +260,7 @@ def compare(outcomes: Sequence[Outcome], other: GivenReport) -> Comparison:
 def _change(before: Outcome | None, after: Outcome | None) -> TestChange:
     if before is None or after is None:
         return TestChange("new" if before is None else "gone", before, after)
-    was, now = _numbered(before.checks), _numbered(after.checks)
+    was, now = numbered(before.checks), numbered(after.checks)
     return TestChange(
         _kind(before.outcome == "passed", after.outcome == "passed"),
         before,
@@ -275,18 +275,6 @@ def _kind(was_passed: bool, is_passed: bool) -> Kind:
     if was_passed:
         return "still passing" if is_passed else "newly failing"
     return "fixed" if is_passed else "still failing"
-
-
-def _numbered(checks: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], Mapping[str, Any]]:
-    """By name, and how many of that name came before it, as several evaluators may have one."""
-    return dict(_keys(checks))
-
-
-def _keys(checks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[tuple[str, int], Mapping[str, Any]]]:
-    counts: Counter[str] = Counter()
-    for check in checks:
-        yield (check["name"], counts[check["name"]]), check
-        counts[check["name"]] += 1
 
 
 def value_text(number: float | None, unit: str) -> str:
