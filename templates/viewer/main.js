@@ -5,11 +5,11 @@
   const { moment } = dodo.data.test;
   const part = (id) => document.getElementById(id);
   dodo.header.show(part);
-  // without a recording the log is all there is
-  document.body.classList.toggle("unrecorded", !dodo.data.test.isRecorded);
   if (dodo.data.test.duration > 0) dodo.transport.show(part("transport"));
   dodo.camera.show(part("scene"));
   dodo.map.show(part("scene"));
+  const isBare = !part("scene").firstChild && dodo.data.channels.every((each) => each.message.startsWith("dodo."));
+  document.body.classList.toggle("unrecorded", isBare);
   dodo.signals.show(part("signals"));
   dodo.log.show(part("log"));
   dodo.checks.show(part("checks"));
