@@ -128,7 +128,7 @@ def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> None:
 
 
 def _extract(archive: zipfile.ZipFile, folder: Path) -> None:
-    """The regular files of the report; a name that would not stay inside is no artifact of GitLab's."""
+    """The regular files of the report; names that would not stay inside are refused."""
     left = MOST_BYTES
     for entry in archive.infolist():
         path = PurePosixPath(entry.filename)

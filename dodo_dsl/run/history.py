@@ -63,10 +63,7 @@ def _repository() -> str:
 
 
 class History:
-    """A file with a line of JSON for each run of a test. Nothing is kept where it cannot be read or written.
-
-    ``runs`` are those in this repository: others have tests of the same names.
-    """
+    """The ``runs`` in this repository, of a file with a line of JSON each, as far as it can be read and written."""
 
     def __init__(self, path: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         """``clock`` gives seconds since the epoch."""

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import jsonschema
 import msgspec
 import pytest
+from junitparser import TestSuite
 
 from dodo_dsl import package_data
 from dodo_dsl.outcome import MachineLoad, NotRun, Response, ServiceUse, Wait
@@ -161,6 +162,15 @@ def test_results_and_page_say_of_which_run_they_are(tmp_path: Path) -> None:
 def test_joined_results_are_of_all_runs_each_once() -> None:
     one, other = (GivenReport(Path(), [], results.Circumstances((run,))) for run in (RUN, replace(RUN, host="b")))
     assert [run.host for run in results.joined([one, other, one]).runs] == ["a-<host>", "b"]
+
+
+def test_cases_are_counted_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the time of thousands of tests goes into that."""
+    counted: list[int] = []
+    count = TestSuite.update_statistics
+    monkeypatch.setattr(TestSuite, "update_statistics", lambda suite: counted.append(len(suite)) or count(suite))
+    write_summaries(tmp_path, [replace(OUTCOME, slug=f"test-{n}") for n in range(9)])
+    assert counted == [9]
 
 
 WHOLE = replace(
