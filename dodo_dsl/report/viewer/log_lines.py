@@ -103,7 +103,7 @@ def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:
 
 
 def _test_times(walls: Sequence[int], test: RecordedTest) -> list[float]:
-    """Times of the machine in the test's: within a test as messages show it, else by its clock, maybe beyond ``FAR``."""
+    """Times of the machine in the test's: within a test as messages show it, else by its clock, or beyond ``FAR``."""
     if not len(test.walls):
         return [(wall - test.begin) / MICROSECONDS for wall in walls]
     arrived = np.array(walls, np.float64)
