@@ -104,6 +104,12 @@ class Checked:
     def ok(self) -> bool:
         return not has_errors(self.diagnostics)
 
+    def sound(self) -> "Checked":
+        """The same with those tests alone in whose specs there is no error."""
+        found = (*self.problems.as_read.items(), *self.problems.by_rules.items())
+        broken = {path for path, problems in found if has_errors(problems)}
+        return narrowed(self, [spec for spec in self.specs if spec.path not in broken])
+
 
 @dataclass(frozen=True)
 class Compilation:

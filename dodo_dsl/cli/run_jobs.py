@@ -25,6 +25,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import named, runs
 from dodo_dsl.plan.test_files import file_problem
+from dodo_dsl.report.results import FILE_NAME
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.history import History
 from dodo_dsl.search.space import space_of, sweep
@@ -132,20 +133,32 @@ def _deployment(stdout: TextIO) -> Deployment:
 
 
 def _usable(report: Path, slugs: Sequence[str]) -> Path:
-    """The report's folder, made, and then left out of git; a folder of specs or of compiled tests is refused."""
+    """The report's folder, made, and then left out of git; a folder with files of others and no report is refused."""
     is_new = not report.exists()
     try:
         report.mkdir(parents=True, exist_ok=True)
         if is_new:
             atomic.write_text(report / ".gitignore", "*\n")
+        is_ours = not any(report.iterdir()) or any(
+            map(_is_written_by_dodo, (report / ".gitignore", report / FILE_NAME))
+        )
     except OSError as error:
         raise UsageError(f"'{report}' cannot take the report: {error.strerror}") from error
     for slug in slugs:
         if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
             raise UsageError(f"'{report}' holds tests; name another folder with --report")
+    if not is_ours:
+        raise UsageError(f"'{report}' holds other files and no report; name a new or empty folder with --report")
     if not os.access(report, os.W_OK):
         raise UsageError(f"'{report}' cannot take the report: no write permission")
     return report.resolve()
+
+
+def _is_written_by_dodo(file: Path) -> bool:
+    try:
+        return regular_file.text(file).startswith(("*\n", '{\n  "dodo": "results"'))
+    except (OSError, ValueError):
+        return False
 
 
 def _load_plan(folder: Path, settings: Settings) -> Plan:

@@ -84,7 +84,7 @@ def meaning(check: Check, others: Collection[str] = ()) -> str:
         return f"{found}; the limit is the recorded value with its tolerance" if found else ""
     if name == "distance" and "mean" in others:
         return _FROM_TARGET
-    if "delay" in others and name in _OF_RESPONDS:
+    if name in _OF_RESPONDS and "delay" in others:
         return _OF_RESPONDS[name]
     prefixed = (words for prefix, words in _PREFIXES.items() if name.startswith(f"{prefix}-"))
     return MEANINGS.get(name) or next(prefixed, "")

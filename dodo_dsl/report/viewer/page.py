@@ -166,7 +166,6 @@ def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict
         "version": VERSION,
         "test": _facts(outcome),
         "duration": test.duration,
-        "isRecorded": bool(test.channels),
         "moment": dataclasses.asdict(moment.decisive(outcome, test.duration)),
         "checks": list(checks(plan, outcome, SpecLines(), record.parameters)),
         "scene": scene(plan, compiled, record.way or Way()),
