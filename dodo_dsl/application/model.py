@@ -64,11 +64,15 @@ class Declared:
 
 @dataclass(frozen=True)
 class EnvFile:
-    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file."""
+    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file.
+
+    ``raw`` is the format whose values are as they are written.
+    """
 
     path: str
     span: Span
     required: bool
+    raw: bool = False
 
 
 @dataclass(frozen=True)
@@ -256,11 +260,11 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
     """The files of ``env_file``."""
     node = service.get("env_file")
     for item in node.items if isinstance(node, source.Sequence) else (node,):
-        path = item.get("path") if isinstance(item, source.Mapping) else item
-        required = item.get("required") if isinstance(item, source.Mapping) else None
+        about = item.get if isinstance(item, source.Mapping) else {"path": item}.get
+        path, required, form = about("path"), about("required"), about("format")
         if isinstance(path, Scalar) and isinstance(path.value, str):
             optional = isinstance(required, Scalar) and not is_true(required.value)
-            yield EnvFile(path.text, path.span, not optional)
+            yield EnvFile(path.text, path.span, not optional, isinstance(form, Scalar) and form.value == "raw")
 
 
 def cid_variables(files: Iterable[EnvFile], folder: Path) -> tuple[str, ...]:
@@ -268,5 +272,5 @@ def cid_variables(files: Iterable[EnvFile], folder: Path) -> tuple[str, ...]:
     found: set[str] = set()
     for file in files:
         if not file.path.startswith(("/", "~", "$")):
-            found |= set(variables_of(folder / file.path))
+            found |= set(variables_of(folder / file.path, raw=file.raw))
     return tuple(v for v in CID_VARIABLES if v in found)

@@ -15,7 +15,7 @@ from dodo_dsl.application.access.findings import shared_findings
 from dodo_dsl.application.access.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.access.model import Access, Look, diagnostic
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
-from dodo_dsl.application.compose_files import ComposeFiles
+from dodo_dsl.application.compose_files import ComposeFiles, dotenv_problems
 from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, env_files, plain
@@ -82,7 +82,8 @@ def read_application(
     withheld = secret_problems.withheld(nodes, files.variables, access.passed, os.environ)
     found.extend(problem for problem in withheld if problem.span not in refused)
     found.extend(secret_problems.written([document]))
-    found.extend(secret_problems.in_files(_own_files(application)))
+    for file, raw in _own_files(application):
+        found.extend((*dotenv_problems(file, raw=raw), *secret_problems.in_file(file, raw)))
     found.extend(secret_problems.left_out(files.secrets))
     return (None if has_errors(found) else application), found
 
@@ -156,12 +157,12 @@ def _shared(document: source.Mapping, application: ApplicationSource) -> Iterato
         yield diagnostic(finding, document, document.span)
 
 
-def _own_files(application: ApplicationSource) -> list[Path]:
-    """The files of ``env_file`` that the application may read, each once."""
-    words = {file.path for service in application.services.values() for file in service.env_files}
-    texts = sorted(interpolated(word, application.known) for word in words)
-    own = (text for text in texts if "$" not in text and application.paths.is_own(text))
-    return list(dict.fromkeys(Path(application.paths.whole(text)) for text in own))
+def _own_files(application: ApplicationSource) -> list[tuple[Path, bool]]:
+    """The files of ``env_file`` that the application may read, each once, and whether they are raw."""
+    words = {(file.path, file.raw) for service in application.services.values() for file in service.env_files}
+    texts = sorted((interpolated(word, application.known), raw) for word, raw in words)
+    own = ((text, raw) for text, raw in texts if "$" not in text and application.paths.is_own(text))
+    return list(dict.fromkeys((Path(application.paths.whole(text)), raw) for text, raw in own))
 
 
 def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:

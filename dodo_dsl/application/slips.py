@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.interpolation import VARIABLE, end_of_variable
+from dodo_dsl.application.interpolation import slip_in
 from dodo_dsl.application.model import ComposeService, text
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
 from dodo_dsl.source import Scalar
@@ -27,8 +27,6 @@ INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 _SCRIPTS = {".py": "python", ".sh": "sh", ".js": "node", ".pl": "perl", ".rb": "ruby"}
 _FILLED = ("services", "volumes", "networks", "secrets", "configs")
 """The top-level keys below which compose fills in variables."""
-_WITHOUT_OPERATOR = re.compile(r"\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*):=?(?P<word>[^-?+}:=][^{}]*)\}")
-_SHOWN = 60
 
 
 def words(service: ComposeService) -> Iterator[Word]:
@@ -153,30 +151,3 @@ def variable_problems(document: source.Mapping) -> Iterator[Diagnostic]:
         for part in source.walk(node) if node else ():
             if isinstance(part, Scalar) and isinstance(part.value, str) and (slip := slip_in(part.value)):
                 yield Diagnostic(part.span, "application-file", *slip)
-
-
-def slip_in(text: str) -> tuple[str, str] | None:
-    """What is wrong with the first such variable, and a hint; defaults are looked at, too."""
-    place = text.find("$")
-    while place >= 0:
-        end = end_of_variable(text, place)
-        match = VARIABLE.fullmatch(text, place, end)
-        if match is None and text[place + 1 : place + 2] == "{":
-            return _slip(text[place:end])
-        if match and (inner := slip_in(match["word"] or "")):
-            return inner
-        place = text.find("$", end)
-    return None
-
-
-def _slip(written: str) -> tuple[str, str]:
-    shown = written[:_SHOWN]
-    if written.count("{") != written.count("}"):
-        return "'${' is not closed", f"write '{written.split(maxsplit=1)[0][:_SHOWN]}}}'"
-    if written == "${}":
-        return "'${}' names no variable", "for example ${GAIN:-1}, or $${} for the text itself"
-    known = _WITHOUT_OPERATOR.fullmatch(written)
-    if known:
-        return f"'{shown}' is not a variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
-    what = "the name of a variable has letters, digits and underscores"
-    return f"'{shown}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"
