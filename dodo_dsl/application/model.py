@@ -211,6 +211,13 @@ def environment(raw: Any) -> dict[str, str | None]:
     return {str(k): None if v is None else text(v) for k, v in (raw or {}).items()}
 
 
+def declared_cid(node: source.Mapping) -> Scalar | None:
+    """What ``x-dodo`` of a document or of a service says to be built in."""
+    about = node.get("x-dodo")
+    cid = about.get("cid") if isinstance(about, source.Mapping) else None
+    return cid if isinstance(cid, Scalar) else None
+
+
 def declared(service: source.Mapping) -> Declared | None:
     """The declaration of a service; None without ``x-dodo``."""
     entry = service.entries.get("x-dodo")

@@ -18,7 +18,7 @@ from dodo_dsl.application.application_problems import application_problems, unkn
 from dodo_dsl.application.compose_files import ComposeFiles, dotenv_problems
 from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
 from dodo_dsl.application.load import as_item, load, unread
-from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, env_files, plain
+from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, declared_cid, env_files, plain
 from dodo_dsl.application.model import declared as declaration_of
 from dodo_dsl.application.slips import variable_problems
 from dodo_dsl.application.variables import tunable_problems
@@ -136,17 +136,8 @@ def _application(
         access=access,
         limits=limits,
         left_out=left_out,
-        cids=tuple(_declared_cids([document, *(service.node for service in kept.values())])),
+        cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
     )
-
-
-def _declared_cids(nodes: Iterable[source.Mapping]) -> Iterator[source.Scalar]:
-    """What ``x-dodo`` of the document and of its services says to be built in."""
-    for node in nodes:
-        about = node.get("x-dodo")
-        cid = about.get("cid") if isinstance(about, source.Mapping) else None
-        if isinstance(cid, source.Scalar):
-            yield cid
 
 
 def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:

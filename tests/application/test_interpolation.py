@@ -22,7 +22,8 @@ FILES: tuple[tuple[str, dict[str, str] | int], ...] = (
     (r'''A="x\\y \"q\" l\nm $$A \$A \q\a\0123\0777\012"''', {"A": 'x\\y "q" l\nm $A $A \\q\aS\\777\\12'}),
     (r"A='a\nb $PLAIN it\'s ${'", {"A": "a\\nb $PLAIN it's ${"}),
     ('A="first\nsecond" B=2\r\nC="x\r\ny"z\nD=3\r\n', {"A": "first\nsecond", "B": "2", "C": "x\r\ny", "D": "3"}),
-    ("OUTSIDE\nABSENT\nA=x\nA=$A:y\nA\nO=$OUTSIDE-$1 $ ${OUTSIDE:+z}\n", {"OUTSIDE": "out", "A": "x:y", "O": "out-$1 $ z"}),
+    ("OUTSIDE\nABSENT\nA=x\nA=$A:y\nA\nO=$OUTSIDE-$1 $ ${OUTSIDE:+z}\n", {
+        "OUTSIDE": "out", "A": "x:y", "O": "out-$1 $ z"}),
     ("\ufeffA={\"a\": [1]}\nB=a\\nb\\\\\nC=`c` $(c)", {"A": '{"a": [1]}', "B": "a\\nb\\\\", "C": "`c` $(c)"}),
     ("A=1\nA B=1", 2), ("A;B=1", 1), ("A='it's'", 1), ('\nA="open\nB=1', 2), ("A='", 1),
     ("A=1\nB=${OPEN\nC=2", 2), ('A="${OPEN"', 1), ("A=${}", 1), ("A=${1}", 1), ("A=${B:=1}", 1), ('A="${B:-x\ny}"', 1),
@@ -64,7 +65,8 @@ def test_dotenv_files_are_read_as_compose_reads_them(tmp_path: Path, monkeypatch
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (b'A="x # y"\n B=$HOME \r\n# c\nOUTSIDE\nC=a # b\nABSENT', {"A": '"x # y"', "B": "$HOME ", "OUTSIDE": "out", "C": "a # b"}),
+        (b'A="x # y"\n B=$HOME \r\n# c\nOUTSIDE\nC=a # b\nABSENT', {
+            "A": '"x # y"', "B": "$HOME ", "OUTSIDE": "out", "C": "a # b"}),
         (b"A=1\nB =2", 2),
         (b"=1", 1),
         (b"A=\xff", 1),
