@@ -12,10 +12,11 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from dodo_dsl import source
 from dodo_dsl.application import stack
-from dodo_dsl.application.application_problems import takes_cid
+from dodo_dsl.application.application_problems import on_other_buses, takes_cid, written_cids
 from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.pictures import pictures_of
@@ -32,7 +33,12 @@ _SKIPPED = ("build", "node_modules", "third_party", "venv")
 _COMMENTS = re.compile(r"/\*.*?(?:\*/|\Z)|(?://|#(?!include))[^\n]*", re.DOTALL)
 """Also one without an end, which the search would begin again in each place."""
 _MESSAGE = re.compile(r"opendlv(?:::|_|\.)proxy(?:::|_|\.)(?P<name>[A-Z][A-Za-z]+)")
-_HEARD = re.compile(r"dataTrigger\s*\(\s*opendlv::proxy::(?P<name>[A-Z][A-Za-z]+)::ID")
+_HEARD = re.compile(
+    r"opendlv::proxy::([A-Z][A-Za-z]+)::ID\b"
+    r"|extractMessage\s*<\s*opendlv::proxy::([A-Z][A-Za-z]+)\s*>"
+    r"|(?P<variable>\b\w+)\s*=\s*[\w.]*opendlv(?:_|\.)proxy(?:_|\.)([A-Z][A-Za-z]+)\(\)\s*(?P=variable)\.(?:Parse|Merge)From"
+)
+"""What a program compares with a message's id, or takes out of an envelope."""
 _SENDS = re.compile(r"\.\s*send\s*\(")
 _CID = re.compile(r"\bOD4Session\s*(?:\w+\s*)?[({]\s*(?:cid\s*=\s*)?(?P<cid>[0-9]{1,3})\b")
 _PLAIN = re.compile(r"[A-Za-z][\w.-]*", re.ASCII)
@@ -92,36 +98,55 @@ class Declarable:
     services: dict[str, str] = field(default_factory=dict)
 
 
+def has_own(file: Path) -> bool:
+    """Whether a compose file, if it can be read, has a service that is none of the stack's."""
+    application = as_written(file)
+    return application is None or any(True for _ in _own(application))
+
+
 def declarable(file: Path) -> Declarable | None:
     """None if the name of the file says all."""
     application = as_written(file)
     if application is None:
         return None
     without = {_item(name): part.instead for name, (_, part) in stack.parts(application).items()}
-    services = {_item(each.name): text for each in _own(application) if (text := _said(each, application))}
+    found = [_found(service, application) for service in _own(application)]
+    others = on_other_buses([each.cids for each in found])
+    for each in found:
+        if each.cids in others:
+            without[_item(each.name)] = f"it is on CID {', '.join(map(str, sorted(each.cids)))}, another bus"
+    services = {_item(each.name): each.said for each in found if each.said and each.cids not in others}
     return Declarable(_item(file.name), without, services) if without or services else None
 
 
-def _said(service: ComposeService, application: ApplicationSource) -> str:
-    """The keys of x-dodo that a service's sources show, where its compose file has none."""
-    build = service.node.get("build")
+class _Found(NamedTuple):
+    """What a service's sources and commands show: its CIDs, and keys of x-dodo that its compose file lacks."""
+
+    name: str
+    cids: set[int]
+    said: str = ""
+
+
+def _found(service: ComposeService, application: ApplicationSource) -> _Found:
+    build, cids = service.node.get("build"), written_cids(service, application)
     context = build.get("context") if isinstance(build, source.Mapping) else build
     if service.declared or not isinstance(context, source.Scalar) or not is_local(context.text):
-        return ""
+        return _Found(service.name, cids)
     if not application.paths.is_own(context.text):
-        return ""
+        return _Found(service.name, cids)
     texts = list(_sources(application.folder / context.text))
-    heard = {match["name"] for text in texts for match in _HEARD.finditer(text)}
+    heard = {name for text in texts for match in _HEARD.finditer(text) for name in match.group(1, 2, 4) if name}
     named = {match["name"] for text in texts if _SENDS.search(text) for match in _MESSAGE.finditer(text)}
     keys = {
         "in": sorted(name for name in heard if name.endswith("Reading")),
         "out": sorted(name for name in named - heard if name.endswith("Request")),
     }
     said = [f"{key}: [{', '.join(f'opendlv.proxy.{n}' for n in names)}]" for key, names in keys.items() if names]
-    built_in = [match["cid"] for text in texts for match in _CID.finditer(text)]
+    built_in = [int(match["cid"]) for text in texts for match in _CID.finditer(text)]
     if built_in and not takes_cid(service):
-        said.append(f"cid: {int(built_in[0])}")
-    return f"{{{', '.join(said)}}}" if said else ""
+        said.append(f"cid: {built_in[0]}")
+        cids = {built_in[0]}
+    return _Found(service.name, cids, f"{{{', '.join(said)}}}" if said else "")
 
 
 def _sources(folder: Path) -> Iterator[str]:
