@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application import host_access, opendlv_flags, stack
+from dodo_dsl.application import compose_paths, host_access, opendlv_flags, stack
 from dodo_dsl.application.access.findings import service_findings
 from dodo_dsl.application.access.model import Look, diagnostic, place
 from dodo_dsl.application.compose_files import variables_of
@@ -264,7 +264,7 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _display, _commands, _references, _conditions, _volumes, _access, _single, _engine):
+    for rule in (_name, _display, _commands, _references, _conditions, _volumes, _unmounted, _access, _single, _engine):
         yield from rule(written)
 
 
@@ -369,6 +369,22 @@ def _volumes(written: Written) -> Iterator[Diagnostic]:
             near = only_fix(name, known)
             fix = Fix(f"{name}:/", f"{near.new}:/") if near and isinstance(volume, str) else near
             yield _bad(place(written.node, steps, written.key), message, hint, fix)
+
+
+def _unmounted(written: Written) -> Iterator[Diagnostic]:
+    """A warning of volumes that a process lacks; machine and test have the same ``/tmp`` and devices."""
+    for item, volume in enumerate(written.plain.get("volumes") or () if KEYS[1] in written.plain else ()):
+        found = host_access.mount(volume)
+        of_machine = (host_access.is_shared_memory, host_access.is_hardware, host_access.is_machine)
+        if found.below("/tmp") or found.source == found.target or any(check(found) for check in of_machine):
+            continue
+        message = f"the process of '{written.name}' has no '{found.target}', as volumes are mounted in containers only"
+        own = f"where '{found.source}' is" if compose_paths.is_path(found.source) else "which it may write to"
+        hint = f"it starts in the folder of this file, {own}: name that in its command, or run with --backend docker"
+        yield Diagnostic(
+            place(written.node, ("volumes", item), written.key), "application-file", message, hint, "warning"
+        )
+        return
 
 
 def _access(written: Written) -> Iterator[Diagnostic]:

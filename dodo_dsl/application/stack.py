@@ -31,7 +31,7 @@ class Part(NamedTuple):
 
 STACK = (
     Part(
-        r"(opendlv-)?(vehicle-view|signal-viewer)|opendlv-ui-.+",
+        r"opendlv-vehicle-view|opendlv-signal-viewer|opendlv-ui-.+",
         "dodo run records each test, and its report replays it on a page",
     ),
     Part(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import wiring_rules
@@ -128,7 +129,7 @@ def _size(path: Path, recording: Recording, messages: MessageSet, camera: int) -
     return image.width, image.height
 
 
-def _played_gaps(path: Path, gaps: Numbers, target: MessageStream | None) -> Numbers:
+def _played_gaps(path: Path, gaps: NDArray[np.float64], target: MessageStream | None) -> NDArray[np.float64]:
     """Times between messages in s as a player has them; raises UsageError where no test can have them."""
     if gaps.max(initial=0) > LONGEST_GAP_S and target is None:
         gaps = np.minimum(gaps, DEFAULT_GAP_S)

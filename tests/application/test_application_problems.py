@@ -142,3 +142,18 @@ def test_what_is_on_both_buses_joins_them() -> None:
     on = {"a": "--cid=111", "relay": "--cid-from=112 --cid-to=111", "b": "--cid=112", "c": "--cid=113"}
     found = messages(", ".join(f"{name}: {{image: x, command: {words}}}" for name, words in on.items()))
     assert [message.partition(",")[0] for message in found] == ["'relay' is on CID 111 and 112", "'c' is on CID 113"]
+
+
+@pytest.mark.parametrize(
+    ("volumes", "lacks"),
+    [
+        ("/tmp:/tmp, /dev/shm:/dev/shm, /dev/video0:/dev/video0, /sys:/sys:ro, /tmp/.X11-unix:/tmp/.X11-unix", ""),
+        ("/tmp:/tmp, './config:/opt/config:ro', data:/data", "/opt/config"),
+        ("{type: bind, source: ./models, target: /models}", "/models"),
+    ],
+)
+def test_volumes_that_a_process_lacks(volumes: str, lacks: str) -> None:
+    service = f"a: {{image: x, command: --cid=1, volumes: [{volumes}], x-dodo-process: [python, -m, x]}}"
+    found = [message for message in messages(service) if "containers only" in message]
+    assert found == [f"the process of 'a' has no '{lacks}', as volumes are mounted in containers only"] * bool(lacks)
+    assert not [m for m in messages(service.replace(", x-dodo-process: [python, -m, x]", "")) if "containers only" in m]

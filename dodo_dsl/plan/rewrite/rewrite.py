@@ -124,6 +124,7 @@ def _planned(service: ComposeService, cid: int, application: ApplicationSource) 
         if name in variables or name in service.cid_variables:
             variables[name] = str(cid)
     process, own = raw.get("x-dodo-process"), service.declared
+    command = opendlv_flags.arguments(list(map(str, process or ())), command)
     words = (*(process or ()), *command)
     return ApplicationService(
         name=service.name,
