@@ -100,7 +100,7 @@ cluon::OD4Session od4{112, [](cluon::data::Envelope &&e) {
     ("services", "left_out"),
     [
         ("view: {image: opendlv-vehicle-view}, dec: {image: 'h264decoder:v1'}", ["view", "dec"]),
-        (f"a: {{image: a, {ALL}}}, b: {{image: b, command: --cid=112}}, view: {{image: opendlv-vehicle-view}}", ["view", "b"]),
+        (f"a: {{image: a, {ALL}}}, b: {{image: b, command: --cid=112}}, v: {{image: opendlv-ui-x}}", ["v", "b"]),
         (f"a: {{image: a, {ALL}}}, b: {{build: src, environment: {{CID: 112}}}}", ["b"]),
         (f"a: {{image: a, {ALL}}}, b: {{build: src}}", ["b"]),
         ("b: {build: src}", []),
