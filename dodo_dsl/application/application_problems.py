@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application import compose_paths, host_access, opendlv_flags, stack
+from dodo_dsl.application import host_access, opendlv_flags, stack
 from dodo_dsl.application.access.findings import service_findings
 from dodo_dsl.application.access.model import Look, diagnostic, place
 from dodo_dsl.application.compose_files import variables_of
@@ -27,7 +27,6 @@ from dodo_dsl.application.model import (
     environment,
     image_variable,
     plain,
-    text,
 )
 from dodo_dsl.application.mounts import missing_folders, nested_mounts
 from dodo_dsl.application.slips import cid_slips, missing_program, words
@@ -217,14 +216,9 @@ def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
 
 def takes_cid(service: ComposeService) -> bool:
     """Whether the CID of a service can be set."""
-    raw = plain(service.node)
-    variables = environment(raw.get("environment"))
-    words = [*_words(raw.get("entrypoint")), *_words(raw.get("command")), *(v for v in variables.values() if v)]
-    return opendlv_flags.takes_cid(words, {**variables, **dict.fromkeys(service.cid_variables)})
-
-
-def _words(command: Any) -> list[str]:
-    return [command] if isinstance(command, str) else [text(word) for word in command or ()]
+    variables = environment(plain(service.node).get("environment"))
+    found = [*(word for word, _ in words(service)), *(value for value in variables.values() if value)]
+    return opendlv_flags.takes_cid(found, {**variables, **dict.fromkeys(service.cid_variables)})
 
 
 @dataclass(frozen=True)
@@ -372,19 +366,18 @@ def _volumes(written: Written) -> Iterator[Diagnostic]:
 
 
 def _unmounted(written: Written) -> Iterator[Diagnostic]:
-    """A warning of volumes that a process lacks; machine and test have the same ``/tmp`` and devices."""
+    """A warning of a volume that a process lacks; it has the test's ``/tmp`` and devices."""
+    of_machine = (host_access.is_shared_memory, host_access.is_hardware, host_access.is_machine)
     for item, volume in enumerate(written.plain.get("volumes") or () if KEYS[1] in written.plain else ()):
         found = host_access.mount(volume)
-        of_machine = (host_access.is_shared_memory, host_access.is_hardware, host_access.is_machine)
-        if found.below("/tmp") or found.source == found.target or any(check(found) for check in of_machine):
-            continue
-        message = f"the process of '{written.name}' has no '{found.target}', as volumes are mounted in containers only"
-        own = f"where '{found.source}' is" if compose_paths.is_path(found.source) else "which it may write to"
-        hint = f"it starts in the folder of this file, {own}: name that in its command, or run with --backend docker"
-        yield Diagnostic(
-            place(written.node, ("volumes", item), written.key), "application-file", message, hint, "warning"
-        )
-        return
+        if not (found.below("/tmp") or found.source == found.target or any(check(found) for check in of_machine)):
+            span = place(written.node, ("volumes", item), written.key)
+            what = f"the process of '{written.name}' has no '{found.target}', as volumes are mounted in containers only"
+            hint = (
+                f"it starts in this file's folder: name '{found.source}' there in its command, or use --backend docker"
+            )
+            yield Diagnostic(span, "application-file", what, hint, "warning")
+            return
 
 
 def _access(written: Written) -> Iterator[Diagnostic]:

@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl.application.access import secret_variables
@@ -21,7 +20,6 @@ _NAMED = re.compile(rf"(?:export\s+)?(?P<name>(?:[\w.\[\]-]|{_BLANKS[:-1]})*)(?P
 _RAW_NAME = re.compile(r"(?P<name>[^=\n]*)(?P<sign>=|\Z|(?=\n))")
 _QUOTED = re.compile(r"""(?P<quote>["'])(?P<body>(?:\\.|(?!(?P=quote))[^\\])*)(?P=quote)""", re.DOTALL)
 _ESCAPE = re.compile(r'\\(?:[abfnrtv$"\\]|0(?P<octal>\d{0,3}))', re.ASCII)
-_OCTAL = re.compile(r"[0-3][0-7]{2}")
 VARIABLE = re.compile(
     r"\$(?:(?P<escaped>\$)|(?P<bare>[A-Za-z_][A-Za-z0-9_]*)"
     r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>.*))?\})"
@@ -222,9 +220,9 @@ def _slip(written: str) -> tuple[str, str]:
 class DotenvProblem(EnvironmentProblem):
     """What compose refuses in a file of variables, at ``line``."""
 
-    def __init__(self, line: int, what: str, hint: str) -> None:
-        self.line, self.what, self.hint = line, what, hint
-        super().__init__(f"line {line}: {what}; {hint}")
+    def __init__(self, text: str, place: int, what: str, hint: str) -> None:
+        self.line, self.what, self.hint = text.count("\n", 0, place) + 1, what, hint
+        super().__init__(f"line {self.line}: {what}; {hint}")
 
 
 def dotenv(text: str, *, raw: bool = False) -> tuple[list[tuple[str, str | None]], DotenvProblem | None]:
@@ -247,74 +245,54 @@ def own_dotenv(folder: Path, known: Mapping[str, str]) -> dict[str, str]:
 
 
 def dotenv_file(
-    path: Path, known: Mapping[str, str], before: Mapping[str, str] = MappingProxyType({}), *, raw: bool = False
+    path: Path, known: Mapping[str, str], before: Mapping[str, str] | None = None, *, raw: bool = False
 ) -> dict[str, str]:
     """The variables of a ``.env`` file, interpolated with ``known`` first, then with earlier ones and those ``before``.
 
     None without a file; raises EnvironmentProblem for what compose refuses.
     """
-    if not path.is_file():
-        return {}
-    written, problem = dotenv(path.read_bytes().decode(errors="replace"), raw=raw)
+    written, problem = dotenv(path.read_bytes().decode(errors="replace") if path.is_file() else "", raw=raw)
     if problem:
         raise EnvironmentProblem(f"'{path.name}', {problem}")
     found: dict[str, str] = {}
     for name, value in written:
         if value is not None or name in known:
-            found[name] = known[name] if value is None else interpolate(value, {**before, **found, **known})
+            found[name] = known[name] if value is None else interpolate(value, {**(before or {}), **found, **known})
     return found
 
 
 def _statements(text: str, raw: bool) -> Iterator[tuple[str, str | None]]:
     """The variables with their values; raises DotenvProblem."""
-    text = text.removeprefix("\ufeff")
-    place = _end(_SKIPPED.match(text))
-    while place < len(text):
-        line, match = text.count("\n", 0, place) + 1, (_RAW_NAME if raw else _NAMED).match(text, place)
+    text, place = text.removeprefix("\ufeff"), 0
+    while (place := _SKIPPED.match(text, place).end()) < len(text):  # type: ignore[union-attr]  (it matches anything)
+        match = (_RAW_NAME if raw else _NAMED).match(text, place)
         name = match["name"].rstrip("\r" if raw else None) if match else ""
         if not match or not name or any(character.isspace() for character in name):
-            shown = text[place : _or_end(text, text.find("\n", place))].partition("=")[0].rstrip()[:_SHOWN]
-            raise DotenvProblem(line, f"'{shown}' is not the name of a variable", "write NAME=value, one in a line")
+            raise DotenvProblem(text, place, "there is no name of a variable", "write NAME=value, one in a line")
         if not match["sign"] and not raw:
-            raise DotenvProblem(line, f"'{name}' has no value, and no line break behind it", f"write {name}=")
+            raise DotenvProblem(text, place, f"'{name}' has no value, and no line break behind it", f"write {name}=")
         value, place = None, match.end()
         if match["sign"] in ("=", ":"):
-            value, place = _raw_value(text, place) if raw else _value(text, place, line)
-        if "\ufffd" in (value or ""):
-            raise DotenvProblem(line, f"the value of '{name}' is not UTF-8 text", "save the file as UTF-8")
+            value, place = _value(text, place, raw)
         yield name, value
-        place = _end(_SKIPPED.match(text, place))
 
 
-def _end(match: re.Match[str] | None) -> int:
-    return match.end() if match else 0
-
-
-def _or_end(text: str, place: int) -> int:
-    return len(text) if place < 0 else place
-
-
-def _raw_value(text: str, start: int) -> tuple[str, int]:
-    end = _or_end(text, text.find("\n", start))
-    return text[start:end].removesuffix("\r").replace("$", "$$"), end
-
-
-def _value(text: str, start: int, line: int) -> tuple[str, int]:
+def _value(text: str, start: int, raw: bool) -> tuple[str, int]:
     """A value, and where it ends; raises DotenvProblem."""
-    quoted = _QUOTED.match(text, start)
-    end = quoted.end() if quoted else _or_end(text, text.find("\n", start))
-    if quoted:
-        quote = quoted["quote"]
-        value = re.sub(r"\\(.)", lambda pair: quote if pair[1] == quote else pair[0], quoted["body"], flags=re.DOTALL)
-        if quote == "'":
-            return value.replace("$", "$$"), end
-        value = _ESCAPE.sub(_unescaped, value)
-    elif text[start:end].startswith(("'", '"')):
-        raise DotenvProblem(line, f"the quotation mark {text[start]} is not closed", "close it behind the value")
-    else:
-        value = text[start:end].partition(" #")[0].rstrip()
+    quoted = None if raw else _QUOTED.match(text, start)
+    end = quoted.end() if quoted else (text.find("\n", start) + 1 or len(text) + 1) - 1
+    value = quoted["body"] if quoted else text[start:end]
+    if "\ufffd" in value:
+        raise DotenvProblem(text, start, "the value is not UTF-8 text", "save the file as UTF-8")
+    if raw:
+        return value.removesuffix("\r").replace("$", "$$"), end
+    if quoted and quoted["quote"] == "'":
+        return value.replace("\\'", "'").replace("$", "$$"), end
+    if value.startswith(("'", '"')) and not quoted:
+        raise DotenvProblem(text, start, f"the quotation mark {value[0]} is not closed", "close it behind the value")
+    value = _ESCAPE.sub(_unescaped, value) if quoted else value.partition(" #")[0].rstrip()
     if slip := slip_in(value):
-        raise DotenvProblem(line, *slip)
+        raise DotenvProblem(text, start, *slip)
     return value, end
 
 
@@ -322,7 +300,7 @@ def _unescaped(match: re.Match[str]) -> str:
     octal = match["octal"]
     if octal is None:
         return _ESCAPES.get(match[0][1], match[0][1])
-    return chr(int(octal, 8)) if _OCTAL.fullmatch(octal) else f"\\{octal}"
+    return chr(int(octal, 8)) if re.fullmatch("[0-3][0-7]{2}", octal) else f"\\{octal}"
 
 
 def dotenv_line(name: str, value: str) -> str:

@@ -12,7 +12,7 @@ from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.interpolation import slip_in
 from dodo_dsl.application.model import ComposeService, text
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
-from dodo_dsl.source import Scalar
+from dodo_dsl.source import Node, Scalar
 
 _FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
 _IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
@@ -31,10 +31,14 @@ _FILLED = ("services", "volumes", "networks", "secrets", "configs")
 def words(service: ComposeService) -> Iterator[Word]:
     """The words of a service's commands, each with the value in which it is written."""
     for key in COMMANDS:
-        node = service.node.get(key)
-        for item in node.items if isinstance(node, source.Sequence) else (node,):
-            if isinstance(item, Scalar):
-                yield from ((word, item) for word in ((text(item.value),) if item is not node else _split(item.text)))
+        yield from words_of(service.node.get(key))
+
+
+def words_of(node: Node | None) -> Iterator[Word]:
+    """The words of one command."""
+    for item in node.items if isinstance(node, source.Sequence) else (node,):
+        if isinstance(item, Scalar):
+            yield from ((word, item) for word in ((text(item.value),) if item is not node else _split(item.text)))
 
 
 def _split(command: str) -> tuple[str, ...]:

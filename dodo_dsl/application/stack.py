@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from dodo_dsl import source
-from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.slips import COMMANDS, words_of
 from dodo_dsl.diagnostics import Diagnostic, Severity
-from dodo_dsl.source import Node, Scalar
+from dodo_dsl.source import Scalar
 
 RULE = "application-stack"
 
@@ -85,12 +85,12 @@ _PLATFORM = re.compile(r"(\.git|-(multi|amd64|x86_64|armhf|arm64|arm|aarch64|alp
 _IMAGE = re.compile(r"(?:.*/)?(?P<name>[A-Za-z0-9._-]+)(?:[:@#].*)?", re.DOTALL)
 _SHELLS = ("sh", "ash", "bash", "dash", "zsh")
 _SEPARATOR = re.compile(r"[;&|\n]+|\b(?:do|then|else)\b")
-_WRAPPER = re.compile(
-    r"-.*|\d+[smh]?|\w+=.*|exec|nohup|env|nice|stdbuf|timeout|time|sudo|while|until|if|!|\{|\(", re.DOTALL
+_BEFORE = re.compile(
+    r"-.*|\d+[smh]?|\w+=.*|exec|nohup|env|nice|stdbuf|timeout|time|sudo|while|until|if|[!{(]", re.DOTALL
 )
 """Words of a shell's command before the program itself."""
 _BESIDE = re.compile(
-    r"cd|mkdir|rm|mv|cp|chmod|chown|ls|cat|tee|gzip|xz|zstd|echo|printf|date|sleep|wait|trap|test|\[|set|export|true|:|done|fi|kill|umask|ulimit|\}|\)|exit"
+    r"cd|mkdir|rm|mv|chmod|cat|tee|gzip|xz|echo|date|sleep|wait|trap|test|set|export|true|done|fi|exit|[]:[)}]"
 )
 """Programs beside which a shell's command is still one of the stack."""
 
@@ -115,25 +115,14 @@ def _names(service: ComposeService) -> Iterator[list[str]]:
     if isinstance(context, Scalar):
         parts = [part for part in re.split(r"[/#?]", context.text) if part]
         yield from ([_PLATFORM.sub("", part)] for part in (parts if "://" in context.text else parts[-1:]))
-    entrypoint, command = (_words(service.node.get(key)) for key in ("entrypoint", "command"))
-    for words in ([*entrypoint, *command], command, _words(service.node.get("x-dodo-process"))):
+    process, entrypoint, command = ([word for word, _ in words_of(service.node.get(key))] for key in COMMANDS)
+    for words in ([*entrypoint, *command], command, process):
         yield list(dict.fromkeys(_programs(words)))
-
-
-def _words(node: Node | None) -> list[str]:
-    if isinstance(node, source.Sequence):
-        return [item.text for item in node.items if isinstance(item, Scalar)]
-    if not isinstance(node, Scalar) or not isinstance(node.value, str):
-        return []
-    try:
-        return list(opendlv_flags.split(node.text))
-    except ValueError:
-        return []
 
 
 def _programs(words: Sequence[str]) -> Iterator[str]:
     """The programs that a command starts, also by a shell, but for what shells have to prepare them."""
-    rest = [] if words and words[0].startswith("-") else list(itertools.dropwhile(_WRAPPER.fullmatch, words))
+    rest = [] if words and words[0].startswith("-") else list(itertools.dropwhile(_BEFORE.fullmatch, words))
     name = rest[0].rpartition("/")[2] if rest else ""
     if name in _SHELLS:
         script = next((word for word in rest[1:] if not word.startswith("-")), "")

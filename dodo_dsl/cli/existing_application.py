@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from dodo_dsl import source
 from dodo_dsl.application import stack
@@ -69,7 +68,7 @@ class Pictures:
 
 def pictures(application: ApplicationSource | None) -> Pictures:
     """The pictures of the first service with a memory's name in its command, if that is none of the stack's."""
-    own = {service.name for service in _own(application)} if application else set()
+    own = {service.name for service in own(application)} if application else set()
     for asked in pictures_of(application) if application else ():
         if asked.service in own:
             memories: dict[str, str] = {}
@@ -80,7 +79,7 @@ def pictures(application: ApplicationSource | None) -> Pictures:
     return Pictures()
 
 
-def _own(application: ApplicationSource) -> Iterator[ComposeService]:
+def own(application: ApplicationSource) -> Iterator[ComposeService]:
     """The services that are none of the stack's."""
     others = stack.parts(application)
     return (service for name, service in application.services.items() if name not in others)
@@ -98,42 +97,31 @@ class Declarable:
     services: dict[str, str] = field(default_factory=dict)
 
 
-def has_own(file: Path) -> bool:
-    """Whether a compose file, if it can be read, has a service that is none of the stack's."""
-    application = as_written(file)
-    return application is None or any(True for _ in _own(application))
-
-
 def declarable(file: Path) -> Declarable | None:
     """None if the name of the file says all."""
     application = as_written(file)
     if application is None:
         return None
     without = {_item(name): part.instead for name, (_, part) in stack.parts(application).items()}
-    found = [_found(service, application) for service in _own(application)]
-    others = on_other_buses([each.cids for each in found])
-    for each in found:
-        if each.cids in others:
-            without[_item(each.name)] = f"it is on CID {', '.join(map(str, sorted(each.cids)))}, another bus"
-    services = {_item(each.name): each.said for each in found if each.said and each.cids not in others}
+    found = {_item(service.name): _found(service, application) for service in own(application)}
+    others = on_other_buses([cids for cids, _ in found.values()])
+    without |= {
+        name: f"it is on CID {', '.join(map(str, cids))}, another bus"
+        for name, (cids, _) in found.items()
+        if cids in others
+    }
+    services = {name: said for name, (_, said) in found.items() if said and name not in without}
     return Declarable(_item(file.name), without, services) if without or services else None
 
 
-class _Found(NamedTuple):
-    """What a service's sources and commands show: its CIDs, and keys of x-dodo that its compose file lacks."""
-
-    name: str
-    cids: set[int]
-    said: str = ""
-
-
-def _found(service: ComposeService, application: ApplicationSource) -> _Found:
+def _found(service: ComposeService, application: ApplicationSource) -> tuple[set[int], str]:
+    """A service's CIDs, and the keys of x-dodo that its sources show and its compose file lacks."""
     build, cids = service.node.get("build"), written_cids(service, application)
     context = build.get("context") if isinstance(build, source.Mapping) else build
     if service.declared or not isinstance(context, source.Scalar) or not is_local(context.text):
-        return _Found(service.name, cids)
+        return cids, ""
     if not application.paths.is_own(context.text):
-        return _Found(service.name, cids)
+        return cids, ""
     texts = list(_sources(application.folder / context.text))
     heard = {name for text in texts for match in _HEARD.finditer(text) for name in match.group(1, 2, 4) if name}
     named = {match["name"] for text in texts if _SENDS.search(text) for match in _MESSAGE.finditer(text)}
@@ -146,7 +134,7 @@ def _found(service: ComposeService, application: ApplicationSource) -> _Found:
     if built_in and not takes_cid(service):
         said.append(f"cid: {built_in[0]}")
         cids = {built_in[0]}
-    return _Found(service.name, cids, f"{{{', '.join(said)}}}" if said else "")
+    return cids, f"{{{', '.join(said)}}}" if said else ""
 
 
 def _sources(folder: Path) -> Iterator[str]:

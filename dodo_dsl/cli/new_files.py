@@ -13,7 +13,8 @@ from typing import TextIO
 import jinja2
 
 from dodo_dsl import __version__, package_data, source
-from dodo_dsl.cli.existing_application import declarable, has_own
+from dodo_dsl.application.read import as_written
+from dodo_dsl.cli.existing_application import declarable, own
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.spec.deployment import FILE_NAME
@@ -66,7 +67,8 @@ def compose_file(root: Path) -> str:
 def own_compose_file(root: Path) -> str:
     """The same, also empty if nothing but the stack around an application is in it."""
     name = compose_file(root)
-    return name if name and has_own(root / name) else ""
+    application = as_written(root / name) if name else None
+    return "" if application and not any(own(application)) else name
 
 
 def other_compose_files(root: Path) -> list[str]:
