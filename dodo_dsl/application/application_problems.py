@@ -29,7 +29,7 @@ from dodo_dsl.application.model import (
     plain,
 )
 from dodo_dsl.application.mounts import missing_folders, nested_mounts
-from dodo_dsl.application.slips import cid_slips, missing_program, words
+from dodo_dsl.application.slips import cid_slips, is_cid, missing_program, words
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
 
@@ -184,16 +184,19 @@ def on_other_buses(each: Sequence[set[int]]) -> list[set[int]]:
 
 def written_cids(service: ComposeService, application: ApplicationSource) -> set[int]:
     """The CIDs of a service: built in, or by commands, variables and files of variables, as far as they are known."""
-    built_in = declared_cid(service.node)
-    given: dict[str, str | None] = {}
+    given, known = dict[str, str | None](), application.known
     for file in service.env_files:
         if "$" not in file.path and application.paths.is_own(file.path):
             given.update(variables_of(application.folder / file.path, raw=file.raw))
     given.update(environment(plain(service.node).get("environment")))
-    filled = {name: interpolated(value, application.known) for name, value in given.items()}
-    shell = {name: value for name, value in filled.items() if value is not None}
-    text = " ".join(interpolated(interpolated(word, application.known), shell) for word, _ in words(service))
-    return opendlv_flags.written_cids(text, filled) | ({int(str(built_in.value))} if built_in else set())
+    filled = {
+        name: known.get(name, "") if value is None else interpolated(value, known) for name, value in given.items()
+    }
+    text = " ".join(interpolated(interpolated(word, known), filled) for word, _ in words(service))
+    flags = (match["cid"] for part in (text, *filled.values()) for match in opendlv_flags.NUMBER.finditer(part))
+    built_in = declared_cid(service.node)
+    found = (*flags, *map(filled.get, opendlv_flags.CID_VARIABLES), str(built_in.value) if built_in else None)
+    return {int(cid) for cid in found if cid and is_cid(cid)}
 
 
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dodo_dsl.application.interpolation import end_of_variable, names
 
 CID_VARIABLES = ("CID", "OD4SESSION_CID")
-HIGHEST_CID = 254
 
 _BRACES = r"\{[^{}]*\}"
 for _ in range(3):
@@ -17,7 +16,7 @@ _VALUE = (
 )
 _CID = re.compile(rf"(?P<flag>(?<![\w-])--cid=)(?:{_VALUE})?|(?P<words>(?<![\w-])--cid[ \t\n]+){_VALUE}")
 _MEMORY = re.compile(r"(?P<flag>--name(?:\.[A-Za-z0-9]+)?=)(?P<name>.+)", re.DOTALL)
-_NUMBER = re.compile(r"--(?:[\w.]+-)*cid(?:-[\w.]+)*\d?[= \t\n]+[\\\"']*(?P<cid>\d{1,3})(?![\w.])", re.ASCII)
+NUMBER = re.compile(r"--(?:[\w.]+-)*cid(?:-[\w.]+)*\d?[= \t\n]+[\\\"']*(?P<cid>\d+)(?![\w.])", re.ASCII)
 """A CID as a flag's value; of those with other names, too, as ``--cid-to``."""
 _PYTHON = re.compile(r"python[0-9.]+")
 _ENDS = ";&|<>"
@@ -86,15 +85,6 @@ def arguments(process: Sequence[str], command: Sequence[str]) -> tuple[str, ...]
     while rest and rest[0] in left and (len(rest) < len(command) or rest[0][:1] != "-"):
         left = left[left.index(rest.pop(0)) + 1 :]
     return tuple(command[len(command) - len(rest) :])
-
-
-def written_cids(text: str, environment: Mapping[str, str | None]) -> set[int]:
-    """The CIDs that commands, joined by blanks, and variables give."""
-    values = (environment.get(variable) or "" for variable in CID_VARIABLES)
-    flags = (match["cid"] for part in (text, *environment.values()) for match in _NUMBER.finditer(part or ""))
-    return {
-        int(cid) for cid in (*flags, *values) if cid.isascii() and cid.isdigit() and 1 <= int(cid[:4]) <= HIGHEST_CID
-    }
 
 
 def takes_memory(argv: Sequence[str]) -> bool:

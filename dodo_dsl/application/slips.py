@@ -17,6 +17,7 @@ from dodo_dsl.source import Node, Scalar
 _FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
 _IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
 _LITERAL = re.compile(r"--cid=(?P<value>[\w.+-]+)")
+_HIGHEST = 254
 _SHORT = 3
 """Letters of a flag that others differ from by one, such as ``--pid`` and ``--id``."""
 COMMANDS = ("x-dodo-process", "entrypoint", "command")
@@ -77,18 +78,19 @@ def cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
         one, literal = _IN_ONE_WORD.fullmatch(word), _LITERAL.fullmatch(word)
         if one:
             yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")
-        elif literal and not _is_cid(literal["value"]):
+        elif literal and not is_cid(literal["value"]):
             yield _warning(
                 item,
-                f"'{word}' gives no CID, expected a number from 1 to {opendlv_flags.HIGHEST_CID}",
+                f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}",
                 "write '--cid=111'",
             )
-        elif not takes_cid and (flag := meant(word, "--cid")) and (_is_cid(flag[6:]) or "$" in flag):
+        elif not takes_cid and (flag := meant(word, "--cid")) and (is_cid(flag[6:]) or "$" in flag):
             yield _warning(item, f"'{word}' is not the flag '--cid'", f"did you mean '{flag}'?")
 
 
-def _is_cid(value: str) -> bool:
-    return value.isascii() and value.isdigit() and 1 <= int(value) <= opendlv_flags.HIGHEST_CID
+def is_cid(value: str) -> bool:
+    """Whether a text is a whole number from 1 to 254."""
+    return value.isascii() and value.isdigit() and len(value) < 9 and 1 <= int(value) <= _HIGHEST
 
 
 def _warning(item: Scalar, message: str, hint: str) -> Diagnostic:

@@ -68,7 +68,7 @@ class Pictures:
 
 def pictures(application: ApplicationSource | None) -> Pictures:
     """The pictures of the first service with a memory's name in its command, if that is none of the stack's."""
-    own = {service.name for service in own(application)} if application else set()
+    own = {service.name for service in own_services(application)} if application else set()
     for asked in pictures_of(application) if application else ():
         if asked.service in own:
             memories: dict[str, str] = {}
@@ -79,7 +79,7 @@ def pictures(application: ApplicationSource | None) -> Pictures:
     return Pictures()
 
 
-def own(application: ApplicationSource) -> Iterator[ComposeService]:
+def own_services(application: ApplicationSource) -> Iterator[ComposeService]:
     """The services that are none of the stack's."""
     others = stack.parts(application)
     return (service for name, service in application.services.items() if name not in others)
@@ -103,7 +103,7 @@ def declarable(file: Path) -> Declarable | None:
     if application is None:
         return None
     without = {_item(name): part.instead for name, (_, part) in stack.parts(application).items()}
-    found = {_item(service.name): _found(service, application) for service in own(application)}
+    found = {_item(service.name): _found(service, application) for service in own_services(application)}
     others = on_other_buses([cids for cids, _ in found.values()])
     without |= {
         name: f"it is on CID {', '.join(map(str, cids))}, another bus"

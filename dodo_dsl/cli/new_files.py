@@ -14,7 +14,7 @@ import jinja2
 
 from dodo_dsl import __version__, package_data, source
 from dodo_dsl.application.read import as_written
-from dodo_dsl.cli.existing_application import declarable, own
+from dodo_dsl.cli.existing_application import declarable, own_services
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.spec.deployment import FILE_NAME
@@ -68,7 +68,7 @@ def own_compose_file(root: Path) -> str:
     """The same, also empty if nothing but the stack around an application is in it."""
     name = compose_file(root)
     application = as_written(root / name) if name else None
-    return "" if application and not any(own(application)) else name
+    return "" if application and not any(own_services(application)) else name
 
 
 def other_compose_files(root: Path) -> list[str]:

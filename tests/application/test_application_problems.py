@@ -109,6 +109,7 @@ CIDS = (
     ("environment: [OD4SESSION_CID=112]", "own"),
     ("environment: {FLAGS: --cid=112 --freq=10}", "own"),
     ("env_file: b.env", "own"),
+    ("command: [--cid=9999999999999999999999], environment: {CID: '112'}", "own"),
     ("env_file: [{path: b.env, format: raw}]", "own"),
     ("x-dodo-process: [./prog, --cid=112]", "own"),
     ("x-dodo: {cid: 112}", "own"),
