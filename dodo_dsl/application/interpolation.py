@@ -264,7 +264,7 @@ def dotenv_file(
 def _statements(text: str, raw: bool) -> Iterator[tuple[str, str | None]]:
     """The variables with their values; raises DotenvProblem."""
     text, place = text.removeprefix("\ufeff"), 0
-    while (place := _SKIPPED.match(text, place).end()) < len(text):  # type: ignore[union-attr]  (it matches anything)
+    while (place := _SKIPPED.match(text, place).end()) < len(text):  # type: ignore[union-attr]
         match = (_RAW_NAME if raw else _NAMED).match(text, place)
         name = match["name"].rstrip("\r" if raw else None) if match else ""
         if not match or not name or any(character.isspace() for character in name):

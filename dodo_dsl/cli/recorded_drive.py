@@ -25,7 +25,7 @@ from dodo_dsl.opendlv.message_set import OWN_IDS, MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import contents
 from dodo_dsl.rec.contents import MessageStream
-from dodo_dsl.rec.frames import IMAGE
+from dodo_dsl.rec.frames import IMAGE, packets
 
 SIGNALS = {
     "opendlv.proxy.GroundSteeringRequest": "groundSteering",
@@ -100,7 +100,8 @@ def look(path: Path, sent: Collection[str]) -> RecordedDrive:
         target = _target(path, streams, signals)
         values = _values(path, recording, messages, target) if target else ()
         cameras = tuple(stream.sender_stamp for stream in streams if stream.id == IMAGE)
-        size = _size(path, recording, messages, cameras[0]) if cameras else (0, 0)
+        first = recording.rows(messages=[IMAGE], sender_stamps=cameras[:1])[:1]
+        size = next(((each.width, each.height) for each in packets(recording, first)), (0, 0))
         times = np.sort(index["time"][played] if received is None else received[played])
         gaps = _played_gaps(path, np.diff(times) / 1e6, target)
         retimed = None if received is None else _retimed(recording, received)
@@ -117,16 +118,6 @@ def look(path: Path, sent: Collection[str]) -> RecordedDrive:
         tuple(s.sender_stamp for s in streams if target and s.id == target.id and s is not target),
         size,
     )
-
-
-def _size(path: Path, recording: Recording, messages: MessageSet, camera: int) -> tuple[int, int]:
-    """Of a camera's first picture, in pixels."""
-    row = recording.rows(messages=[IMAGE], sender_stamps=[camera])[:1]
-    try:
-        (image,) = (messages.decode(e.data_type, e.payload) for e in recording.envelopes(row))
-    except MessageError as error:
-        raise UsageError(f"'{path}': {error}") from None
-    return image.width, image.height
 
 
 def _played_gaps(path: Path, gaps: NDArray[np.float64], target: MessageStream | None) -> NDArray[np.float64]:
@@ -221,8 +212,8 @@ def files(
 
 def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None, pictures: Pictures) -> str:
     """A warning if services of the application read pictures, of which the recording has none, or of another size."""
-    if pictures.service and drive.cameras and drive.size != (pictures.width, pictures.height):
-        own, recorded = (f"{width}x{height}" for width, height in ((pictures.width, pictures.height), drive.size))
+    own, recorded = (f"{width}x{height}" for width, height in ((pictures.width, pictures.height), drive.size))
+    if pictures.service and drive.cameras and recorded != own:
         found = f"the pictures of '{path.name}' are {recorded}, and '{pictures.service}' seems to take {own}"
         return f"warning: {found}: it gets the recorded size\n"
     names = (*_MEMORIES, *pictures.memories.values())
