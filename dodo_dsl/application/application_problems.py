@@ -14,7 +14,6 @@ from dodo_dsl import source
 from dodo_dsl.application import host_access, opendlv_flags, stack
 from dodo_dsl.application.access.findings import service_findings
 from dodo_dsl.application.access.model import Look, diagnostic, place
-from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.host_access import is_true, references
 from dodo_dsl.application.interpolation import interpolated, interpolated_node
@@ -184,11 +183,8 @@ def on_other_buses(each: Sequence[set[int]]) -> list[set[int]]:
 
 def written_cids(service: ComposeService, application: ApplicationSource) -> set[int]:
     """The CIDs of a service: built in, or by commands, variables and files of variables, as far as they are known."""
-    given, known = dict[str, str | None](), application.known
-    for file in service.env_files:
-        if "$" not in file.path and application.paths.is_own(file.path):
-            given.update(variables_of(application.folder / file.path, raw=file.raw))
-    given.update(environment(plain(service.node).get("environment")))
+    known = application.known
+    given = {**service.file_variables, **environment(plain(service.node).get("environment"))}
     filled = {
         name: known.get(name, "") if value is None else interpolated(value, known) for name, value in given.items()
     }

@@ -80,7 +80,7 @@ class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
     ``declared`` is None without x-dodo, or if that says nothing of messages.
-    ``cid_variables`` are the CID variables that its ``env_files`` set.
+    ``file_variables`` are those that its ``env_files`` set.
     """
 
     name: str
@@ -88,7 +88,12 @@ class ComposeService:
     span: Span
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
-    cid_variables: tuple[str, ...] = ()
+    file_variables: Mapping[str, str | None] = field(default_factory=dict)
+
+    @property
+    def cid_variables(self) -> tuple[str, ...]:
+        """The CID variables among those of its files."""
+        return tuple(name for name in CID_VARIABLES if name in self.file_variables)
 
     @property
     def has_display(self) -> bool:
@@ -274,10 +279,7 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
             yield EnvFile(path.text, path.span, not optional, isinstance(form, Scalar) and form.value == "raw")
 
 
-def cid_variables(files: Iterable[EnvFile], folder: Path) -> tuple[str, ...]:
-    """The CID variables that files next to the compose file set."""
-    found: set[str] = set()
-    for file in files:
-        if not file.path.startswith(("/", "~", "$")):
-            found |= set(variables_of(folder / file.path, raw=file.raw))
-    return tuple(v for v in CID_VARIABLES if v in found)
+def file_variables(files: Iterable[EnvFile], folder: Path) -> dict[str, str | None]:
+    """The variables that files next to the compose file set."""
+    own = (file for file in files if not file.path.startswith(("/", "~", "$")))
+    return {name: v for file in own for name, v in variables_of(folder / file.path, raw=file.raw).items()}

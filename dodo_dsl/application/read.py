@@ -18,7 +18,7 @@ from dodo_dsl.application.application_problems import application_problems, unkn
 from dodo_dsl.application.compose_files import ComposeFiles, dotenv_problems
 from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
 from dodo_dsl.application.load import as_item, load, unread
-from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, declared_cid, env_files, plain
+from dodo_dsl.application.model import ApplicationSource, ComposeService, declared_cid, env_files, file_variables, plain
 from dodo_dsl.application.model import declared as declaration_of
 from dodo_dsl.application.slips import variable_problems
 from dodo_dsl.application.variables import tunable_problems
@@ -161,7 +161,7 @@ def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:
     if not isinstance(node, source.Mapping):
         return None
     files = tuple(env_files(node))
-    return ComposeService(name, node, entry.key, declaration_of(node), files, cid_variables(files, folder))
+    return ComposeService(name, node, entry.key, declaration_of(node), files, file_variables(files, folder))
 
 
 def _used_cid_variables(services: Iterable[source.Mapping]) -> list[str]:
