@@ -41,12 +41,7 @@ class DynamicModel(Service):
         )
         car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
         drive = _drive(flags, condition)
-        self.vehicle = Vehicle(flags["freq"], car, flags["steps"], condition, drive)
-        if drive is None:
-            stable = self.vehicle.car.stable_above(flags["freq"] * flags["steps"])
-            self._log.debug(
-                "the steps are stable above %.3f m/s; sideways the car moves above %g", stable, car.slip_speed
-            )
+        self.vehicle = Vehicle(car, condition, drive)
         self.inputs = {**self._requests(flags), ("opendlv.sim.Command", None): self._command}
         self._state = context.messages.type("opendlv.sim.KinematicState")
         self._frame_id = flags["frame-id"]
