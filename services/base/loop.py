@@ -124,7 +124,8 @@ class Loop:
     """In real time: the services of the test, whose messages others must not send."""
     _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
     _stamps: HeardStamps = field(init=False)
-    _has_begun: bool = False
+    _began: int | None = None
+    """When the test began, in us."""
     _reported: int = 0
     _paused: float = 0.0
     _report_after: int = 0
@@ -152,7 +153,7 @@ class Loop:
         if self.service.finished and self.service.verdict is None:
             print(json.dumps({"dodo": "end-of-input"}), flush=True)
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
-        self.clock.close(stopped if self._has_begun else lambda: True)
+        self.clock.close(stopped if self._began is not None else lambda: True)
         self._tell_strangers()
         self._report(self.clock.now())
         if self.session.lost:
@@ -212,7 +213,7 @@ class Loop:
         if envelope.data_type in self._handlers:
             self._stamps.take(envelope)
         if envelope.data_type == self._begin:
-            self._has_begun = True
+            self._began = envelope.sample_time
             if self.members is not None:
                 self.members.begin()
             self.service.begin(envelope.sample_time)
@@ -226,7 +227,15 @@ class Loop:
                 except MessageError as error:
                     _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
                     return
+                if self.members is not None:
+                    self.members.check_numbers(message, envelope.sender_stamp, self._seconds)
                 handler(message, envelope.sample_time)
+
+    @property
+    def _seconds(self) -> float | None:
+        """When the message that is handled arrived, from the test's begin on; None before it."""
+        arrived = self.service.arrived
+        return None if self._began is None or arrived is None else max(arrived - self._began, 0) / MICROSECONDS
 
     def _tell_strangers(self) -> None:
         """In the reason of a failed verdict, because they may explain it, else as notes."""

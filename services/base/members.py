@@ -7,11 +7,14 @@ message is made by the compiler, of the wiring.
 
 import ctypes
 import json
+import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
+
+from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.address import LINES, Address, is_of_the_world
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE, is_proven, with_proof
@@ -102,11 +105,31 @@ class SenderTable:
             return False
         return said.service == service and (said.host, said.port) == source
 
+    def check_numbers(self, message: Message, stamp: int, takers: Iterable[str], seconds: float | None) -> None:
+        """Report a number of the application's that is not finite, which services take, ``seconds`` after the begin."""
+        name = message.DESCRIPTOR.full_name
+        if name in self._reported or not (number := _infinite_number(message)):
+            return
+        self._reported.add(name)
+        when = "before the test began" if seconds is None else f"after {seconds:.2f} s"
+        to = " and ".join(f"'{taker}'" for taker in takers)
+        self.report(f"the application sent {name}/{stamp} to {to} {when}: {number}, not a finite number")
+
     def report(self, reason: str) -> None:
         """Report to the runner why the test fails."""
         if reason not in self._reported:
             self._reported.add(reason)
             print(json.dumps({"dodo": "foreign", "reason": reason}), flush=True)
+
+
+def _infinite_number(message: Message, inside: str = "") -> str:
+    """The first number of a message that is none, or infinite, as ``groundSteering is nan``; empty if all are finite."""
+    for field, value in message.ListFields():
+        if isinstance(value, float) and not math.isfinite(value):
+            return f"{inside}{field.name} is {value}"
+        if isinstance(value, Message) and (found := _infinite_number(value, f"{inside}{field.name}.")):
+            return found
+    return ""
 
 
 def _entries(text: str, messages: MessageSet) -> Iterator[tuple[tuple[int, int | None], Producers]]:
@@ -245,6 +268,12 @@ class Members:
             return self._session.source in self._known or self._is_excused(producers)
         self._table.report(producers.reason)  # printed, and of a service of the test
         return False
+
+    def check_numbers(self, message: Message, stamp: int, seconds: float | None) -> None:
+        """Report a message that the session received last if the application sent it, and a number of it is none."""
+        source = self._session.source
+        if source not in self._known or source == self._addresses.get(LINES):
+            self._table.check_numbers(message, stamp, [self._name], seconds)
 
     def send(self, envelope: Envelope) -> bytes:
         """Send a message of the world to the test's services alone, and return its frame.

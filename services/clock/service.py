@@ -1,5 +1,6 @@
 """The clock on the bus: it waits for the test's begin, steps it to its end, and reports its progress to the runner."""
 
+import contextlib
 import json
 import logging
 import os
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
@@ -64,7 +66,8 @@ class ClockService(Service):
         self._heard = frozenset([*answering, *self._senders.ids, session.messages.id(SENDER)])
         self._guarded = self._senders.ids | {session.messages.id(name) for name in CONSUMED}
         self._early: list[tuple[Envelope, Address]] = []
-        self._exchange = exchange = Exchange(session, channel, answers.take, self._senders)
+        self._answers = answers
+        self._exchange = exchange = Exchange(session, channel, self._take, self._senders)
         self._application: SteppedApplication | VirtualApplication
         if isinstance(answers, SentMessages):
             assert own_time is not None, "the program gives it"
@@ -114,6 +117,16 @@ class ClockService(Service):
         """The process ids of the application's services; none where the runner gives none."""
         message: Any = self._session.messages.decode(begin.data_type, begin.payload)
         return [whole(word) for word in message.application.split(",") if is_whole(word) and len(word) < 10]
+
+    def _take(self, envelope: Envelope) -> None:
+        """Take a message of the application."""
+        takers = self._stepper.takers(envelope.data_type)
+        if takers and any(each.matches(envelope) for each in self._answers.filters):
+            with contextlib.suppress(MessageError):  # the services say so
+                message = self._session.messages.decode(envelope.data_type, envelope.payload)
+                since = (self._stepper.now - EPOCH) / MICROSECONDS
+                self._senders.check_numbers(message, envelope.sender_stamp, takers, since)
+        self._answers.take(envelope)
 
     def _over(self) -> bool:
         now = time.monotonic()
