@@ -228,7 +228,7 @@ class Loop:
                     _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
                     return
                 if self.members is not None:
-                    self.members.check_numbers(message, envelope.sender_stamp, self._seconds)
+                    self.members.check_numbers(message, envelope, self._seconds)
                 handler(message, envelope.sample_time)
 
     @property

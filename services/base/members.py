@@ -269,11 +269,11 @@ class Members:
         self._table.report(producers.reason)  # printed, and of a service of the test
         return False
 
-    def check_numbers(self, message: Message, stamp: int, seconds: float | None) -> None:
-        """Report a message that the session received last if the application sent it, and a number of it is none."""
-        source = self._session.source
-        if source not in self._known or source == self._addresses.get(LINES):
-            self._table.check_numbers(message, stamp, [self._name], seconds)
+    def check_numbers(self, message: Message, envelope: Envelope, seconds: float | None) -> None:
+        """Report the message that the session received last if the application sent it, and a number is not finite."""
+        producers = self._table.producers(envelope)
+        if self._session.source not in self._known if producers is None else LINES in producers.services:
+            self._table.check_numbers(message, envelope.sender_stamp, [self._name], seconds)
 
     def send(self, envelope: Envelope) -> bytes:
         """Send a message of the world to the test's services alone, and return its frame.

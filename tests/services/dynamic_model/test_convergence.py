@@ -1,6 +1,7 @@
 """The model against scipy's solver on the equations written down once more, from the published ones."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -81,4 +82,4 @@ def test_the_error_goes_down_by_the_square_of_the_step() -> None:
         for _ in range(2 * count):
             motion = step(motion, wheel_angle(0.1), 0.14, 0.5 / count)
         errors.append(math.dist((motion.vx, motion.vy, motion.yaw_rate), exact))
-    assert [a / b for a, b in zip(errors, errors[1:], strict=False)] == pytest.approx([4] * 3, rel=0.2)
+    assert [a / b for a, b in pairwise(errors)] == pytest.approx([4] * 3, rel=0.2)
