@@ -123,11 +123,11 @@ class SenderTable:
 
 
 def _infinite_number(message: Message, inside: str = "") -> str:
-    """The first number of a message that is none, or infinite, as ``groundSteering is nan``; empty if all are finite."""
-    for field, value in message.ListFields():
+    """The first number of a message that is not finite, as ``groundSteering is nan``; empty if all are."""
+    for about, value in message.ListFields():
         if isinstance(value, float) and not math.isfinite(value):
-            return f"{inside}{field.name} is {value}"
-        if isinstance(value, Message) and (found := _infinite_number(value, f"{inside}{field.name}.")):
+            return f"{inside}{about.name} is {value}"
+        if isinstance(value, Message) and (found := _infinite_number(value, f"{inside}{about.name}.")):
             return found
     return ""
 

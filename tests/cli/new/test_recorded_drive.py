@@ -183,7 +183,10 @@ def test_what_makes_no_test_is_said(empty: Path, words: list[str], said: str) ->
     assert err.startswith(f"dodo new: {said}")
 
 
-@pytest.mark.parametrize(("values", "limit"), [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30")])
+@pytest.mark.parametrize(
+    ("values", "limit"),
+    [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30"), ([0.0] * 19 + [1.0], "0.025")],
+)
 @pytest.mark.thorough
 def test_limits_have_two_digits_and_are_never_zero(empty: Path, values: list[float], limit: str) -> None:
     write(empty / "drive.rec", (STEERING, 0, values))

@@ -292,8 +292,8 @@ def easy(app: Application, number: int) -> None:
 
 ATTACKS = {name.replace("_", "-"): function for name, function in list(globals().items()) if name in (
     "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "nan_once", "unrecorded", "join",
-    "join_again", "disguise", "step_to_ports", "answer_to_ports", "step_on_bus", "answer_on_bus", "repeat_steps", "spy", "echo",
-    "boxes", "easy", "directly", "true_pose", "true_pose_curve",
+    "join_again", "disguise", "step_to_ports", "answer_to_ports", "step_on_bus", "answer_on_bus", "repeat_steps", "spy",
+    "echo", "boxes", "easy", "directly", "true_pose", "true_pose_curve",
 )}  # fmt: skip
 
 

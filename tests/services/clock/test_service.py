@@ -158,5 +158,6 @@ def test_a_number_of_the_application_that_is_not_finite_is_reported_once(
         assert answers.is_complete
         channel.close()
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
-        f"the application sent {STEERING}/0 to 'vehicle' and 'track' after 0.70 s: groundSteering is -inf, not a finite number"
+        f"the application sent {STEERING}/0 to 'vehicle' and 'track' after 0.70 s: "
+        "groundSteering is -inf, not a finite number"
     ]
