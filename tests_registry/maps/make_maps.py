@@ -106,7 +106,7 @@ CAR = [
     [(-0.06, -0.06, 0.11), (0.06, -0.06, 0.11), (0.06, 0.16, 0.11), (-0.06, 0.16, 0.11)],
 ]
 """The lower and the upper corners of a car in m; its front is at -y, as that of all models at frames."""
-YELLOW, BLUE = [0.8, 0.69, 0.13], [0.13, 0.17, 0.3]
+YELLOW, BLUE = [0.8, 0.69, 0.13], [0.11, 0.16, 0.32]
 """Colours of cones, as those of real ones in pictures of a Kiwi car; docs/reference/maps.md has what was measured."""
 BOARD = {
     "yellow": [(0.30, 0.172), (0.36, 0.07), (0.52, 0.13), (0.56, -0.05)],

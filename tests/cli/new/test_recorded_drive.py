@@ -56,7 +56,7 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
     code, out, err = dodo("new", "mine", "--level", "dil", "--rec", file)
     assert (code, err) == (0, "")
     assert f"{file}: 15.0 s, pictures of the camera with sender stamp 0\n" in out
-    assert f"judged: groundSteering of {STEERING}/0, 151 values from -0.0672978 to 0.113228\n" in out
+    assert f"judged: groundSteering of {STEERING}/0, 151 values from -0.0675461 to 0.113257\n" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     found = spec(empty, "mine")
     assert found["rec"] == found["target"] == f"../recordings/{file}"
