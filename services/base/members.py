@@ -106,7 +106,7 @@ class SenderTable:
         return said.service == service and (said.host, said.port) == source
 
     def check_numbers(self, message: Message, stamp: int, takers: Iterable[str], seconds: float | None) -> None:
-        """Report a number of the application's that is not finite, which services take, ``seconds`` after the begin."""
+        """Report a number of the application's that is not finite, which services take, after ``seconds`` of the test."""
         name = message.DESCRIPTOR.full_name
         if name in self._reported or not (number := _infinite_number(message)):
             return
