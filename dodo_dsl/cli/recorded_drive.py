@@ -223,8 +223,6 @@ def _found(path: Path, drive: RecordedDrive, field: str) -> str:
         target = f"{drive.target.name}/{drive.target.sender_stamp}"
         values = f"{len(drive.values)} values from {min(drive.values):g} to {max(drive.values):g}"
         lines.append(f"judged: {field} of {target}, {values}")
-        if not drive.of_constant:
-            lines.append("that is always the same, so an application that sends it without looking passes")
     if drive.others:
         lines.append(
             f"other sender stamps of it are {', '.join(map(str, drive.others))}: change 'target-sender' for them"

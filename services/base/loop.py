@@ -228,14 +228,9 @@ class Loop:
                     _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
                     return
                 if self.members is not None:
-                    self.members.check_numbers(message, envelope, self._seconds)
+                    began, arrived = self._began, self.service.arrived
+                    self.members.check_numbers(envelope, arrived - began if began and arrived else None)
                 handler(message, envelope.sample_time)
-
-    @property
-    def _seconds(self) -> float | None:
-        """When the message that is handled arrived, from the test's begin on; None before it."""
-        arrived = self.service.arrived
-        return None if self._began is None or arrived is None else max(arrived - self._began, 0) / MICROSECONDS
 
     def _tell_strangers(self) -> None:
         """In the reason of a failed verdict, because they may explain it, else as notes."""

@@ -1,6 +1,5 @@
 """The clock on the bus: it waits for the test's begin, steps it to its end, and reports its progress to the runner."""
 
-import contextlib
 import json
 import logging
 import os
@@ -10,7 +9,6 @@ from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
@@ -122,10 +120,7 @@ class ClockService(Service):
         """Take a message of the application."""
         takers = self._stepper.takers(envelope.data_type)
         if takers and any(each.matches(envelope) for each in self._answers.filters):
-            with contextlib.suppress(MessageError):  # the services say so
-                message = self._session.messages.decode(envelope.data_type, envelope.payload)
-                since = (self._stepper.now - EPOCH) / MICROSECONDS
-                self._senders.check_numbers(message, envelope.sender_stamp, takers, since)
+            self._senders.check_numbers(envelope, takers, self._stepper.now - EPOCH)
         self._answers.take(envelope)
 
     def _over(self) -> bool:

@@ -39,7 +39,7 @@ def pedal_position(request: float, car: Car = KIWI) -> float:
 
 
 _GAMMA = 1 - math.sqrt(0.5)
-"""Where in a step its stages are implicit: with it the method is of second order and L-stable."""
+"""Share of a step that each stage is long: so the method is of second order and L-stable."""
 
 
 def step(motion: BodyMotion, wheel: float, pedal: float, dt: float, car: Car = KIWI) -> BodyMotion:
@@ -51,12 +51,8 @@ def step(motion: BodyMotion, wheel: float, pedal: float, dt: float, car: Car = K
     if abs(motion.vx) <= car.slip_speed:
         motion = BodyMotion(motion.vx)
     first = _implicit(motion, wheel, pedal, _GAMMA * dt, car)
-    part = 1 / _GAMMA - 1
-    second = BodyMotion(
-        motion.vx + part * (first.vx - motion.vx),
-        motion.vy + part * (first.vy - motion.vy),
-        motion.yaw_rate + part * (first.yaw_rate - motion.yaw_rate),
-    )
+    pairs = ((motion.vx, first.vx), (motion.vy, first.vy), (motion.yaw_rate, first.yaw_rate))
+    second = BodyMotion(*(start + (1 / _GAMMA - 1) * (end - start) for start, end in pairs))
     return _implicit(second, wheel, pedal, _GAMMA * dt, car)
 
 
@@ -173,7 +169,6 @@ class Vehicle:
     def __init__(self, car: Car = KIWI, condition: Condition = AS_NEW, drive: Drive | None = None) -> None:
         """Without a `drive` it is that of the Kiwi car, with the parameters of `car`."""
         self.motion = BodyMotion()
-        self.rejected = 0
         self.car = condition.of(car)
         self.drive: Drive = drive or KiwiDrive(self.car, condition.steering_offset)
         self._latency = round(condition.latency * MICROSECONDS)
@@ -185,7 +180,6 @@ class Vehicle:
     def request(self, actuator: str, value: float) -> bool:
         """Take a request to an actuator of the drive; False, and nothing changes, when it is not finite."""
         if not math.isfinite(value):
-            self.rejected += 1
             return False
         accepted = self.drive.accepted(actuator, value)
         if self._latency and self._now is not None:

@@ -72,9 +72,8 @@ class DynamicModel(Service):
     def _handler(self, name: str, field: str, actuator: str) -> Handler:
         def take(message: Any, _sample_time: int) -> None:
             value = getattr(message, field)
-            if not self.vehicle.request(actuator, value) and self.vehicle.rejected == 1:
-                short = name.rpartition(".")[2]
-                self._log.warning("ignored a %s of %s, and will ignore all that are not finite", short, value)
+            if not self.vehicle.request(actuator, value):
+                self._log.warning("ignored a %s of %s", name.rpartition(".")[2], value)
 
         return take
 
