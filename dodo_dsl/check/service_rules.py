@@ -101,6 +101,9 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
             yield argument.problem
         elif not holds(argument.parameter.when, service.texts):
             yield _without_effect(service, argument, entry)
+        elif argument.parameter.deprecated:
+            message = f"parameter '{name}' is deprecated: {argument.parameter.deprecated}"
+            yield Diagnostic(entry.key, "unused-parameter", message, "remove it", "warning")
 
 
 def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) -> Diagnostic:

@@ -39,7 +39,7 @@ SIGNALS = {
 BOUNDS = {"opendlv.proxy.GroundSteeringRequest": "38 deg", "opendlv.proxy.PedalPositionRequest": "1"}
 """The size that answers to pictures may have, by the Kiwi car's vehicle; of other messages any."""
 SHARE_OF_MEAN, SHARE_OF_DISTANCE = 10, 50
-"""Limits of the distance to the recorded signal, in percent of its range."""
+"""Limits of the distance to the recorded signal, in percent of its range; of the mean at most half of a constant's."""
 FEWEST = 10
 DEFAULT_GAP_S = 1
 """Longer gaps are shortened by the player unless it is set otherwise, but not in a target."""
@@ -80,6 +80,11 @@ class RecordedDrive:
         """Of the signal; its largest value where it is constant, 1 if that is 0."""
         values = self.values or (0.0,)
         return max(values) - min(values) or max(map(abs, values)) or 1.0
+
+    @property
+    def of_constant(self) -> float:
+        """The mean distance of the signal to the constant that is nearest to it."""
+        return float(np.abs(np.array(self.values) - np.median(self.values)).mean()) if self.values else 0.0
 
 
 def look(path: Path, sent: Collection[str]) -> RecordedDrive:
@@ -202,9 +207,8 @@ def files(
         is_target=drive.target is not None,
         bound=BOUNDS.get(message, ""),
         sender=drive.target.sender_stamp if drive.target else 0,
-        mean=_limit(drive.range * SHARE_OF_MEAN / 100),
+        mean=_limit(min(drive.range * SHARE_OF_MEAN / 100, drive.of_constant / 2 or math.inf)),
         distance=_limit(drive.range * SHARE_OF_DISTANCE / 100),
-        share_of_mean=SHARE_OF_MEAN,
         share_of_distance=SHARE_OF_DISTANCE,
     )
     return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)

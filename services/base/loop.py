@@ -127,7 +127,8 @@ class Loop:
     """In real time: the services of the test, whose messages others must not send."""
     _handlers: dict[int, list[tuple[int | None, Handler, Layout]]] = field(default_factory=dict)
     _stamps: HeardStamps = field(init=False)
-    _has_begun: bool = False
+    _began: int | None = None
+    """When the test began, in us."""
     _reported: int = 0
     _paused: float = 0.0
     _report_after: int = 0
@@ -156,7 +157,7 @@ class Loop:
         if self.service.finished and self.service.verdict is None:
             print(json.dumps({"dodo": "end-of-input"}), flush=True)
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
-        self.clock.close(stopped if self._has_begun else lambda: True)
+        self.clock.close(stopped if self._began is not None else lambda: True)
         self._tell_strangers()
         self._report(self.clock.now())
         if self.session.lost:
@@ -216,7 +217,7 @@ class Loop:
         if envelope.data_type in self._handlers:
             self._stamps.take(envelope)
         if envelope.data_type == self._begin:
-            self._has_begun = True
+            self._began = envelope.sample_time
             if self.members is not None:
                 self.members.begin()
             self.service.begin(envelope.sample_time)
@@ -230,6 +231,9 @@ class Loop:
                 except MessageError as error:
                     _warn_once("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, str(error))
                     return
+                if self.members is not None:
+                    began, arrived = self._began, self.service.arrived
+                    self.members.check_numbers(envelope, arrived - began if began and arrived else None)
                 handler(message, envelope.sample_time)
 
     def _tell_strangers(self) -> None:

@@ -23,7 +23,6 @@ class Integration(Service):
         self._log = context.log
         self.period = period_of(flags["freq"])
         self.body = Integrator(start(flags))
-        self.rejected = 0
         self._frame = context.messages.type(FRAME)
         self._old = MessageSet(odvd.load(OLD_FRAME)) if flags["euler"] else None
         self._stamps = [stamp for stamp in (flags["frame-id"], flags["copy-id"]) if stamp is not None]
@@ -51,9 +50,7 @@ class Integration(Service):
         if all(map(math.isfinite, (*twist.velocity, *twist.rates))):
             self.body.feed(twist, sample_time)
             return
-        self.rejected += 1
-        if self.rejected == 1:
-            self._log.warning("ignored a KinematicState of %s, and will ignore all that are not finite", twist)
+        self._log.warning("ignored a KinematicState of %s", twist)
 
 
 def _old_payload(messages: MessageSet, pose: BodyPose) -> bytes:

@@ -65,7 +65,7 @@ class Loop:
             Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), VehicleBox(0.36, 0.16)
         )
         heading = math.radians(90 + self.yaw)
-        car, body = Vehicle(100), Integrator(Attitude((self.right, 0.0, 0.0), quaternion(0, 0, heading)))
+        car, body = Vehicle(), Integrator(Attitude((self.right, 0.0, 0.0), quaternion(0, 0, heading)))
         driver, answers = steering.Driver(self.reverse), []
         now = 0
         evaluator.begin(now)

@@ -56,7 +56,7 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
     code, out, err = dodo("new", "mine", "--level", "dil", "--rec", file)
     assert (code, err) == (0, "")
     assert f"{file}: 15.0 s, pictures of the camera with sender stamp 0\n" in out
-    assert f"judged: groundSteering of {STEERING}/0, 151 values from -0.0672978 to 0.113228\n" in out
+    assert f"judged: groundSteering of {STEERING}/0, 151 values from -0.0675461 to 0.113257\n" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     found = spec(empty, "mine")
     assert found["rec"] == found["target"] == f"../recordings/{file}"
@@ -222,7 +222,10 @@ def test_what_makes_no_test_is_said(empty: Path, words: list[str], said: str) ->
     assert err.startswith(f"dodo new: {said}")
 
 
-@pytest.mark.parametrize(("values", "limit"), [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30")])
+@pytest.mark.parametrize(
+    ("values", "limit"),
+    [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30"), ([0.0] * 19 + [1.0], "0.025")],
+)
 @pytest.mark.thorough
 def test_limits_have_two_digits_and_are_never_zero(empty: Path, values: list[float], limit: str) -> None:
     write(empty / "drive.rec", (STEERING, 0, values))
