@@ -97,7 +97,7 @@ def with_strangers(reason: str, strangers: Iterable[str]) -> str:
     return "; ".join([reason, *strangers])
 
 
-TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
+TEST_BEGIN, END_OF_INPUT, NOT_SHOWN = "dodo.TestBegin", "dodo.EndOfInput", "dodo.NotShown"
 REPORT_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
@@ -135,6 +135,8 @@ class Loop:
         ids = self.session.messages.id
         for (name, stamp), handler in self.service.inputs.items():
             self._handlers.setdefault(ids(name), []).append((stamp, handler))
+        if type(self.service).not_shown is not Service.not_shown:
+            self._handlers[ids(NOT_SHOWN)] = [(None, self.service.not_shown)]
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
         self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)

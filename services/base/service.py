@@ -152,6 +152,9 @@ class Service:
     def end_of_input(self, now: int) -> None:
         """A source has ended: evaluators decide."""
 
+    def not_shown(self, message: Any, due: int) -> None:
+        """A player could not show the frame of a ``dodo.NotShown``."""
+
     def record(self) -> None:
         """The service ends, with a verdict or without: complete what is in ``judged``."""
 

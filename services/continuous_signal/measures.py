@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.base import Check
-from services.base.evaluator import EARLY
+from services.base.evaluator import EARLY, Hidden
 from services.continuous_signal.target import MICROSECONDS, Target, Times, Values
 
 
@@ -21,7 +21,7 @@ from services.continuous_signal.target import MICROSECONDS, Target, Times, Value
 class Coverage:
     """The judged time, which share of it samples hold, and its longest gap without one; all times in s.
 
-    Without samples the gap is the whole time.
+    Without samples the gap is the whole time. In ``hidden`` s of the gap nothing was shown, which do not count.
     """
 
     begin: float
@@ -29,11 +29,12 @@ class Coverage:
     share: float
     gap_begin: float
     gap_end: float
+    hidden: float = 0.0
 
     @property
     def gap(self) -> float:
         """The length of the longest gap, in s."""
-        return self.gap_end - self.gap_begin
+        return self.gap_end - self.gap_begin - self.hidden
 
 
 def holds(times: Times, end: int, longest: int) -> Values:
@@ -42,14 +43,24 @@ def holds(times: Times, end: int, longest: int) -> Values:
     return found
 
 
-def cover(times: Times, begin: int, end: int, longest: int) -> Coverage:
-    """What samples cover of the time from `begin` to `end`; `times` ascend and are inside it, all in us."""
+def cover(times: Times, begin: int, end: int, longest: int, hidden: Hidden | None = None) -> Coverage:
+    """What samples cover of the time from `begin` to `end`; `times` ascend and are inside it, all in us.
+
+    Time that is ``hidden`` does not pass.
+    """
     edges = np.concatenate([[begin], times, [end]])
-    gaps = np.diff(edges)
+    shown = edges
+    if hidden:
+        lengths = np.diff(hidden, prepend=hidden[0])
+        lengths[::2] = 0
+        shown = edges - np.rint(np.interp(edges, hidden, np.cumsum(lengths))).astype(np.int64)
+    gaps = np.diff(shown)
     at = int(np.argmax(gaps))
-    share = float(holds(times, end, longest).sum()) / (end - begin)
+    share = float(holds(shown[1:-1], shown[-1], longest).sum()) / (shown[-1] - shown[0])
+    lost = edges[at + 1] - edges[at] - gaps[at]
     return Coverage(*(float(each) for each in (
         begin / MICROSECONDS, end / MICROSECONDS, share, edges[at] / MICROSECONDS, edges[at + 1] / MICROSECONDS,
+        lost / MICROSECONDS,
     )))  # fmt: skip
 
 
@@ -241,11 +252,13 @@ def measure(
     limits: SignalLimits,
     judged: tuple[int, int] | None = None,
     frames: Times | None = None,
+    hidden: Hidden | None = None,
 ) -> SignalMeasures:
     """The measures of samples in any order, their times in microseconds on the target's own scale.
 
     ``judged`` is the part of the target's time that they have to cover; by default all of it. ``frames`` are the times
-    of the pictures that have to be answered, ascending; by default each sample answers one.
+    of the pictures that have to be answered, ascending; by default each sample answers one. Nothing has to be held
+    while frames are ``hidden``.
     """
     inside = times >= limits.start
     if limits.until is not None:
@@ -260,7 +273,7 @@ def measure(
     begin, end = judged or judged_time(target, limits)
     if samples and times[known][0] <= limits.start_up:
         begin = max(begin, int(times[known][0]))
-    coverage = _coverage(times[known], begin, end, limits.hold)
+    coverage = _coverage(times[known], begin, end, limits.hold, hidden)
     if not samples:
         return SignalMeasures(len(times), 0, outside, broken, coverage=coverage)
     times, values, expected = times[known], values[known], expected[known]
@@ -323,8 +336,9 @@ def _average(values: NDArray[Any], weights: Values) -> float:
     return round(float(np.average(values, weights=weights)), _DIGITS)
 
 
-def _coverage(times: Times, begin: int, end: int, hold: int) -> Coverage | None:
-    return cover(times[(times >= begin) & (times <= end)], begin, end, hold) if begin < end else None
+def _coverage(times: Times, begin: int, end: int, hold: int, hidden: Hidden | None) -> Coverage | None:
+    is_seen = begin < end if not hidden else hidden.shown(begin) < hidden.shown(end)
+    return cover(times[(times >= begin) & (times <= end)], begin, end, hold, hidden) if is_seen else None
 
 
 def _check(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.base.evaluator import Hidden
 from services.base.judged import FAILED, MOST_SAMPLES, WARNED
 from services.continuous_signal.measures import (
     Coverage,
@@ -222,7 +223,13 @@ class SignalEvaluator(Evaluator):
         start = begin if self._from_begin else target.start
         times, values = self._samples.since(start)
         judged = self._judged(target, span.is_complete)
-        measures = measure(target, times, values, self._limits, judged, self._frames)
+        hidden = Hidden(each - start for each in (self.hidden if self._from_begin else self.hidden_samples))
+        frames = self._frames
+        if frames is not None:
+            frames = frames[[not hidden.hides(frame) for frame in frames.tolist()]]
+        if hidden and hidden.shown(judged[0]) == hidden.shown(judged[1]):
+            raise UnjudgeableError(f"no frame was shown {span.within}, so there was nothing to answer")
+        measures = measure(target, times, values, self._limits, judged, frames, hidden)
         if self._limits.sign_share is not None and measures.samples and measures.sign_share is None:
             raise UnjudgeableError(f"the target is nowhere farther than {self._limits.floor:g} from 0: it has no sign")
         said = verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))

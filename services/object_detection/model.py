@@ -208,14 +208,15 @@ class DetectionEvaluator(Evaluator):
         if self._truth is None and not self._has_truth:
             raise UnjudgeableError(f"no true box came {span.within}")
         for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
-            if self._truth and (span.is_complete or key < self._last):
+            is_shown = not (self._truth and self._truth.frames == "sample-time" and self.hidden_samples.hides(key))
+            if self._truth and is_shown and (span.is_complete or key < self._last):
                 counts = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
                 self._count(counts, JudgedFrame(key, f"of picture {key}", None), {"picture": key})
         if self._truth is None or span.is_complete:
             self._require_truth(span.within)
         end = self.elapsed(self.now if self._ended is None else self._ended) if self.now is not None else 0.0
         self._score.unanswered = self._silence.unanswered()
-        self._score.gap = self._silence.gap(self._rules.start, min(end, self._max_time))
+        self._score.gap = self._silence.gap(self._rules.start, min(end, self._max_time), self._hidden)
         return replace(verdict(self._score, self._limits, span.within), evidence=self._score.evidence())
 
     def _require_truth(self, within: str) -> None:
@@ -229,6 +230,11 @@ class DetectionEvaluator(Evaluator):
             raise UnjudgeableError(f"no true box of class '{missing[0]}' came {within}")
         if not there:
             raise UnjudgeableError(f"none of {self._score.frames} frames has a true box {within}")
+
+    def _hidden(self, begin: float, end: float) -> float:
+        """For how long nothing was shown, all in s of the test."""
+        first, last = (self.zero + round(time * MICROSECONDS) for time in (begin, end))
+        return (last - first - self.hidden.shown(last) + self.hidden.shown(first)) / MICROSECONDS
 
     def _is_of_the_future(self, key: FrameKey) -> bool:
         """A frame that comes later must not be used up."""

@@ -81,10 +81,16 @@ def pixels(frame: DecodedFrame) -> RecordedPicture:
 def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
     """The first picture of the rows that can be decoded; raises VideoError if none can."""
     decoder = Decoder()
+    unknown: VideoError | None = None
     for envelope in recording.envelopes(rows):
-        frame = decoder.frame(envelope)
+        try:
+            frame = decoder.frame(envelope)
+        except VideoError as error:
+            frame, unknown = None, unknown or error
         if frame is not None:
             return frame
+    if unknown is not None:
+        raise unknown
     why = ": there is no key frame among them" if decoder.early == len(rows) else ""
     raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded{why}")
 
@@ -110,13 +116,13 @@ class PictureMemories:
         self.shown = self.misfits = 0
         self._memories = memories
 
-    def show(self, picture: RecordedPicture, sample_time: int) -> None:
-        """Publish a picture; raises SharedMemoryError when a reader keeps the lock."""
+    def show(self, picture: RecordedPicture, sample_time: int) -> bool:
+        """Publish a picture, if it has the size; raises SharedMemoryError when a reader keeps the lock."""
         if picture.argb.nbytes != self._memories[0][0].size:
             if not self.misfits:
                 _log.warning("skipped the picture of %d us, which has another size than the first", sample_time)
             self.misfits += 1
-            return
+            return False
         pictures = with_copies(picture.argb, picture.i420, (kind for _, kind in self._memories))
         for memory, kind in self._memories:
             if kind in pictures:
@@ -125,6 +131,7 @@ class PictureMemories:
                     memory.stamp(sample_time)
                     memory.notify_all()
         self.shown += 1
+        return True
 
 
 READ_AHEAD = 256
@@ -146,6 +153,8 @@ class EntryStream:
         self._recording, self._part = recording, part
         self.shown = part.shown
         """Which entries are pictures for the memory."""
+        self.times: Numbers = recording.index["time"][part.rows]
+        """The sample times of entries, in us."""
         self._images = np.flatnonzero(part.shown)
         self._entries = self._from(0)
         self._ahead: RecordedEntry | None = None

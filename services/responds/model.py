@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,6 +111,7 @@ class ResponseEvaluator(Evaluator):
     def __init__(self, name: str, field: str, frames: Frames, limits: ResponseLimits, max_time: float) -> None:
         super().__init__(max_time, limits.delay / MICROSECONDS)
         self._name, self._field, self._frames, self._limits = name, field, frames, limits
+        self._shown = np.ones(len(frames.due), np.bool_)
         if field:
             self.plot = self.judged.series(f"{field} of {name}", low=limits.low, high=limits.high)
         else:
@@ -129,6 +131,9 @@ class ResponseEvaluator(Evaluator):
     def forget(self, now: int) -> None:
         self._clear()
 
+    def not_shown(self, message: Any, due: int) -> None:
+        self._shown[message.number : message.number + 1] = False
+
     def take(self, values: Mapping[str, float], sample_time: int) -> None:
         """An answer with the numbers that are judged, by their fields."""
         arrival = self.arrival
@@ -136,6 +141,8 @@ class ResponseEvaluator(Evaluator):
             return
         self._received += 1
         number = self._frames.of(sample_time, arrival, self.zero)
+        while number >= 0 and not self._shown[number]:
+            number -= 1
         due = self.zero + int(self._frames.due[number]) if number >= 0 else arrival
         delay = arrival - due
         self._judge(values, due)
@@ -159,9 +166,14 @@ class ResponseEvaluator(Evaluator):
                 self.plot.add(time, value)
 
     def decide(self, span: JudgedTime) -> Verdict:
-        judged = self._judged()
-        if not len(judged):
+        due, limits = self._frames.due, self._limits
+        over = due + limits.delay <= (self.now or self.zero) - self.zero
+        asked = np.flatnonzero((over | self._answered) & self._shown)
+        if not len(asked):
             raise UnjudgeableError(f"no frame came {span.within}, so there was nothing to answer")
+        if len(asked) < limits.frames:
+            raise UnjudgeableError(f"only {len(asked)} frames came {span.within}, and {limits.frames} have to be answered")
+        judged = self._from_first(asked)
         answered = int(self._answered[judged].sum())
         checks = tuple(self.checks(answered, len(judged)))
         evidence = {"time": self._first_broken.time} if self._first_broken else {}
@@ -174,15 +186,11 @@ class ResponseEvaluator(Evaluator):
         said = f"answered {answered} of {len(judged)} frames with {self._name}{values}"
         return Verdict("passed", said + self._aside(), checks)
 
-    def _judged(self) -> Times:
-        """The numbers of the frames that had their time to be answered, or are, from the first answer on."""
-        due, limits = self._frames.due, self._limits
-        over = due + limits.delay <= (self.now or self.zero) - self.zero
-        numbers = np.flatnonzero(over | self._answered)
+    def _from_first(self, asked: Times) -> Times:
+        """The numbers of frames from the first answered one on."""
         answered = np.flatnonzero(self._answered)
-        if len(answered) and due[answered[0]] <= limits.start_up:
-            numbers = numbers[numbers >= answered[0]]
-        return numbers
+        is_soon = len(answered) and self._frames.due[answered[0]] <= self._limits.start_up
+        return asked[asked >= answered[0]] if is_soon else asked
 
     def checks(self, answered: int, judged: int) -> Iterator[Check]:
         """Each measure with its limit, of so many frames answered in time among those judged."""
