@@ -111,7 +111,7 @@ class Loop:
     lost so far (``{"dodo": "lost", "messages": N}``) and in real time how many updates ended late since the test began
     (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``) and for how long what is emulated stood still
     (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and messages that came
-    under other sender stamps only (``{"dodo": "note", "text": "..."}``), unless a verdict does. Raises what the model
+    under other sender stamps only (``{"dodo": "note", "text": "..."}``), unless a verdict does, and the service's notes. Raises what the model
     raises, and SessionError.
     """
 
@@ -235,8 +235,8 @@ class Loop:
         strangers, verdict = self._stamps.strangers(), self.service.verdict
         if strangers and verdict is not None and verdict.outcome == "failed":
             self.service.verdict = replace(verdict, reason=with_strangers(verdict.reason, strangers), silent=False)
-            return
-        for text in strangers:
+            strangers = []
+        for text in (*strangers, *self.service.notes):
             print(json.dumps({"dodo": "note", "text": text}), flush=True)
 
     def _report(self, now: int) -> None:

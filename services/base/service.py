@@ -3,7 +3,7 @@
 import json
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -139,6 +139,8 @@ class Service:
     """When the message that is handled, or was last, arrived, in microseconds of test time."""
     paused: float = 0.0
     """Seconds for which what the service emulates has stood still so far, as the machine was too busy for it."""
+    notes: Sequence[str] = ()
+    """Sentences for the result of the test, which decide nothing."""
     drive: Callable[[Callable[[], bool]], None] | None = None
     """Runs instead of the loop, for the clock service. Takes a function that says whether to stop."""
 

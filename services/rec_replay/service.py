@@ -3,7 +3,7 @@
 import logging
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -94,14 +94,19 @@ class Replay(Service):
             return None
         return self._player.when(int(self._pictures[0 if is_over else number]), in_next_round=is_over)
 
+    @property
+    def notes(self) -> Sequence[str]:
+        """The pictures that were not shown."""
+        lost, early = self._stream.decoder.undecoded, self._stream.decoder.early
+        misfits = self._memories.misfits if self._memories else 0
+        why = f", {early} of them before the first key frame" if early else ""
+        others = f"{misfits} frames have another size than the first and were not shown" if misfits else ""
+        return [*([f"{lost} frames could not be decoded and were not shown{why}"] if lost else ()), *filter(None, [others])]
+
     def close(self) -> None:
         """Log what could not be played."""
         if self._too_large:
             _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
-        if lost := self._stream.decoder.undecoded:
-            early = self._stream.decoder.early
-            why = f": {early} came before the first key frame" if early else ""
-            _log.warning("%d pictures could not be decoded and were not shown%s", lost, why)
         if self._memories is not None:
             _log.info("%d pictures were shown", self._memories.shown)
 
