@@ -50,6 +50,17 @@ class Check:
         }
 
 
+SINGLE = 2.0**-23
+"""By which numbers of type float, singles, are apart, as a share of them: 0.3 is sent as 0.30000001192092896."""
+
+
+def at_limit(value: float | None, limit: float | None, single: float) -> float | None:
+    """The limit in place of a value that differs from it only as singles of the size ``single`` do."""
+    if value is None or limit is None or abs(value - limit) > single * SINGLE:
+        return value
+    return limit
+
+
 _MOST_REASON = 2000
 """Characters of a reason: of longer ones the runner takes no verdict."""
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import recording_times
-from dodo_dsl.opendlv.message_set import OWN_IDS
 from dodo_dsl.opendlv.recording import Recording
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
@@ -67,22 +66,12 @@ class PlayedPart:
 def of_recording(path: Path, part: PlayedPart) -> Frames:
     """The frames as the player shows them; raises ValueError if there are none."""
     with Recording(path) as recording:
-        index = recording.index
-        times = index["time"]
-        begin = int(times[times > 0].min(initial=np.iinfo(np.int64).max))
-        start = begin + round(part.start * MICROSECONDS) if part.start else None
-        end = None if part.end is None else begin + round(part.end * MICROSECONDS)
-        rows = recording.rows(start=start, end=end)
-        rows = rows[~np.isin(index["data_type"][rows], list(OWN_IDS))]
-        played = recording_times.within(recording, rows)
-        order = np.argsort(played, kind="stable")
-        rows, played = rows[order], played[order]
-        shown = (index["data_type"][rows] == recording_times.IMAGE) & (index["sender_stamp"][rows] == part.sender)
+        max_gap = round(part.max_gap * MICROSECONDS)
+        rows, times, due = recording_times.played(recording, part.start, part.end, max_gap, part.timemod)
+        shown = np.isin(rows, recording.rows([recording_times.IMAGE], sender_stamps=[part.sender]))
     if not shown.any():
         raise ValueError(f"{path}: has no pictures of sender {part.sender} in the part that is played")
-    gaps = np.minimum(np.diff(played, prepend=played[:1]), round(part.max_gap * MICROSECONDS))
-    due = np.rint(np.cumsum(gaps) / part.timemod).astype(np.int64)[shown]
-    return Frames(due, None if part.is_test_time else played[shown])
+    return Frames(due[shown], None if part.is_test_time else times[shown])
 
 
 @dataclass(frozen=True)
