@@ -110,9 +110,9 @@ class Loop:
     ``name`` is the source in its EndOfInput. Lines on stdout report, once a second at most, how many messages were
     lost so far (``{"dodo": "lost", "messages": N}``) and in real time how many updates ended late since the test began
     (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``) and for how long what is emulated stood still
-    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and messages that came
-    under other sender stamps only (``{"dodo": "note", "text": "..."}``), unless a verdict does, and the service's notes. Raises what the model
-    raises, and SessionError.
+    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and the
+    service's notes, with messages that came under other sender stamps only, unless a verdict does
+    (``{"dodo": "note", "text": "..."}``). Raises what the model raises, and SessionError.
     """
 
     name: str

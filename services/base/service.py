@@ -51,14 +51,12 @@ class Check:
 
 
 SINGLE = 2.0**-23
-"""By which numbers of type float, singles, are apart, as a share of them: 0.3 is sent as 0.30000001192092896."""
+"""What float fields are exact to, as a share of their value: 0.3 comes as 0.30000001192092896."""
 
 
-def at_limit(value: float | None, limit: float | None, single: float) -> float | None:
-    """The limit in place of a value that differs from it only as singles of the size ``single`` do."""
-    if value is None or limit is None or abs(value - limit) > single * SINGLE:
-        return value
-    return limit
+def at_limit(value: float, limit: float | None, exact: float) -> float:
+    """A value that is exact to ``exact``; the limit itself where it may be that."""
+    return value if limit is None or abs(value - limit) > exact else limit
 
 
 _MOST_REASON = 2000

@@ -3,7 +3,7 @@
 import logging
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,7 @@ class Replay(Service):
         self._player, self._stream, self._memories = player, stream, memories
         self._status, self._not_shown = messages.type(STATUS), messages.type(NOT_SHOWN)
         self._shifts, self._settle = shifts, settle
-        self._too_large = 0
+        self._too_large = self._lost = 0
         self._reported = -STATUS_PERIOD
         self._end: int | None = None
         self._pictures = np.flatnonzero(stream.shown)
@@ -94,15 +94,6 @@ class Replay(Service):
             return None
         return self._player.when(int(self._pictures[0 if is_over else number]), in_next_round=is_over)
 
-    @property
-    def notes(self) -> Sequence[str]:
-        """The pictures that were not shown."""
-        lost, early = self._stream.decoder.undecoded, self._stream.decoder.early
-        misfits = self._memories.misfits if self._memories else 0
-        why = f", {early} of them before the first key frame" if early else ""
-        others = f"{misfits} frames have another size than the first and were not shown" if misfits else ""
-        return [*([f"{lost} frames could not be decoded and were not shown{why}"] if lost else ()), *filter(None, [others])]
-
     def close(self) -> None:
         """Log what could not be played."""
         if self._too_large:
@@ -124,23 +115,26 @@ class Replay(Service):
         if self._shifts:
             envelope = envelope._replace(sent=due, sample_time=due)
         if self._memories is not None and self._stream.shown[entry]:
-            if picture is None or not self._memories.show(picture, envelope.sample_time):
-                yield Output(self._missed(entry, due), 0, due)
+            is_shown = picture is not None and self._memories.show(picture, envelope.sample_time)
+            if not is_shown:
+                yield Output(self._missed(entry, due, self._memories.misfits), 0, due)
         if is_sent and len(envelope.payload) > LARGEST_PAYLOAD:
             self._too_large += 1
         elif is_sent:
             yield envelope
 
-    def _missed(self, entry: int, due: int) -> Message:
+    def _missed(self, entry: int, due: int, misfits: int) -> Message:
         """The message that a picture was not shown, and until when: evaluators expect no answer to it."""
         number, times, next_due = int(np.searchsorted(self._pictures, entry)), self._stream.times, self._next_due()
         until = due + DAY if next_due is None else next_due
         sampled = due if self._shifts else int(times[entry])
         later = self._pictures[number + 1 :][:1]
         length = until - due if self._shifts or not len(later) else int(times[later[0]]) - sampled
-        missed: Message = self._not_shown(
-            number=number, sampled=sampled, sampledUntil=sampled + length, dueUntil=until
-        )
+        self._lost, early = self._lost + 1, self._stream.decoder.early
+        reasons = {"before the first key frame": early, "of another size than the first": misfits}
+        why = (f", {count} of them {reason}" for reason, count in reasons.items() if count)
+        self.notes = [f"{self._lost} frames could not be shown{''.join(why)}"]
+        missed: Message = self._not_shown(number=number, sampled=sampled, sampledUntil=sampled + length, dueUntil=until)
         return missed
 
 
@@ -158,7 +152,9 @@ def build(context: Context) -> Service:
         player.play()
     settle = round(flags["settle"] * MICROSECONDS)
     memories = _memories(context, recording, part)
-    service = Replay(player, stream, memories, context.messages, flags["sample-times"] == "test", settle, context.clock.expect)
+    service = Replay(
+        player, stream, memories, context.messages, flags["sample-times"] == "test", settle, context.clock.expect
+    )
     service.late_after = _half_period(part)
     context.resources.callback(service.close)
     return service

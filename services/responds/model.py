@@ -13,6 +13,7 @@ from dodo_dsl.opendlv.recording import Recording
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
 from services.base.evaluator import EARLY
+from services.base.service import at_limit
 
 Times = NDArray[np.int64]
 """Microseconds."""
@@ -76,7 +77,7 @@ def of_recording(path: Path, part: PlayedPart) -> Frames:
 
 @dataclass(frozen=True)
 class ResponseLimits:
-    """Limits of the answers; ``delay`` and ``start_up`` in us. Values of the field are from ``low`` to ``high``."""
+    """Limits of the answers; ``delay`` and ``start_up`` in us. Values of the field are from ``low`` to ``high``, and ``exact`` to a share of themselves."""
 
     share: float
     frames: int
@@ -84,6 +85,7 @@ class ResponseLimits:
     start_up: int
     low: float | None = None
     high: float | None = None
+    exact: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -149,6 +151,8 @@ class ResponseEvaluator(Evaluator):
                 self._broken += 1
                 self._first_broken = self._first_broken or BrokenValue(field, self.elapsed(time))
             elif field == self._field:
+                limits, exact = self._limits, self._limits.exact * abs(value)
+                value = at_limit(at_limit(value, limits.low, exact), limits.high, exact)
                 self._lowest = value if self._lowest is None else min(self._lowest, value)
                 self._highest = value if self._highest is None else max(self._highest, value)
             if field == self._field:
@@ -161,7 +165,9 @@ class ResponseEvaluator(Evaluator):
         if not len(asked):
             raise UnjudgeableError(f"no frame came {span.within}, so there was nothing to answer")
         if len(asked) < limits.frames:
-            raise UnjudgeableError(f"only {len(asked)} frames came {span.within}, and {limits.frames} have to be answered")
+            raise UnjudgeableError(
+                f"only {len(asked)} frames came {span.within}, and {limits.frames} have to be answered"
+            )
         judged = self._from_first(asked)
         answered = int(self._answered[judged].sum())
         checks = tuple(self.checks(answered, len(judged)))
@@ -172,6 +178,8 @@ class ResponseEvaluator(Evaluator):
         if faults:
             return Verdict("failed", "; ".join(faults) + self._aside(), checks, evidence=evidence)
         values = f", {self._field} from {self._lowest:z.4g} to {self._highest:z.4g}" if self._field else ""
+        if self._field and self._lowest == self._highest and self._received > 1:
+            self.notes = [f"all {self._received} answers have the same {self._field}, {self._lowest:z.4g}"]
         said = f"answered {answered} of {len(judged)} frames with {self._name}{values}"
         return Verdict("passed", said + self._aside(), checks)
 
