@@ -198,6 +198,8 @@ def resolve(
             if (manifest := manifests.get(use.uses.text)) is not None
         )
         services, wiring = _driven(services, wire(services, declared), declared)
+        if spec.timeout_s and any(service.ends_input for service in services):
+            services = tuple(_with_default(each, "within_timeout", f"{spec.timeout_s:g}") for each in services)
         played = replayed(wiring, services, deployment.messages)
         found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
     return found
@@ -208,15 +210,16 @@ def _driven(
 ) -> tuple[tuple[ResolvedService, ...], Wiring]:
     """Services and wiring where the messages that drive the vehicle have taken the place of defaults."""
     messages = ",".join(driving(wiring))
-    found = tuple(_with_default(service, messages) for service in services) if messages else services
+    found = tuple(_with_default(service, "driving", messages) for service in services) if messages else services
     return (services, wiring) if all(map(operator.is_, found, services)) else (found, wire(found, declared))
 
 
-def _with_default(service: ResolvedService, messages: str) -> ResolvedService:
+def _with_default(service: ResolvedService, key: str, text: str) -> ResolvedService:
+    """The service with another default of its parameters that are ``driving``, or whatever the key is."""
     changed = {
-        name: replace(each, value=replace(each.value, text=messages))
+        name: replace(each, value=replace(each.value, text=text))
         for name, each in service.arguments.items()
-        if each.parameter.driving and each.entry is None and each.value and each.value.text != messages
+        if getattr(each.parameter, key) and each.entry is None and each.value and each.value.text != text
     }
     return replace(service, arguments={**service.arguments, **changed}) if changed else service
 

@@ -51,6 +51,12 @@ class ResolvedService:
         """The values as strings; parameters without a fitting value are missing."""
         return {name: a.value.text for name, a in self.arguments.items() if a.value is not None}
 
+    @property
+    def ends_input(self) -> bool:
+        """Whether it ends the input of its test."""
+        endless = self.manifest.endless
+        return endless is not None and not any(holds(when, self.texts) for when in endless)
+
     def filling(self, placeholder: str) -> str | None:
         """What stands for a placeholder of the manifest's ports; None if its parameter has no fitting value.
 
@@ -111,7 +117,8 @@ def resolved(
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
         entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
-        same = known is not None and known.parameter is parameter and known.entry is entry and not parameter.driving
+        is_of_test = parameter.driving or parameter.within_timeout
+        same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
         if not holds(parameter.when, texts):
             arguments[name] = known if known and same and known.value is None else Argument(parameter, entry)
             continue

@@ -49,6 +49,9 @@ def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
     for item in cases.items if isinstance(cases, Sequence) else ():
         if isinstance(item, Mapping):
             yield from _conditions(item.get("when"), types)
+    endless = node.get("endless")
+    for item in endless.items if isinstance(endless, Sequence) else ():
+        yield from _conditions(item, types)
     groups = node.get("one-of")
     for scalar in walk(groups) if groups is not None else ():
         if isinstance(scalar, Scalar) and scalar.text not in types:
@@ -238,7 +241,8 @@ class Manifest:
     """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None.
 
     A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
-    by patterns of their names, empty if it does not declare them. ``messages`` are those that it has whatever its
+    by patterns of their names, empty if it does not declare them. ``endless`` is when it does not end
+    the input, None if it never does. ``messages`` are those that it has whatever its
     parameters are, ``cases`` the others.
     """
 
@@ -255,6 +259,7 @@ class Manifest:
     example: tuple[str, ...] | None = None
     one_of: tuple[tuple[str, ...], ...] = ()
     checks: dict[str, str] = field(default_factory=dict)
+    endless: tuple[When, ...] | None = None
     cases: tuple[Case, ...] = ()
 
     def messages_with(self, texts: Map[str, str]) -> Ports:
@@ -320,6 +325,7 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
         example=tuple(raw["example"]) if "example" in raw else None,
         one_of=tuple(tuple(names) for names in raw.get("one-of", ())),
         checks=raw.get("checks") or {},
+        endless=tuple(map(_when, raw["endless"])) if "endless" in raw else None,
         cases=tuple(Case(_when(case["when"]), _ports(case)) for case in (raw.get("messages") or {}).get("cases", ())),
     )
     return manifest, found

@@ -77,7 +77,10 @@ def of_recording(path: Path, part: PlayedPart) -> Frames:
 
 @dataclass(frozen=True)
 class ResponseLimits:
-    """Limits of the answers; ``delay`` and ``start_up`` in us. Values of the field are from ``low`` to ``high``, and ``exact`` to a share of themselves."""
+    """Limits of the answers; ``delay`` and ``start_up`` in us. Values of the field are from ``low`` to ``high``.
+
+    They are ``exact`` to a share of themselves.
+    """
 
     share: float
     frames: int
@@ -146,7 +149,8 @@ class ResponseEvaluator(Evaluator):
             self._delay = max(self._delay or 0.0, delay / MICROSECONDS)
 
     def _judge(self, values: Mapping[str, float], time: int) -> None:
-        for field, value in values.items():
+        for field, sent in values.items():
+            value = sent
             if not np.isfinite(value):
                 self._broken += 1
                 self._first_broken = self._first_broken or BrokenValue(field, self.elapsed(time))
