@@ -227,7 +227,7 @@ def _times(service: ResolvedService, player: ResolvedService | None, unsure: Sev
         return
     first, begin, end = judged
     if begin >= end:
-        why = f"has nothing to judge: its target begins at {first:,g} s, and judged is from {begin:,g} s to {end:,g} s"
+        why = f"has nothing to judge: its target begins at {first:,.10g} s, judged are {begin:,.10g} s to {end:,.10g} s"
         hint = "write 'align: sample-time' for times since 1970" if first > _SINCE_1970 else "see from, until, max-time"
         yield "target", why, hint, "error"
     elif is_copied and first < _SINCE_1970:
@@ -271,11 +271,12 @@ def _counts(
     for name in {"min-samples", "min-frames"} & texts.keys():
         least, most = int(texts[name]), None
         path = player.arguments["rec"].value if player else None
-        if player and path and path.path and (sender := player.texts.get("video-sender", "")).isdecimal():
+        sender = player.texts.get("video-sender", "") if player else ""
+        if path and path.path and sender.isdecimal() and unsure == "error":
             most = pictures(path.path, int(sender), least)
-        elif period and name == "min-samples" and (judged := _judged(service)):
+        elif period and name == "min-samples" and (judged := _judged(service)) and judged[1] < judged[2]:
             _, begin, end = judged
-            most = max(0, math.floor(end / period + _CLOSE) - math.ceil(begin / period - _CLOSE) + 1)
+            most = math.floor(end / period + _CLOSE) - math.ceil(begin / period - _CLOSE) + 1
         elif period and name == "min-frames" and "max-delay" in texts:
             most = max(0, math.floor((float(texts["max-time"]) - float(texts["max-delay"])) / period + _CLOSE) + 1)
         if most is not None and most < least:

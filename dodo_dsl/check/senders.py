@@ -7,7 +7,7 @@ from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.opendlv.address import LINES, POSE, is_of_the_world
 
 SENDING_LAYERS = ("environment", "action")
-OF_SOURCES = ("dodo.EndOfInput", "dodo.NotShown")
+END_OF_INPUT = "dodo.EndOfInput"
 
 
 def senders(test: ResolvedTest) -> tuple[str, ...]:
@@ -26,7 +26,7 @@ def senders(test: ResolvedTest) -> tuple[str, ...]:
         if not wiring.judges_by(end.port):
             table[end.port] = [LINES]
     sources = sorted(use.name for use in test.spec.uses if use.layer in SENDING_LAYERS)
-    table.update((Port("message", name), sources) for name in OF_SOURCES)
+    table[Port("message", END_OF_INPUT)] = sources
     words = (
         f"{port}={','.join(f'{name}?' if name in own else name for name in names)}" for port, names in table.items()
     )

@@ -19,7 +19,7 @@ from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
-from services.base.members import Members, World
+from services.base.members import END_OF_INPUT, NOT_SHOWN, Members, World
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 SHORTEST = 10_000
@@ -97,7 +97,7 @@ def with_strangers(reason: str, strangers: Iterable[str]) -> str:
     return "; ".join([reason, *strangers])
 
 
-TEST_BEGIN, END_OF_INPUT, NOT_SHOWN = "dodo.TestBegin", "dodo.EndOfInput", "dodo.NotShown"
+TEST_BEGIN = "dodo.TestBegin"
 REPORT_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
