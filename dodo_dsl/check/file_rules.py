@@ -176,63 +176,57 @@ def _within(context: RuleContext, service: ResolvedService, seconds: str, entry:
         yield Diagnostic(entry.value.span, "short-timeout", message, hint, "warning")
 
 
-LIMIT = "input-limit"
-_CLOSE = 1e-9
 _SINCE_1970 = 1e8
 """Seconds; larger times count from 1970."""
+_CLOSE = 1e-9
 
 Unmet = tuple[str, str, str, Severity]
-"""The parameter that what the test shows cannot meet, why in words behind the service's name, and a hint."""
+"""A parameter that what the test shows cannot meet, why in words behind the service's name, and a hint."""
 
 
 def check_input(context: RuleContext) -> Iterator[Diagnostic]:
     """In lockstep a frame has one answer, with its sample time; else an application may answer as often as it likes."""
-    spec, wiring, services = context.spec, context.wiring, context.services
-    if not spec.is_whole or not context.test.is_complete:
-        return
+    spec, services = context.spec, context.services
     unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
     player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
     known = lockstep.rates(services)
-    period = 0.0 if player or not known.keys() & lockstep.cameras_of(wiring) else 1 / lockstep.step_hz(wiring, known)
-    is_endless = not any(service.ends_input for service in services)
-    for service in services:
-        if service.use.layer == "evaluation" and service.use.layer in service.manifest.layers:
-            found = [*_times(service, player, unsure), *_counts(service, player, period, unsure)]
-            for name, argument in service.arguments.items():
-                if is_endless and argument.parameter.within_timeout and not argument.entry:
-                    found += _to_the_end(name, float(argument.text or "inf"), spec.timeout_s or 0.0)
-            for name, why, hint, severity in found:
-                entry = service.use.parameters.get(name)
-                span = entry.value.span if entry else service.use.span
-                yield Diagnostic(span, LIMIT, f"'{service.use.name}' {why}", hint, severity)
-
-
-def _to_the_end(name: str, default: float, timeout: float) -> Iterator[Unmet]:
-    if default < timeout:
-        why = f"judges the first {default:g} s of at most {timeout:g} s, because nothing ends the input before"
-        yield name, why, f"write '{name}: ...', how long it is to judge", "warning"
+    has_rate = not player and known.keys() & lockstep.cameras_of(context.wiring)
+    period = 1 / lockstep.step_hz(context.wiring, known) if has_rate else 0.0
+    for service in services if spec.is_whole and context.test.is_complete else ():
+        found: list[Unmet] = []
+        for name, argument in service.arguments.items():
+            is_default = argument.parameter.within_timeout and not argument.entry and argument.text
+            if is_default and float(argument.text or 0) < (spec.timeout_s or 0.0):
+                why = (
+                    f"judges {argument.text} s of the {spec.timeout_s:g} s that it may take, as nothing ends the input"
+                )
+                found.append((name, why, f"write '{name}: ...', how long it is to judge", "warning"))
+        if service.use.layer == "evaluation":
+            found += [*_times(service, player, unsure), *_frames(service, player, period, unsure)]
+        for name, why, hint, severity in found:
+            entry = service.use.parameters.get(name)
+            span = entry.value.span if entry else service.use.span
+            yield Diagnostic(span, "input-limit", f"'{service.use.name}' {why}", hint, severity)
 
 
 def _times(service: ResolvedService, player: ResolvedService | None, unsure: Severity) -> Iterator[Unmet]:
     """Times of the target and of samples that never meet."""
-    texts, target = service.texts, service.arguments.get("target")
-    if target is None or "align" not in texts:
-        return
-    is_copied = bool(target.value) and texts["align"] == "sample-time"
-    if player and player.texts.get("sample-times") == "recorded" and not is_copied:
+    is_copied = service.texts.get("align") == "sample-time" and "target" in service.texts
+    if player and "align" in service.texts and player.texts.get("sample-times") == "recorded" and not is_copied:
         why = f"expects samples with times of the test, and frames of '{player.use.name}' keep those of the recording"
         hint = f"write 'sample-times: test' under 'with' of '{player.use.name}'"
         yield "align", why, hint, "warning" if without_pictures(player) else unsure
-    if (judged := _judged(service)) is None:
-        return
-    first, begin, end = judged
-    if begin >= end:
-        why = f"has nothing to judge: its target begins at {first:,.10g} s, judged are {begin:,.10g} s to {end:,.10g} s"
-        hint = "write 'align: sample-time' for times since 1970" if first > _SINCE_1970 else "see from, until, max-time"
-        yield "target", why, hint, "error"
-    elif is_copied and first < _SINCE_1970:
-        why = f"aligns by sample times, which count from 1970, and its target begins at {first:g} s"
-        yield "target", why, "write 'align: begin' for seconds since the start of the test", "error"
+    if judged := _judged(service):
+        first, begin, end = judged
+        if begin >= end:
+            why = (
+                f"has nothing to judge: its target begins at {first:,.10g} s, judged is {begin:,.10g} s to {end:.10g} s"
+            )
+            hint = "write 'align: sample-time' for times since 1970" if first > _SINCE_1970 else "see from and until"
+            yield "target", why, hint, "error"
+        elif is_copied and first < _SINCE_1970:
+            why = f"aligns by sample times, which count from 1970, and its target begins at {first:g} s"
+            yield "target", why, "write 'align: begin' for seconds since the start of the test", "error"
 
 
 def _judged(service: ResolvedService) -> tuple[float, float, float] | None:
@@ -242,11 +236,10 @@ def _judged(service: ResolvedService) -> tuple[float, float, float] | None:
     found = table_span(path, texts.get("target-field") or texts.get("field", "")) if path else None
     if found is None:
         return None
-    first, last = found
     is_copied = texts.get("align") == "sample-time"
-    begin, end = (0.0, last - first) if is_copied else found
-    ends = [float(texts[name]) for name in ("until", *(() if is_copied else ("max-time",))) if texts.get(name)]
-    return first, max(begin, float(texts.get("from", 0))), min(end, *ends, end)
+    begin, end = (0.0, found[1] - found[0]) if is_copied else found
+    limits = [float(texts[name]) for name in ("until", "max-time")[: 1 if is_copied else 2] if name in texts]
+    return found[0], max(begin, float(texts.get("from", 0))), min(end, *limits, end)
 
 
 @functools.lru_cache(maxsize=256)
@@ -263,41 +256,36 @@ def table_span(path: Path, field: str) -> tuple[float, float] | None:
     return times[0], times[-1]
 
 
-def _counts(
+def _frames(
     service: ResolvedService, player: ResolvedService | None, period: float, unsure: Severity
 ) -> Iterator[Unmet]:
-    """More answers than there are frames, or faster ones, where frames come each ``period`` s, or of a recording."""
-    texts = service.texts
-    for name in {"min-samples", "min-frames"} & texts.keys():
-        least, most = int(texts[name]), None
-        path = player.arguments["rec"].value if player else None
-        sender = player.texts.get("video-sender", "") if player else ""
-        if path and path.path and sender.isdecimal() and unsure == "error":
-            most = pictures(path.path, int(sender), least)
-        elif period and name == "min-samples" and (judged := _judged(service)) and judged[1] < judged[2]:
-            _, begin, end = judged
-            most = math.floor(end / period + _CLOSE) - math.ceil(begin / period - _CLOSE) + 1
-        elif period and name == "min-frames" and "max-delay" in texts:
-            most = max(0, math.floor((float(texts["max-time"]) - float(texts["max-delay"])) / period + _CLOSE) + 1)
-        if most is not None and most < least:
-            why = f"expects {least} answers, and what it judges has {most} frame{'' if most == 1 else 's'}"
-            yield name, why, f"write '{name}: {max(most, 1)}' or less", unsure
+    """More answers than there are frames in a recording or each ``period`` s, and a gap that is shorter than that."""
+    texts, judged = service.texts, _judged(service)
+    name = "min-samples" if "min-samples" in texts else "min-frames"
+    least = most = int(texts.get(name, 0))
+    path = player.arguments["rec"].value if player else None
+    if player and path and path.path and unsure == "error":
+        most = pictures(path.path, int(player.texts.get("video-sender", 0)), least)
+    elif period and judged and judged[1] < judged[2]:
+        most = math.floor(judged[2] / period + _CLOSE) - math.ceil(judged[1] / period - _CLOSE) + 1
+    elif period and name == "min-frames" and "max-delay" in texts:
+        most = math.floor((float(texts["max-time"]) - float(texts["max-delay"])) / period + _CLOSE) + 1
+    if most < least:
+        why = f"expects {least} answers, and what it judges has {most} frame{'' if most == 1 else 's'}"
+        yield name, why, f"write '{name}: {most}' or less", unsure
     gap = service.arguments.get("max-gap")
-    if gap and not gap.parameter.shared and gap.text and float(gap.text) < period - _CLOSE:
+    if gap and gap.text and not gap.parameter.shared and float(gap.text) < period - _CLOSE:
         why = f"expects an answer each {float(gap.text):g} s, and frames come each {period:g} s"
         yield "max-gap", why, f"write 'max-gap: {period:g} s' or more", unsure
-    if "hold" in texts and float(texts["hold"]) < (held := period * float(texts["min-coverage"])) - _CLOSE:
-        why = f"takes a sample to hold for {float(texts['hold']):g} s, and frames come each {period:g} s"
-        yield "hold", why, f"write 'hold: {held:g} s' or more", unsure
 
 
 @functools.lru_cache(maxsize=256)
-def pictures(path: Path, sender: int, most: int) -> int | None:
-    """How many frames of a camera a recording has, up to so many; None if that is not known, or it has none."""
+def pictures(path: Path, sender: int, most: int) -> int:
+    """How many frames of a camera a recording has, up to so many; so many if it has none, or is damaged."""
     try:
-        return recording_contents.count(path, known_ids(())[IMAGE], sender, most) or None
+        return recording_contents.count(path, known_ids(())[IMAGE], sender, most) or most
     except OSError:
-        return None  # reported with the file
+        return most  # reported with the file
 
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:

@@ -53,9 +53,10 @@ class ResolvedService:
 
     @property
     def ends_input(self) -> bool:
-        """Whether it ends the input of its test."""
-        endless = self.manifest.endless
-        return endless is not None and not any(holds(when, self.texts) for when in endless)
+        """Whether it ends the input of its test, as a recording does that is not repeated, and the end of a path."""
+        texts = self.texts
+        has_end = any(texts.get(name) for name in ("path", "points", "length")) and texts.get("hold") == "false"
+        return self.use.layer != "evaluation" and (has_end or texts.get("autorewind") == "false")
 
     def filling(self, placeholder: str) -> str | None:
         """What stands for a placeholder of the manifest's ports; None if its parameter has no fitting value.

@@ -49,13 +49,11 @@ def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
     for item in cases.items if isinstance(cases, Sequence) else ():
         if isinstance(item, Mapping):
             yield from _conditions(item.get("when"), types)
-    for key in ("one-of", "endless"):
-        listed = node.get(key)
-        for scalar in walk(listed) if listed is not None else ():
-            names = [each.partition("=")[0] for each in scalar.text.split(",")] if isinstance(scalar, Scalar) else ()
-            for name in (each for each in names if each not in types):
-                message = f"'{key}' names the unknown parameter '{name}'"
-                yield Diagnostic(scalar.span, RULE, message, did_you_mean(name, types))
+    groups = node.get("one-of")
+    for scalar in walk(groups) if groups is not None else ():
+        if isinstance(scalar, Scalar) and scalar.text not in types:
+            message = f"'one-of' names the unknown parameter '{scalar.text}'"
+            yield Diagnostic(scalar.span, RULE, message, did_you_mean(scalar.text, types))
     for name, entry in entries.items():
         if name in RESERVED:
             message = f"'--{name}' is a flag of every service, so it cannot name a parameter"
@@ -176,11 +174,6 @@ def _when(raw: dict[str, list[str | bool]]) -> When:
     return {name: tuple(v if isinstance(v, str) else str(v).lower() for v in values) for name, values in raw.items()}
 
 
-def _endless(text: str) -> When:
-    """What ``hold=true,path=`` stands for."""
-    return {name: (value,) for name, _, value in (each.partition("=") for each in text.split(","))}
-
-
 @dataclass(frozen=True)
 class Parameter:
     """A service's parameter; ``unit`` is the unit of the flag's number, empty for a bare number.
@@ -245,8 +238,7 @@ class Manifest:
     """One service; ``folder`` holds its ``service.yml``. ``example`` has flags to run it alone with, or is None.
 
     A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
-    by patterns of their names, empty if it does not declare them. ``endless`` is when it does not end
-    the input, None if it never does. ``messages`` are those that it has whatever its
+    by patterns of their names, empty if it does not declare them. ``messages`` are those that it has whatever its
     parameters are, ``cases`` the others.
     """
 
@@ -263,7 +255,6 @@ class Manifest:
     example: tuple[str, ...] | None = None
     one_of: tuple[tuple[str, ...], ...] = ()
     checks: dict[str, str] = field(default_factory=dict)
-    endless: tuple[When, ...] | None = None
     cases: tuple[Case, ...] = ()
 
     def messages_with(self, texts: Map[str, str]) -> Ports:
@@ -329,7 +320,6 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
         example=tuple(raw["example"]) if "example" in raw else None,
         one_of=tuple(tuple(names) for names in raw.get("one-of", ())),
         checks=raw.get("checks") or {},
-        endless=tuple(map(_endless, raw["endless"])) if "endless" in raw else None,
         cases=tuple(Case(_when(case["when"]), _ports(case)) for case in (raw.get("messages") or {}).get("cases", ())),
     )
     return manifest, found

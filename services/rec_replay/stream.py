@@ -37,6 +37,7 @@ class Decoder:
 
     def __init__(self) -> None:
         self.undecoded = self.early = 0
+        self.fault: VideoError | None = None
         self._messages = MessageSet.standard()
         self._format = ""
         self._codec: VideoDecoder | None = None
@@ -46,17 +47,24 @@ class Decoder:
         self._codec = None
 
     def frame(self, envelope: Envelope) -> DecodedFrame | None:
-        """The picture of a message; raises VideoError for a format that is not known, and a size that is too large."""
-        image = self._image(envelope)
+        """The picture of a message; None, and the ``fault``, for an unknown format or too large a size."""
         frame = None
-        if image is not None:
-            refuse_large(image.width, image.height)
-            if self._codec is None or image.format != self._format:
-                self._codec, self._format = VideoDecoder(image.format), image.format
-            before = self._codec.early
-            frame = self._codec.decode(image.data)
-            self.early += self._codec.early - before
+        try:
+            frame = self._decoded(self._image(envelope))
+        except VideoError as error:
+            self.fault = self.fault or error
         self.undecoded += frame is None
+        return frame
+
+    def _decoded(self, image: Any) -> DecodedFrame | None:
+        if image is None:
+            return None
+        refuse_large(image.width, image.height)
+        if self._codec is None or image.format != self._format:
+            self._codec, self._format = VideoDecoder(image.format), image.format
+        before = self._codec.early
+        frame = self._codec.decode(image.data)
+        self.early += self._codec.early - before
         return frame
 
     def is_key_frame(self, envelope: Envelope) -> bool:
@@ -81,16 +89,12 @@ def pixels(frame: DecodedFrame) -> RecordedPicture:
 def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
     """The first picture of the rows that can be decoded; raises VideoError if none can."""
     decoder = Decoder()
-    unknown: VideoError | None = None
     for envelope in recording.envelopes(rows):
-        try:
-            frame = decoder.frame(envelope)
-        except VideoError as error:
-            frame, unknown = None, unknown or error
+        frame = decoder.frame(envelope)
         if frame is not None:
             return frame
-    if unknown is not None:
-        raise unknown
+    if decoder.fault is not None:
+        raise decoder.fault
     why = ": there is no key frame among them" if decoder.early == len(rows) else ""
     raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded{why}")
 
@@ -191,9 +195,5 @@ class EntryStream:
                 yield RecordedEntry(envelope, sent, self._decoded(envelope) if shown else None)
 
     def _decoded(self, envelope: Envelope) -> RecordedPicture | None:
-        try:
-            frame = self.decoder.frame(envelope)
-        except VideoError:
-            self.decoder.undecoded += 1
-            return None
+        frame = self.decoder.frame(envelope)
         return pixels(frame) if frame is not None else None
