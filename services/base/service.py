@@ -50,7 +50,7 @@ class Check:
         }
 
 
-SINGLE = 2.0**-23
+SINGLE = 2.0**-24
 """What float fields are exact to, as a share of their value: 0.3 comes as 0.30000001192092896."""
 
 

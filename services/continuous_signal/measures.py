@@ -171,7 +171,7 @@ class SignalLimits:
 
     def exact_to(self, *values: Values) -> float:
         """To what the distance between values is exact."""
-        return self.exact * max(float(np.abs(each[np.isfinite(each)]).max(initial=0.0)) for each in values)
+        return self.exact * sum(float(np.abs(each[np.isfinite(each)]).max(initial=0.0)) for each in values)
 
     def band_at(self, expected: Values) -> Values:
         """The distance from each of these targets up to which a sample is inside the band; without a band any is."""
