@@ -1,7 +1,6 @@
 """Times of a recording that cannot be right: they would put messages where none belongs, and judge by that."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,19 +36,14 @@ def within(recording: Recording, rows: Numbers) -> Numbers:
     return np.clip(times, others.min(), others.max()) if len(others) else times
 
 
-class PlayedRows(NamedTuple):
-    """Rows of a recording in the order in which they are played, their times, and when they are due; all in us."""
+def played(
+    recording: Recording, start: float, end: float | None, max_gap: int, timemod: float
+) -> tuple[Numbers, Numbers, Numbers]:
+    """The rows that a player plays from ``start`` to ``end`` (s since the first message), in its order.
 
-    rows: Numbers
-    times: Numbers
-    due: Numbers
-
-
-def played(recording: Recording, start: float, end: float | None, max_gap: int, timemod: float) -> PlayedRows:
-    """What a player plays from ``start`` to ``end`` (s since the first message), with gaps of ``max_gap`` us at most.
-
-    A message without a sample time has its place by when it was received, or else sent. Gaps are those between
-    neighbours, whatever of them is chosen; then all goes ``timemod`` times faster. DoDo's messages are left out.
+    With them are their times, and when they are due, in us, with gaps of ``max_gap`` us at most. A message without a
+    sample time has its place by when it was received, or else sent. Gaps are those between neighbours, whatever of
+    them is chosen; then all goes ``timemod`` times faster. DoDo's messages are left out.
     """
     index, second = recording.index, 1_000_000
     begin = int(index["time"][index["time"] > 0].min(initial=1 << 62))
@@ -61,7 +55,7 @@ def played(recording: Recording, start: float, end: float | None, max_gap: int, 
     order = np.argsort(times, kind="stable")
     rows, times = rows[order], times[order]
     gaps = np.minimum(np.diff(times, prepend=times[:1]), max_gap)
-    return PlayedRows(rows, times, np.rint(np.cumsum(gaps) / timemod).astype(np.int64))
+    return rows, times, np.rint(np.cumsum(gaps) / timemod).astype(np.int64)
 
 
 def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:

@@ -143,7 +143,7 @@ def picture_times(path: Path, sender: int, start: int) -> Times | None:
 
 
 def due_times(path: Path, sender: int, start: float, end: float | None, timemod: float) -> Times:
-    """When a player shows the pictures of a camera in a recording, in us from its begin, with gaps of 1 s at most."""
+    """When a player shows the pictures of a camera in a recording, in us from its start, with gaps of 1 s at most."""
     with Recording(path) as recording:
         rows, _, due = recording_times.played(recording, start, end, MICROSECONDS, timemod)
         return due[np.isin(rows, recording.rows([recording_times.IMAGE], sender_stamps=[sender]))]
