@@ -196,7 +196,7 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
         found: list[Unmet] = []
         for name, argument in service.arguments.items():
             is_default = argument.parameter.within_timeout and not argument.entry and argument.text
-            if is_default and float(argument.text or 0) < (spec.timeout_s or 0.0):
+            if is_default and spec.kind != "closed-loop" and float(argument.text or 0) < (spec.timeout_s or 0.0):
                 why = (
                     f"judges {argument.text} s of the {spec.timeout_s:g} s that it may take, as nothing ends the input"
                 )

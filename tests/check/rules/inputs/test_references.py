@@ -53,6 +53,7 @@ def test_a_timeout_shorter_than_an_evaluator_waits(timeout: str, rules: list[str
 
 
 SIGNAL = """
+kind: open-loop
 clock: {clock}
 timeout: 90 s
 environment:
