@@ -202,6 +202,9 @@ def resolve(
         services, wiring = _driven(services, wire(services, declared), declared)
         if takes_old_frames(wiring, deployment.messages):
             services = tuple(_with_default(each, "true", lambda it: it.parameter.name == EULER) for each in services)
+        if spec.timeout_s and any(service.ends_input for service in services):
+            ending = operator.attrgetter("parameter.within_timeout")
+            services = tuple(_with_default(each, f"{spec.timeout_s:g}", ending) for each in services)
         played = replayed(wiring, services, deployment.messages)
         found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
     return found

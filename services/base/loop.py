@@ -21,7 +21,7 @@ from dodo_dsl.opendlv.protobuf_classes import Layout
 from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
-from services.base.members import Members, World
+from services.base.members import END_OF_INPUT, NOT_SHOWN, Members, World
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 SHORTEST = 10_000
@@ -99,7 +99,7 @@ def with_strangers(reason: str, strangers: Iterable[str]) -> str:
     return "; ".join([reason, *strangers])
 
 
-TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
+TEST_BEGIN = "dodo.TestBegin"
 REPORT_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
@@ -113,9 +113,9 @@ class Loop:
     ``name`` is the source in its EndOfInput. Lines on stdout report, once a second at most, how many messages were
     lost so far (``{"dodo": "lost", "messages": N}``) and in real time how many updates ended late since the test began
     (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``) and for how long what is emulated stood still
-    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and messages that came
-    under other sender stamps only (``{"dodo": "note", "text": "..."}``), unless a verdict does. Raises what the model
-    raises, and SessionError.
+    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and the
+    service's notes, with messages that came under other sender stamps only, unless a verdict does
+    (``{"dodo": "note", "text": "..."}``). Raises what the model raises, and SessionError.
     """
 
     name: str
@@ -140,6 +140,9 @@ class Loop:
         for (name, stamp), handler in self.service.inputs.items():
             entry = (stamp, handler, self.session.messages.layout(name))
             self._handlers.setdefault(ids(name), []).append(entry)
+        if type(self.service).not_shown is not Service.not_shown:
+            entry = (None, self.service.not_shown, self.session.messages.layout(NOT_SHOWN))
+            self._handlers[ids(NOT_SHOWN)] = [entry]
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
         self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)
@@ -241,8 +244,8 @@ class Loop:
         strangers, verdict = self._stamps.strangers(), self.service.verdict
         if strangers and verdict is not None and verdict.outcome == "failed":
             self.service.verdict = replace(verdict, reason=with_strangers(verdict.reason, strangers), silent=False)
-            return
-        for text in strangers:
+            strangers = []
+        for text in (*strangers, *self.service.notes):
             print(json.dumps({"dodo": "note", "text": text}), flush=True)
 
     def _report(self, now: int) -> None:

@@ -29,6 +29,7 @@ VARIABLE = "DODO_SENDERS"
 
 ``my-pose?`` is a service that may not say from where it sends. Without a sender stamp all of them are meant.
 """
+END_OF_INPUT, NOT_SHOWN = "dodo.EndOfInput", "dodo.NotShown"
 RUNNER_ONLY = ("dodo.TestBegin", "dodo.Alive")
 """Messages of the runner, which prove themselves."""
 _MOST_NAMED = 3
@@ -145,6 +146,8 @@ def _entries(text: str, messages: MessageSet) -> Iterator[tuple[tuple[int, int |
         silent = frozenset(each.removesuffix("?") for each in written if each.endswith("?"))
         services = tuple(each.removesuffix("?") for each in written)
         yield (messages.id(name), int(stamp) if stamp else None), Producers(message, services, silent)
+        if name == END_OF_INPUT:  # the same services show what may be answered
+            yield (messages.id(NOT_SHOWN), None), Producers(NOT_SHOWN, services, silent)
 
 
 WORLD_VARIABLE = "DODO_WORLD"

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 
 import pytest
 
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
 from services.base.loop import Loop
@@ -203,3 +204,13 @@ def test_what_the_application_prints_comes_from_the_runner_alone(
         f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",
         "the application sent opendlv.sim.Frame/0, which only 'pose' may send",
     ]
+
+
+def test_who_may_end_the_input_alone_may_say_what_was_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "dodo.EndOfInput=camera,drive")
+    messages = MessageSet.standard()
+    table = SenderTable.load(messages, b"")
+    told = table.by_message[messages.id("dodo.NotShown"), None]
+    assert (told.services, told.reason) == (
+        ("camera", "drive"), "the application sent dodo.NotShown, which only 'camera' and 'drive' may send",
+    )  # fmt: skip
