@@ -13,7 +13,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -30,13 +30,11 @@ OWN = ROOT / "build" / "bench" / "node" / "node_modules" / ".bin" / SERVER
 """Where scripts/install-bench-tools puts it."""
 PEER = str(OWN) if OWN.is_file() else shutil.which(SERVER)
 NO_PEER = f"{SERVER} is not installed (scripts/install-bench-tools, with npm)"
-TESTS, ROUNDS, KEYS, REQUESTS, PAUSES = 100, 5, 10, 4, 2
+TESTS, ROUNDS, KEYS, PAUSES = 100, 5, 10, 2
 PAUSE_S = 0.8
 GOAL = Goal(0.2, of="value")
 OPENED = "sil-closed-straight-1"
 MISTAKE = ("timeout: 60 s", "timeot: 60 s")
-PLACES = {"completion": "freq: 100 Hz", "hover": "freq: 10 Hz", "definition": "../maps/straight"}
-"""Requests, and the text of the test behind whose second letter they ask."""
 KEY, LATE, AFTER_PAUSE = "problems after a key", "problems after a key, 95 %", "problems after a key, after a pause"
 
 
@@ -65,15 +63,10 @@ class Session:
         text = path.read_text()
         self.texts = (text.replace(*MISTAKE), text)
         assert self.texts[0] != text
-        self.places = {method: self._place(word) for method, word in PLACES.items()}
         document = {"uri": path.as_uri(), "languageId": "yaml", "version": 0, "text": text}
         one.send(method="textDocument/didOpen", params={"textDocument": document})
         self.key()
         self.key()  # what is loaded once is loaded now
-
-    def _place(self, word: str) -> tuple[int, int]:
-        before = self.texts[1].partition(word)[0] + word[:2]
-        return before.count("\n"), len(before.rpartition("\n")[2])
 
     def key(self) -> float:
         """Seconds until the mistake is shown, or until it is gone, in turns."""
@@ -98,18 +91,13 @@ class Session:
         self.key()
         return found
 
-    def ask(self, method: str) -> float:
-        begin = time.perf_counter()
-        assert self.editor.at(f"textDocument/{method}", self.path, *self.places[method])
-        return time.perf_counter() - begin
-
 
 @contextmanager
 def peer(folder: Path, path: Path) -> Iterator[Session]:
     """The YAML language server, with DoDo's schema, which the first line of the test names."""
     assert PEER
     with editor(folder, command=(PEER, "--stdio")) as one:
-        settings = {"yaml": {"validate": True, "hover": True, "completion": True, "schemaStore": {"enable": False}}}
+        settings = {"yaml": {"validate": True, "schemaStore": {"enable": False}}}
         one.send(method="workspace/didChangeConfiguration", params={"settings": settings})
         yield Session(one, path)
 
@@ -117,17 +105,10 @@ def peer(folder: Path, path: Path) -> Iterator[Session]:
 Times = dict[str, list[float]]
 
 
-def measure(session: Session, times: Times, has_definitions: bool) -> None:
-    """One round: some keys, some of them after pauses, and some requests."""
-
-    def note(name: str, call: Callable[[], float], number: int) -> None:
-        times.setdefault(name, []).extend(call() for _ in range(number))
-
-    note(KEY, session.key, KEYS)
-    note(AFTER_PAUSE, session.key_after_a_pause, PAUSES)
-    for method in PLACES:
-        if has_definitions or method != "definition":
-            note(method, lambda method=method: session.ask(method), REQUESTS)  # type: ignore[misc]
+def measure(session: Session, times: Times) -> None:
+    """One round: some keys, some of them after pauses."""
+    times.setdefault(KEY, []).extend(session.key() for _ in range(KEYS))
+    times.setdefault(AFTER_PAUSE, []).extend(session.key_after_a_pause() for _ in range(PAUSES))
 
 
 def late(values: Sequence[float]) -> list[float]:
@@ -137,13 +118,10 @@ def late(values: Sequence[float]) -> list[float]:
 def rows(ours: Times, theirs: Times) -> list[Row]:
     """A row for each kind of wait; every value of ours has one of the peer's, if it has an answer at all."""
     made = []
-    for name in (KEY, LATE, AFTER_PAUSE, *PLACES):
+    for name in (KEY, LATE, AFTER_PAUSE):
         pair = [late(times.get(KEY, ())) if name == LATE else times.get(name, []) for times in (ours, theirs)]
         beside = (SERVER, pair[1]) if pair[1] else ()
-        note = "" if theirs and beside else "the peer has no such answer" if theirs else NO_PEER
-        made.append(
-            cost_row(f"editor, {name}", "s", pair[0], *beside, goal=None if name in PLACES else GOAL, note=note)
-        )
+        made.append(cost_row(f"editor, {name}", "s", pair[0], *beside, goal=GOAL, note="" if theirs else NO_PEER))
     return made
 
 
@@ -154,19 +132,18 @@ def compare(folder: Path) -> None:
     with editor(folder) as one:
         session = Session(one, path)
         if PEER is None:
-            sessions = [(session, ours, True)]
-            _rounds(budget, sessions, ours, theirs)
+            _rounds(budget, [(session, ours)], ours, theirs)
             return
         with peer(folder, path) as other:
-            _rounds(budget, [(session, ours, True), (other, theirs, False)], ours, theirs)
+            _rounds(budget, [(session, ours), (other, theirs)], ours, theirs)
 
 
-def _rounds(budget: Budget, sessions: Sequence[tuple[Session, Times, bool]], ours: Times, theirs: Times) -> None:
+def _rounds(budget: Budget, sessions: Sequence[tuple[Session, Times]], ours: Times, theirs: Times) -> None:
     for number in budget.rounds(ROUNDS):
-        for session, times, has_definitions in sessions if number % 2 else reversed(sessions):
-            measure(session, times, has_definitions)
+        for session, times in sessions if number % 2 else reversed(sessions):
+            measure(session, times)
         report(*rows(ours, theirs))
-    for name in (KEY, AFTER_PAUSE, *PLACES):
+    for name in (KEY, AFTER_PAUSE):
         for whose, times in (("ours", ours), ("peer", theirs)):
             if values := times.get(name):
                 middle, end = statistics.median(values) * 1000, late(values)[0] * 1000

@@ -104,6 +104,12 @@ class Checked:
     def ok(self) -> bool:
         return not has_errors(self.diagnostics)
 
+    def sound(self) -> "Checked":
+        """The same with those tests alone in whose specs there is no error."""
+        found = (*self.problems.as_read.items(), *self.problems.by_rules.items())
+        broken = {path for path, problems in found if has_errors(problems)}
+        return narrowed(self, [spec for spec in self.specs if spec.path not in broken])
+
 
 @dataclass(frozen=True)
 class Compilation:
@@ -141,6 +147,9 @@ def load(
             files, access(deployment), deployment.sandbox, reader, deployment.declarations
         )
         found = [*found, *of_application, *(unseen_problems(source, deployment) if source else ())]
+    if settings.emulate:
+        rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
+        deployment = replace(deployment, rigs=rigs)
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
@@ -187,7 +196,7 @@ def _at(checked: Checked, spec: Spec, label: str, values: Mapping[str, Values]) 
 def access(deployment: Deployment) -> Access:
     """What the deployment allows its application."""
     roots = (str(deployment.root),) if deployment.file else ()
-    ports = tuple(port for rig in deployment.rigs.values() if (port := rig.text(PORT)))
+    ports = tuple(port.text for rig in deployment.rigs.values() if isinstance(port := rig.node.get(PORT), Scalar))
     return Access(roots, tuple(deployment.paths), deployment.environment, deployment.outside, ports=ports)
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from dodo_dsl.spec.model import BASELINE, Goal, RecordedValue
 
 Result = Literal["passed", "failed", "error"]
+ON_EMULATED = "on an emulated rig: no hardware took part"
 NEXT_REPORT = ".next-"
 """How the name of a folder inside a report's begins in which the next report is written."""
 
@@ -227,6 +228,16 @@ def failed_checks(outcome: Outcome) -> tuple[str, ...]:
     return tuple(sorted(name for name in names if not differs_each_run(name)))
 
 
+def numbered(checks: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], Mapping[str, Any]]:
+    """By name, and how many of that name came before it, as several evaluators may have one."""
+    counts: Counter[str] = Counter()
+    found = {}
+    for check in checks:
+        found[check["name"], counts[check["name"]]] = check
+        counts[check["name"]] += 1
+    return found
+
+
 def against_baseline(
     checks: Sequence[Mapping[str, Any]], baseline: Sequence[RecordedValue]
 ) -> Iterator[tuple[dict[str, Any], RecordedValue]]:
@@ -235,11 +246,7 @@ def against_baseline(
     The tolerance is a share of the recorded value, or if that is 0 of the limit. Of two limits the nearer one to
     the recorded value counts. What differs from run to run does not count.
     """
-    counts: Counter[str] = Counter()
-    found = {}
-    for check in checks:
-        found[check["name"], counts[check["name"]]] = check
-        counts[check["name"]] += 1
+    found = numbered(checks)
     for before in baseline:
         now = found.get((before.check, before.number))
         if now is None or not now["limit"] or differs_each_run(before.check):

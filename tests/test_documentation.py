@@ -113,6 +113,20 @@ def test_ones_own_test_is_never_left_out(newcomer: Path) -> None:
     assert "sil-closed-straight" in stdout.getvalue().splitlines()[0]
 
 
+def test_the_test_of_a_recording_with_a_table_in_seconds_checks(newcomer: Path) -> None:
+    """As the page shows it, and as it is told without the test's sample times."""
+    text = block("dil-by-hand", (ROOT / "docs/how-to/recordings.md").read_text())
+    for folder in ("dil-by-hand", "recordings", "targets"):
+        (newcomer / "tests" / folder).mkdir()
+    shutil.copy(ROOT / "tests_registry/recordings/kiwi-track.rec", newcomer / "tests/recordings/drive.rec")
+    (newcomer / "tests/targets/by-hand.csv").write_text("time,value\n0,0\n9,0.2\n")
+    for written, code in ((text, 0), (text.replace(", sample-times: test", ""), 2)):
+        (newcomer / "tests/dil-by-hand/dil-by-hand.dodo.yml").write_text(written)
+        stdout = StringIO()
+        assert main(["compile", "--check", "dil-by-hand"], stdout, stdout) == code, stdout.getvalue()
+    assert "hint: write 'sample-times: test' under 'with' of 'drive'" in stdout.getvalue()
+
+
 @pytest.mark.slow
 def test_the_application_of_the_page_passes_the_test_of_the_readme(newcomer: Path) -> None:
     code, output = dodo("run", "sil-my-straight", "--clock", "lockstep")

@@ -6,7 +6,7 @@ dependencies, and no service that takes a CID.
 
 import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,19 +16,19 @@ from dodo_dsl.application.access.findings import service_findings
 from dodo_dsl.application.access.model import Look, diagnostic, place
 from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.host_access import is_true, references
-from dodo_dsl.application.interpolation import interpolated_node
+from dodo_dsl.application.interpolation import interpolated, interpolated_node
 from dodo_dsl.application.model import (
     KEYS,
     SANDBOX,
     ApplicationSource,
     ComposeService,
+    declared_cid,
     environment,
     image_variable,
     plain,
-    text,
 )
 from dodo_dsl.application.mounts import missing_folders, nested_mounts
-from dodo_dsl.application.slips import cid_slips, missing_program
+from dodo_dsl.application.slips import cid_slips, is_cid, missing_program, words
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
 
@@ -64,7 +64,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     found.extend(_cycles(application))
     found.extend(_never_healthy(application))
     found.extend(_same_variable(application))
-    found.extend(_several_cids(application))
+    found.extend(_several_cids(application, of_stack))
     yield from found
     if not has_errors(found):
         yield from _without_cid(application)
@@ -150,13 +150,49 @@ def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
             yield Diagnostic(application.services[name].span, "application-file", message, "rename one of them")
 
 
-def _several_cids(application: ApplicationSource) -> Iterator[Diagnostic]:
-    for cid in application.cids:
-        first = application.cids[0]
-        if cid.value != first.value:
-            place = f"{shown_path(first.span.file)}:{first.span.line}"
-            message = f"'cid' is {cid.text}, and {first.text} in {place}: a test has one bus"
-            yield Diagnostic(cid.span, "application-cid", message, "declare the same one, or none where it is a flag")
+def _several_cids(application: ApplicationSource, of_stack: Collection[str]) -> Iterator[Diagnostic]:
+    """Services on another bus than the first, or than what is built in; and warnings of those on several."""
+    own = [service for name, service in application.services.items() if name not in of_stack]
+    built_in = [cid for service in own if (cid := declared_cid(service.node))]
+    buses = [(f"'cid' is {c.text}", c.span, {int(str(c.value))}) for c in application.cids if c not in built_in]
+    for service in own:
+        if cids := written_cids(service, application):
+            numbers = " and ".join(map(str, sorted(cids)))
+            place = (declared_cid(service.node) or service).span
+            buses.append((f"'{service.name}' is on CID {numbers}", place, cids))
+    others = on_other_buses([cids for _, _, cids in buses])
+    gone = [*application.without, *of_stack, *(s.name for s in own if written_cids(s, application) in others)]
+    for what, span, cids in buses:
+        if cids in others:
+            first = f"{buses[0][0]} in {shown_path(buses[0][1].file)}:{buses[0][1].line}"
+            hint = f"leave out what is not under test, as dodo.yml can: {stack.way_out(application.named, gone)}"
+            message = f"{what}, and {first}: a test has one bus"
+            yield Diagnostic(span, "application-cid", message, f"{hint}; or write one CID everywhere")
+        elif len(cids) > 1:
+            hint = "leave it out in dodo.yml if it passes on messages between them"
+            yield Diagnostic(span, "application-cid", f"{what}, which are one bus in a test", hint, "warning")
+
+
+def on_other_buses(each: Sequence[set[int]]) -> list[set[int]]:
+    """The CIDs of those that neither share one with the first, nor are joined to it by what is on several."""
+    bus = next((cids for cids in each if cids), set())
+    while joined := {cid for cids in each if cids & bus for cid in cids} - bus:
+        bus = bus | joined
+    return [cids for cids in each if cids and not cids & bus]
+
+
+def written_cids(service: ComposeService, application: ApplicationSource) -> set[int]:
+    """The CIDs of a service: built in, or by commands, variables and files of variables, as far as they are known."""
+    known = application.known
+    given = {**service.file_variables, **environment(plain(service.node).get("environment"))}
+    filled = {
+        name: known.get(name, "") if value is None else interpolated(value, known) for name, value in given.items()
+    }
+    text = " ".join(interpolated(interpolated(word, known), filled) for word, _ in words(service))
+    flags = (match["cid"] for part in (text, *filled.values()) for match in opendlv_flags.NUMBER.finditer(part))
+    built_in = declared_cid(service.node)
+    found = (*flags, *map(filled.get, opendlv_flags.CID_VARIABLES), str(built_in.value) if built_in else None)
+    return {int(cid) for cid in found if cid and is_cid(cid)}
 
 
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -179,14 +215,9 @@ def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
 
 def takes_cid(service: ComposeService) -> bool:
     """Whether the CID of a service can be set."""
-    raw = plain(service.node)
-    variables = environment(raw.get("environment"))
-    words = [*_words(raw.get("entrypoint")), *_words(raw.get("command")), *(v for v in variables.values() if v)]
-    return opendlv_flags.takes_cid(words, {**variables, **dict.fromkeys(service.cid_variables)})
-
-
-def _words(command: Any) -> list[str]:
-    return [command] if isinstance(command, str) else [text(word) for word in command or ()]
+    variables = environment(plain(service.node).get("environment"))
+    found = [*(word for word, _ in words(service)), *(value for value in variables.values() if value)]
+    return opendlv_flags.takes_cid(found, {**variables, **dict.fromkeys(service.cid_variables)})
 
 
 @dataclass(frozen=True)
@@ -226,7 +257,7 @@ class Written:
 
 def problems(written: Written) -> Iterator[Diagnostic]:
     """Everything wrong with one service."""
-    for rule in (_name, _display, _commands, _references, _conditions, _volumes, _access, _single, _engine):
+    for rule in (_name, _display, _commands, _references, _conditions, _volumes, _unmounted, _access, _single, _engine):
         yield from rule(written)
 
 
@@ -331,6 +362,21 @@ def _volumes(written: Written) -> Iterator[Diagnostic]:
             near = only_fix(name, known)
             fix = Fix(f"{name}:/", f"{near.new}:/") if near and isinstance(volume, str) else near
             yield _bad(place(written.node, steps, written.key), message, hint, fix)
+
+
+def _unmounted(written: Written) -> Iterator[Diagnostic]:
+    """A warning of a volume that a process lacks; it has the test's ``/tmp`` and devices."""
+    of_machine = (host_access.is_shared_memory, host_access.is_hardware, host_access.is_machine)
+    for item, volume in enumerate(written.plain.get("volumes") or () if KEYS[1] in written.plain else ()):
+        found = host_access.mount(volume)
+        if not (found.below("/tmp") or found.source == found.target or any(check(found) for check in of_machine)):
+            span = place(written.node, ("volumes", item), written.key)
+            what = f"the process of '{written.name}' has no '{found.target}', as volumes are mounted in containers only"
+            hint = (
+                f"it starts in this file's folder: name '{found.source}' there in its command, or use --backend docker"
+            )
+            yield Diagnostic(span, "application-file", what, hint, "warning")
+            return
 
 
 def _access(written: Written) -> Iterator[Diagnostic]:

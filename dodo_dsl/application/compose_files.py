@@ -1,7 +1,7 @@
 """The files of an application, each read once, with their problems."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl import source
@@ -96,7 +96,10 @@ class ComposeFiles:
 
     def gather(self, file: Path | None, span: Span) -> None:
         """Adds the variables of an ``.env`` file, if there is one."""
+        self.problems.extend(dotenv_problems(file) if file else ())
         for name, value in variables_of(file).items() if file else ():
+            if value is None:
+                continue
             if file and holds_secret(name, value) and not is_steering(name):
                 self.secrets.setdefault(name, file)
             if self.variables.setdefault(name, value) != value:
@@ -106,9 +109,18 @@ class ComposeFiles:
                 self.problem(span, message, "a test has one .env file, so give the variable one value")
 
 
-def variables_of(file: Path) -> Mapping[str, str]:
-    """The variables that a regular file sets; symlinks are not followed."""
-    return dotenv(text_of(file))
+def variables_of(file: Path, *, raw: bool = False) -> Mapping[str, str | None]:
+    """The variables that a regular file sets, None if from outside; symlinks are not followed."""
+    found: dict[str, str | None] = {}
+    for name, value in dotenv(text_of(file), raw=raw)[0]:
+        found[name] = found.get(name) if value is None else value
+    return found
+
+
+def dotenv_problems(file: Path, *, raw: bool = False) -> Iterator[Diagnostic]:
+    """What compose refuses in a file of variables; it shows nothing of the line, which may be a secret."""
+    if problem := dotenv(text_of(file), raw=raw)[1]:
+        yield Diagnostic(Span(str(file), problem.line, 1, 0), "application-file", problem.what, problem.hint)
 
 
 def text_of(file: Path) -> str:

@@ -1,7 +1,7 @@
 """Variables in compose files, ``${NAME:-default}``: found, and filled in as compose does; and ``.env`` files."""
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +12,19 @@ if TYPE_CHECKING:
     from dodo_dsl.source import Node
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_LINE = re.compile(r"\s*(?:export\s+)?(?P<name>[A-Za-z_][A-Za-z0-9_.-]*)[ \t]*[=:][ \t]*")
+_WITHOUT_OPERATOR = re.compile(r"\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*):=?(?P<word>[^-?+}:=][^{}]*)\}")
+_SHOWN = 60
+_BLANKS = r"[ \t\v\f\r\x85\xa0]*"
+_SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
+_NAMED = re.compile(rf"(?:export\s+)?(?P<name>(?:[\w.\[\]-]|{_BLANKS[:-1]})*)(?P<sign>[=:\n]|\Z){_BLANKS}")
+_RAW_NAME = re.compile(r"(?P<name>[^=\n]*)(?P<sign>=|\Z|(?=\n))")
+_QUOTED = re.compile(r"""(?P<quote>["'])(?P<body>(?:\\.|(?!(?P=quote))[^\\])*)(?P=quote)""", re.DOTALL)
+_ESCAPE = re.compile(r'\\(?:[abfnrtv$"\\]|0(?P<octal>\d{0,3}))', re.ASCII)
 VARIABLE = re.compile(
     r"\$(?:(?P<escaped>\$)|(?P<bare>[A-Za-z_][A-Za-z0-9_]*)"
-    r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>.*))?\})",
-    re.DOTALL,
+    r"|\{(?P<name>[A-Za-z_][A-Za-z0-9_]*)(?:(?P<colon>:?)(?P<operator>[-?+])(?P<word>.*))?\})"
 )
-_ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "$": "$$"}
+_ESCAPES = {"a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v", "$": "$$"}
 
 
 def end_of_variable(text: str, start: int) -> int:
@@ -184,20 +190,52 @@ def changed_node(written: "Node", change: Callable[[str], str]) -> "Node":
     return replace(written, value=filled, text=filled)
 
 
-def dotenv(text: str) -> dict[str, str]:
-    """The variables of a ``.env`` file as compose reads it; a literal ``$`` is doubled.
+def slip_in(text: str) -> tuple[str, str] | None:
+    """What is wrong with the first such variable, and a hint; defaults are looked at, too."""
+    place = text.find("$")
+    while place >= 0:
+        end = end_of_variable(text, place)
+        match = VARIABLE.fullmatch(text, place, end)
+        if match is None and text[place + 1 : place + 2] == "{":
+            return _slip(text[place:end])
+        if match and (inner := slip_in(match["word"] or "")):
+            return inner
+        place = text.find("$", end)
+    return None
 
-    Names without a value, and lines that cannot be read, are skipped.
+
+def _slip(written: str) -> tuple[str, str]:
+    shown = written[:_SHOWN]
+    if written.count("{") != written.count("}"):
+        return "'${' is not closed", f"write '{written.split(maxsplit=1)[0][:_SHOWN]}}}'"
+    if written == "${}":
+        return "'${}' names no variable", "for example ${GAIN:-1}, or $${} for the text itself"
+    known = _WITHOUT_OPERATOR.fullmatch(written)
+    if known:
+        return f"'{shown}' is not a variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
+    what = "the name of a variable has letters, digits and underscores"
+    return f"'{shown}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"
+
+
+class DotenvProblem(EnvironmentProblem):
+    """What compose refuses in a file of variables, at ``line``."""
+
+    def __init__(self, text: str, place: int, what: str, hint: str) -> None:
+        self.line, self.what, self.hint = text.count("\n", 0, place) + 1, what, hint
+        super().__init__(f"line {self.line}: {what}; {hint}")
+
+
+def dotenv(text: str, *, raw: bool = False) -> tuple[list[tuple[str, str | None]], DotenvProblem | None]:
+    """The variables of a ``.env`` file as compose reads it, up to the first problem; a literal ``$`` is doubled.
+
+    None takes the value from outside. ``raw`` is the format in which values are as they are written.
     """
-    found, place = {}, 0
-    while place < len(text):
-        line_end = _or_end(text, text.find("\n", place))
-        match = _LINE.match(text, place, line_end)
-        if match is None or text[place:line_end].lstrip().startswith("#"):
-            place = line_end + 1
-            continue
-        found[match["name"]], place = _value(text, match.end(), line_end)
-    return found
+    found: list[tuple[str, str | None]] = []
+    try:
+        found.extend(_statements(text, raw))
+    except DotenvProblem as problem:
+        return found, problem
+    return found, None
 
 
 def own_dotenv(folder: Path, known: Mapping[str, str]) -> dict[str, str]:
@@ -206,41 +244,63 @@ def own_dotenv(folder: Path, known: Mapping[str, str]) -> dict[str, str]:
     return {} if path.is_symlink() else dotenv_file(path, known)
 
 
-def dotenv_file(path: Path, known: Mapping[str, str]) -> dict[str, str]:
-    """The variables of a ``.env`` file, interpolated with earlier ones and ``known``; none without a file."""
-    if not path.is_file():
-        return {}
+def dotenv_file(
+    path: Path, known: Mapping[str, str], before: Mapping[str, str] | None = None, *, raw: bool = False
+) -> dict[str, str]:
+    """The variables of a ``.env`` file, interpolated with ``known`` first, then with earlier ones and those ``before``.
+
+    None without a file; raises EnvironmentProblem for what compose refuses.
+    """
+    written, problem = dotenv(path.read_bytes().decode(errors="replace") if path.is_file() else "", raw=raw)
+    if problem:
+        raise EnvironmentProblem(f"'{path.name}', {problem}")
     found: dict[str, str] = {}
-    for name, value in dotenv(path.read_text(encoding="utf-8", errors="replace")).items():
-        found[name] = interpolate(value, {**found, **known})
+    for name, value in written:
+        if value is not None or name in known:
+            found[name] = known[name] if value is None else interpolate(value, {**(before or {}), **found, **known})
     return found
 
 
-def _or_end(text: str, place: int) -> int:
-    return len(text) if place < 0 else place
+def _statements(text: str, raw: bool) -> Iterator[tuple[str, str | None]]:
+    """The variables with their values; raises DotenvProblem."""
+    text, place = text.removeprefix("\ufeff"), 0
+    while (place := _SKIPPED.match(text, place).end()) < len(text):  # type: ignore[union-attr]
+        match = (_RAW_NAME if raw else _NAMED).match(text, place)
+        name = match["name"].rstrip("\r" if raw else None) if match else ""
+        if not match or not name or any(character.isspace() for character in name):
+            raise DotenvProblem(text, place, "there is no name of a variable", "write NAME=value, one in a line")
+        if not match["sign"] and not raw:
+            raise DotenvProblem(text, place, f"'{name}' has no value, and no line break behind it", f"write {name}=")
+        value, place = None, match.end()
+        if match["sign"] in ("=", ":"):
+            value, place = _value(text, place, raw)
+        yield name, value
 
 
-def _value(text: str, start: int, line_end: int) -> tuple[str, int]:
-    """A value, and the position where the next line begins."""
-    quote = text[start : start + 1]
-    if quote not in ("'", '"'):
-        return re.split(r"(?:^|\s)#", text[start:line_end], maxsplit=1)[0].strip(), line_end + 1
-    characters, place = [], start + 1
-    while place < len(text) and text[place] != quote:
-        step = _character(text, place, quote)
-        characters.append(step[0])
-        place += step[1]
-    return "".join(characters), _or_end(text, text.find("\n", place)) + 1
+def _value(text: str, start: int, raw: bool) -> tuple[str, int]:
+    """A value, and where it ends; raises DotenvProblem."""
+    quoted = None if raw else _QUOTED.match(text, start)
+    end = quoted.end() if quoted else (text.find("\n", start) + 1 or len(text) + 1) - 1
+    value = quoted["body"] if quoted else text[start:end]
+    if "\ufffd" in value:
+        raise DotenvProblem(text, start, "the value is not UTF-8 text", "save the file as UTF-8")
+    if raw:
+        return value.removesuffix("\r").replace("$", "$$"), end
+    if quoted and quoted["quote"] == "'":
+        return value.replace("\\'", "'").replace("$", "$$"), end
+    if value.startswith(("'", '"')) and not quoted:
+        raise DotenvProblem(text, start, f"the quotation mark {value[0]} is not closed", "close it behind the value")
+    value = _ESCAPE.sub(_unescaped, value) if quoted else value.partition(" #")[0].rstrip()
+    if slip := slip_in(value):
+        raise DotenvProblem(text, start, *slip)
+    return value, end
 
 
-def _character(text: str, place: int, quote: str) -> tuple[str, int]:
-    """The character at a position inside quotes, and the number of characters that it is written with."""
-    character, following = text[place], text[place + 1 : place + 2]
-    if quote == "'":
-        return ("'", 2) if text[place : place + 2] == "\\'" else ("$$" if character == "$" else character, 1)
-    if character == "\\" and following in ('"', "\\", *_ESCAPES):
-        return _ESCAPES.get(following, following), 2
-    return character, 1
+def _unescaped(match: re.Match[str]) -> str:
+    octal = match["octal"]
+    if octal is None:
+        return _ESCAPES.get(match[0][1], match[0][1])
+    return chr(int(octal, 8)) if re.fullmatch("[0-3][0-7]{2}", octal) else f"\\{octal}"
 
 
 def dotenv_line(name: str, value: str) -> str:

@@ -64,11 +64,15 @@ class Declared:
 
 @dataclass(frozen=True)
 class EnvFile:
-    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file."""
+    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file.
+
+    ``raw`` is the format whose values are as they are written.
+    """
 
     path: str
     span: Span
     required: bool
+    raw: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
     ``declared`` is None without x-dodo, or if that says nothing of messages.
-    ``cid_variables`` are the CID variables that its ``env_files`` set.
+    ``file_variables`` are those that its ``env_files`` set.
     """
 
     name: str
@@ -84,7 +88,12 @@ class ComposeService:
     span: Span
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
-    cid_variables: tuple[str, ...] = ()
+    file_variables: Mapping[str, str | None] = field(default_factory=dict)
+
+    @property
+    def cid_variables(self) -> tuple[str, ...]:
+        """The CID variables among those of its files."""
+        return tuple(name for name in CID_VARIABLES if name in self.file_variables)
 
     @property
     def has_display(self) -> bool:
@@ -207,6 +216,13 @@ def environment(raw: Any) -> dict[str, str | None]:
     return {str(k): None if v is None else text(v) for k, v in (raw or {}).items()}
 
 
+def declared_cid(node: source.Mapping) -> Scalar | None:
+    """What ``x-dodo`` of a document or of a service says to be built in."""
+    about = node.get("x-dodo")
+    cid = about.get("cid") if isinstance(about, source.Mapping) else None
+    return cid if isinstance(cid, Scalar) else None
+
+
 def declared(service: source.Mapping) -> Declared | None:
     """The declaration of a service; None without ``x-dodo``."""
     entry = service.entries.get("x-dodo")
@@ -256,17 +272,14 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
     """The files of ``env_file``."""
     node = service.get("env_file")
     for item in node.items if isinstance(node, source.Sequence) else (node,):
-        path = item.get("path") if isinstance(item, source.Mapping) else item
-        required = item.get("required") if isinstance(item, source.Mapping) else None
+        about = item.get if isinstance(item, source.Mapping) else {"path": item}.get
+        path, required, form = about("path"), about("required"), about("format")
         if isinstance(path, Scalar) and isinstance(path.value, str):
             optional = isinstance(required, Scalar) and not is_true(required.value)
-            yield EnvFile(path.text, path.span, not optional)
+            yield EnvFile(path.text, path.span, not optional, isinstance(form, Scalar) and form.value == "raw")
 
 
-def cid_variables(files: Iterable[EnvFile], folder: Path) -> tuple[str, ...]:
-    """The CID variables that files next to the compose file set."""
-    found: set[str] = set()
-    for file in files:
-        if not file.path.startswith(("/", "~", "$")):
-            found |= set(variables_of(folder / file.path))
-    return tuple(v for v in CID_VARIABLES if v in found)
+def file_variables(files: Iterable[EnvFile], folder: Path) -> dict[str, str | None]:
+    """The variables that files next to the compose file set."""
+    own = (file for file in files if not file.path.startswith(("/", "~", "$")))
+    return {name: v for file in own for name, v in variables_of(folder / file.path, raw=file.raw).items()}

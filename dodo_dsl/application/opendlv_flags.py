@@ -16,6 +16,9 @@ _VALUE = (
 )
 _CID = re.compile(rf"(?P<flag>(?<![\w-])--cid=)(?:{_VALUE})?|(?P<words>(?<![\w-])--cid[ \t\n]+){_VALUE}")
 _MEMORY = re.compile(r"(?P<flag>--name(?:\.[A-Za-z0-9]+)?=)(?P<name>.+)", re.DOTALL)
+NUMBER = re.compile(r"--(?:[\w.]+-)*cid(?:-[\w.]+)*\d?[= \t\n]+[\\\"']*(?P<cid>\d+)(?![\w.])", re.ASCII)
+"""A CID as a flag's value; of those with other names, too, as ``--cid-to``."""
+_PYTHON = re.compile(r"python[0-9.]+")
 _ENDS = ";&|<>"
 
 
@@ -74,6 +77,14 @@ def takes_cid(argv: Iterable[str], environment: Mapping[str, object]) -> bool:
     return any(_CID.search(w) or w == "--cid" or names(w) & {*CID_VARIABLES} for w in argv) or any(
         variable in environment for variable in CID_VARIABLES
     )
+
+
+def arguments(process: Sequence[str], command: Sequence[str]) -> tuple[str, ...]:
+    """A command behind the process that it starts itself, for an image without a program: only what follows that."""
+    left, rest = ([_PYTHON.sub("python", word.rpartition("/")[2]) for word in words] for words in (process, command))
+    while rest and rest[0] in left and (len(rest) < len(command) or rest[0][:1] != "-"):
+        left = left[left.index(rest.pop(0)) + 1 :]
+    return tuple(command[len(command) - len(rest) :])
 
 
 def takes_memory(argv: Sequence[str]) -> bool:

@@ -15,10 +15,10 @@ from dodo_dsl.application.access.findings import shared_findings
 from dodo_dsl.application.access.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.access.model import Access, Look, diagnostic
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
-from dodo_dsl.application.compose_files import ComposeFiles
+from dodo_dsl.application.compose_files import ComposeFiles, dotenv_problems
 from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
 from dodo_dsl.application.load import as_item, load, unread
-from dodo_dsl.application.model import ApplicationSource, ComposeService, cid_variables, env_files, plain
+from dodo_dsl.application.model import ApplicationSource, ComposeService, declared_cid, env_files, file_variables, plain
 from dodo_dsl.application.model import declared as declaration_of
 from dodo_dsl.application.slips import variable_problems
 from dodo_dsl.application.variables import tunable_problems
@@ -82,7 +82,8 @@ def read_application(
     withheld = secret_problems.withheld(nodes, files.variables, access.passed, os.environ)
     found.extend(problem for problem in withheld if problem.span not in refused)
     found.extend(secret_problems.written([document]))
-    found.extend(secret_problems.in_files(_own_files(application)))
+    for file, raw in _own_files(application):
+        found.extend((*dotenv_problems(file, raw=raw), *secret_problems.in_file(file, raw)))
     found.extend(secret_problems.left_out(files.secrets))
     return (None if has_errors(found) else application), found
 
@@ -135,17 +136,8 @@ def _application(
         access=access,
         limits=limits,
         left_out=left_out,
-        cids=tuple(_declared_cids([document, *(service.node for service in kept.values())])),
+        cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
     )
-
-
-def _declared_cids(nodes: Iterable[source.Mapping]) -> Iterator[source.Scalar]:
-    """What ``x-dodo`` of the document and of its services says to be built in."""
-    for node in nodes:
-        about = node.get("x-dodo")
-        cid = about.get("cid") if isinstance(about, source.Mapping) else None
-        if isinstance(cid, source.Scalar):
-            yield cid
 
 
 def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -156,12 +148,12 @@ def _shared(document: source.Mapping, application: ApplicationSource) -> Iterato
         yield diagnostic(finding, document, document.span)
 
 
-def _own_files(application: ApplicationSource) -> list[Path]:
-    """The files of ``env_file`` that the application may read, each once."""
-    words = {file.path for service in application.services.values() for file in service.env_files}
-    texts = sorted(interpolated(word, application.known) for word in words)
-    own = (text for text in texts if "$" not in text and application.paths.is_own(text))
-    return list(dict.fromkeys(Path(application.paths.whole(text)) for text in own))
+def _own_files(application: ApplicationSource) -> list[tuple[Path, bool]]:
+    """The files of ``env_file`` that the application may read, each once, and whether they are raw."""
+    words = {(file.path, file.raw) for service in application.services.values() for file in service.env_files}
+    texts = sorted((interpolated(word, application.known), raw) for word, raw in words)
+    own = ((text, raw) for text, raw in texts if "$" not in text and application.paths.is_own(text))
+    return list(dict.fromkeys((Path(application.paths.whole(text)), raw) for text, raw in own))
 
 
 def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:
@@ -169,7 +161,7 @@ def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:
     if not isinstance(node, source.Mapping):
         return None
     files = tuple(env_files(node))
-    return ComposeService(name, node, entry.key, declaration_of(node), files, cid_variables(files, folder))
+    return ComposeService(name, node, entry.key, declaration_of(node), files, file_variables(files, folder))
 
 
 def _used_cid_variables(services: Iterable[source.Mapping]) -> list[str]:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.interpolation import VARIABLE, end_of_variable
+from dodo_dsl.application.interpolation import slip_in
 from dodo_dsl.application.model import ComposeService, text
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
-from dodo_dsl.source import Scalar
+from dodo_dsl.source import Node, Scalar
 
 _FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
 _IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
@@ -27,17 +27,19 @@ INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 _SCRIPTS = {".py": "python", ".sh": "sh", ".js": "node", ".pl": "perl", ".rb": "ruby"}
 _FILLED = ("services", "volumes", "networks", "secrets", "configs")
 """The top-level keys below which compose fills in variables."""
-_WITHOUT_OPERATOR = re.compile(r"\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*):=?(?P<word>[^-?+}:=][^{}]*)\}")
-_SHOWN = 60
 
 
 def words(service: ComposeService) -> Iterator[Word]:
     """The words of a service's commands, each with the value in which it is written."""
     for key in COMMANDS:
-        node = service.node.get(key)
-        for item in node.items if isinstance(node, source.Sequence) else (node,):
-            if isinstance(item, Scalar):
-                yield from ((word, item) for word in ((text(item.value),) if item is not node else _split(item.text)))
+        yield from words_of(service.node.get(key))
+
+
+def words_of(node: Node | None) -> Iterator[Word]:
+    """The words of one command."""
+    for item in node.items if isinstance(node, source.Sequence) else (node,):
+        if isinstance(item, Scalar):
+            yield from ((word, item) for word in ((text(item.value),) if item is not node else _split(item.text)))
 
 
 def _split(command: str) -> tuple[str, ...]:
@@ -76,14 +78,19 @@ def cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
         one, literal = _IN_ONE_WORD.fullmatch(word), _LITERAL.fullmatch(word)
         if one:
             yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")
-        elif literal and not _is_cid(literal["value"]):
-            yield _warning(item, f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}", "write '--cid=111'")
-        elif not takes_cid and (flag := meant(word, "--cid")) and (_is_cid(flag[6:]) or "$" in flag):
+        elif literal and not is_cid(literal["value"]):
+            yield _warning(
+                item,
+                f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}",
+                "write '--cid=111'",
+            )
+        elif not takes_cid and (flag := meant(word, "--cid")) and (is_cid(flag[6:]) or "$" in flag):
             yield _warning(item, f"'{word}' is not the flag '--cid'", f"did you mean '{flag}'?")
 
 
-def _is_cid(value: str) -> bool:
-    return value.isascii() and value.isdigit() and 1 <= int(value) <= _HIGHEST
+def is_cid(value: str) -> bool:
+    """Whether a text is a whole number from 1 to 254."""
+    return value.isascii() and value.isdigit() and len(value) < 9 and 1 <= int(value) <= _HIGHEST
 
 
 def _warning(item: Scalar, message: str, hint: str) -> Diagnostic:
@@ -153,30 +160,3 @@ def variable_problems(document: source.Mapping) -> Iterator[Diagnostic]:
         for part in source.walk(node) if node else ():
             if isinstance(part, Scalar) and isinstance(part.value, str) and (slip := slip_in(part.value)):
                 yield Diagnostic(part.span, "application-file", *slip)
-
-
-def slip_in(text: str) -> tuple[str, str] | None:
-    """What is wrong with the first such variable, and a hint; defaults are looked at, too."""
-    place = text.find("$")
-    while place >= 0:
-        end = end_of_variable(text, place)
-        match = VARIABLE.fullmatch(text, place, end)
-        if match is None and text[place + 1 : place + 2] == "{":
-            return _slip(text[place:end])
-        if match and (inner := slip_in(match["word"] or "")):
-            return inner
-        place = text.find("$", end)
-    return None
-
-
-def _slip(written: str) -> tuple[str, str]:
-    shown = written[:_SHOWN]
-    if written.count("{") != written.count("}"):
-        return "'${' is not closed", f"write '{written.split(maxsplit=1)[0][:_SHOWN]}}}'"
-    if written == "${}":
-        return "'${}' names no variable", "for example ${GAIN:-1}, or $${} for the text itself"
-    known = _WITHOUT_OPERATOR.fullmatch(written)
-    if known:
-        return f"'{shown}' is not a variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
-    what = "the name of a variable has letters, digits and underscores"
-    return f"'{shown}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"

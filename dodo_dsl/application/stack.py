@@ -4,15 +4,16 @@
 that it starts; one with ``x-dodo`` is the application's own, as the team says what it sends and takes.
 """
 
+import itertools
 import re
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from dodo_dsl import source
-from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.slips import COMMANDS, words_of
 from dodo_dsl.diagnostics import Diagnostic, Severity
-from dodo_dsl.source import Node, Scalar
+from dodo_dsl.source import Scalar
 
 RULE = "application-stack"
 
@@ -34,11 +35,11 @@ STACK = (
         "dodo run records each test, and its report replays it on a page",
     ),
     Part(
-        r"opendlv-video-.+-(decoder|viewer)|opendlv-image-viewer",
+        r"opendlv-video-.+-(decoder|viewer)|opendlv-image-viewer|(video-)?(h26[45]|x26[45]|openh264|vp[89])-?decoder",
         "virtual-camera, rec-replay or a rig's camera puts the pictures into the shared memory",
     ),
     Part(
-        r"opendlv-video-.+-(encoder|recorder)|opendlv-device-camera-.+-(encoder|recorder)",
+        r"opendlv-(video|device-camera)-.+-(encoder|recorder)|(video-)?(h26[45]|x26[45]|openh264|vp[89])-?encoder",
         "the recording of a test keeps its pictures, as 'record: {frames: ...}' says",
     ),
     Part(
@@ -80,43 +81,55 @@ STACK = (
         "each test is recorded; dodo rec info and dodo rec export show what was said",
     ),
 )
-_PLATFORM = re.compile(r"(-(multi|amd64|x86_64|armhf|arm64|arm|aarch64|alpine|dev))+$")
+_PLATFORM = re.compile(r"(\.git|-(multi|amd64|x86_64|armhf|arm64|arm|aarch64|alpine|dev|v?[0-9][0-9.]*))+$")
 _IMAGE = re.compile(r"(?:.*/)?(?P<name>[A-Za-z0-9._-]+)(?:[:@#].*)?", re.DOTALL)
-_BUILD = re.compile(r"(?:.*/)?(?P<name>[A-Za-z0-9_-]+?)(?:\.git)?(?:#.*)?", re.DOTALL)
+_SHELLS = ("sh", "ash", "bash", "dash", "zsh")
+_SEPARATOR = re.compile(r"[;&|\n]+|\b(?:do|then|else)\b")
+_BEFORE = re.compile(
+    r"-.*|\d+[smh]?|\w+=.*|exec|nohup|env|nice|stdbuf|timeout|time|sudo|while|until|if|[!{(]", re.DOTALL
+)
+"""Words of a shell's command before the program itself."""
+_BESIDE = re.compile(
+    r"cd|mkdir|rm|mv|chmod|cat|tee|gzip|xz|echo|date|sleep|wait|trap|test|set|export|true|done|fi|exit|[]:[)}]"
+)
+"""Programs beside which a shell's command is still one of the stack."""
 
 
 def part(service: ComposeService) -> tuple[str, Part] | None:
     """Which part of the stack a service is, by the name under which it is known; None for the application's own."""
     if service.declared is not None:
         return None
-    for name in _names(service):
-        for row in STACK:
-            if re.fullmatch(row.names, name):
-                return name, row
+    for names in _names(service):
+        rows = [next((row for row in STACK if re.fullmatch(row.names, name)), None) for name in names]
+        if rows and rows[0] and all(rows):
+            return names[0], rows[0]
     return None
 
 
-def _names(service: ComposeService) -> Iterator[str]:
-    """What the service may be known by: its image, the repository it is built from, and its program."""
+def _names(service: ComposeService) -> Iterator[list[str]]:
+    """What the service may be known by: its image, the repository it is built from, and the programs it starts."""
     image, build = service.node.get("image"), service.node.get("build")
     context = build.get("context") if isinstance(build, source.Mapping) else build
-    for node, pattern in ((image, _IMAGE), (context, _BUILD)):
-        if isinstance(node, Scalar) and (match := pattern.fullmatch(node.text)):
-            yield _PLATFORM.sub("", match["name"])
-    for key in ("entrypoint", "command", "x-dodo-process"):
-        if word := _first(service.node.get(key)):
-            yield word.rpartition("/")[2]
+    if isinstance(image, Scalar) and (match := _IMAGE.fullmatch(image.text)):
+        yield [_PLATFORM.sub("", match["name"])]
+    if isinstance(context, Scalar):
+        parts = [part for part in re.split(r"[/#?]", context.text) if part]
+        yield from ([_PLATFORM.sub("", part)] for part in (parts if "://" in context.text else parts[-1:]))
+    process, entrypoint, command = ([word for word, _ in words_of(service.node.get(key))] for key in COMMANDS)
+    for words in ([*entrypoint, *command], command, process):
+        yield list(dict.fromkeys(_programs(words)))
 
 
-def _first(node: Node | None) -> str:
-    if isinstance(node, source.Sequence):
-        return node.items[0].text if node.items and isinstance(node.items[0], Scalar) else ""
-    if not isinstance(node, Scalar) or not isinstance(node.value, str):
-        return ""
-    try:
-        return next(iter(opendlv_flags.split(node.text)), "")
-    except ValueError:
-        return ""
+def _programs(words: Sequence[str]) -> Iterator[str]:
+    """The programs that a command starts, also by a shell, but for what shells have to prepare them."""
+    rest = [] if words and words[0].startswith("-") else list(itertools.dropwhile(_BEFORE.fullmatch, words))
+    name = rest[0].rpartition("/")[2] if rest else ""
+    if name in _SHELLS:
+        script = next((word for word in rest[1:] if not word.startswith("-")), "")
+        for command in _SEPARATOR.split(script):
+            yield from _programs(command.split())
+    elif name and not _BESIDE.fullmatch(name):
+        yield name
 
 
 def parts(application: ApplicationSource) -> dict[str, tuple[str, Part]]:

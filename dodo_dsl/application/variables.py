@@ -10,7 +10,6 @@ from decimal import Decimal
 
 from dodo_dsl import source
 from dodo_dsl.application.access.secret_variables import is_steering
-from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.application.interpolation import changed_node, names, with_values
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
@@ -130,8 +129,7 @@ def _variables(application: ApplicationSource) -> set[str]:
         found.update(environment(plain(service.node).get("environment")))
         texts = (part.text for part in source.walk(service.node) if isinstance(part, Scalar))
         found.update(*map(names, texts))
-        for file in service.env_files:
-            found.update(variables_of(application.folder / file.path) if application.paths.is_own(file.path) else ())
+        found.update(service.file_variables)
     return found
 
 

@@ -25,10 +25,12 @@ RULES: tuple[Rule, ...] = (
     service_rules.check_layers,
     service_rules.check_parameters,
     service_rules.check_messages,
+    service_rules.check_own_messages,
     file_rules.check_references,
     file_rules.check_files,
     file_rules.check_starts,
     file_rules.check_limits,
+    file_rules.check_input,
     spec_rules.check_goals,
     spec_rules.check_baseline,
     wiring_rules.check_producers,
@@ -75,7 +77,14 @@ def check(
 
 def forget_files() -> None:
     """What is kept of the files that tests name, which may have changed."""
-    read = (file_rules.entries, file_rules.problems, file_rules.fault_of_start, baseline.results)
+    read = (
+        file_rules.entries,
+        file_rules.problems,
+        file_rules.fault_of_start,
+        file_rules.table_span,
+        file_rules.pictures,
+        baseline.results,
+    )
     for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()
 

@@ -141,7 +141,7 @@ def _origin(spec: Spec, use: Use, argument: Argument) -> str:
     entry = argument.entry
     if entry is None:
         is_default = argument.value == default_value(argument.parameter)
-        return "default" if is_default else "what the vehicle takes"
+        return "default" if is_default else "what vehicle or application take"
     place = _place(entry.key)
     if argument.parameter.name in use.parameters:
         return place

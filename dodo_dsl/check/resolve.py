@@ -7,7 +7,7 @@ is judged by, is left out of what is played: it would be taken for the applicati
 
 import functools
 import operator
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -17,17 +17,19 @@ from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, message, wire
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
 from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
-from dodo_dsl.spec.arguments import Argument, ResolvedService, resolved
+from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService, resolved
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.rig import Rig
+from dodo_dsl.spec.rig import KIND_TAGS, Rig, emulated
 
 FORMAT = "recording"
 ONLY, WITHOUT = "messages", "without"
 """Parameters of messages that are played alone, and that are left out."""
 IMAGE = "opendlv.proxy.ImageReading"
 _NO_STAMP = -1
+EULER = "euler"
+"""Parameter with which a service sends frames also in the form of message set 0.9."""
 _REQUEST = "Request"
 """How messages are called that ask an actuator for something, as applications do."""
 
@@ -191,13 +193,18 @@ def resolve(
     found: list[ResolvedTest] = []
     for spec in specs:
         previous = found[-1] if found and found[-1].spec.path == spec.path else None
-        rig = deployment.rig(spec.rig) if spec.rig else None
+        rig = deployment.rig(spec.rig) or (emulated(spec.rig) if spec.rig in KIND_TAGS else None) if spec.rig else None
         services = tuple(
             resolved(spec, use, manifest, rig, _arguments(previous, use.layer, use.name))
             for use in spec.uses
             if (manifest := manifests.get(use.uses.text)) is not None
         )
         services, wiring = _driven(services, wire(services, declared), declared)
+        if takes_old_frames(wiring, deployment.messages):
+            services = tuple(_with_default(each, "true", lambda it: it.parameter.name == EULER) for each in services)
+        if spec.timeout_s and any(service.ends_input for service in services):
+            ending = operator.attrgetter("parameter.within_timeout")
+            services = tuple(_with_default(each, f"{spec.timeout_s:g}", ending) for each in services)
         played = replayed(wiring, services, deployment.messages)
         found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
     return found
@@ -208,17 +215,25 @@ def _driven(
 ) -> tuple[tuple[ResolvedService, ...], Wiring]:
     """Services and wiring where the messages that drive the vehicle have taken the place of defaults."""
     messages = ",".join(driving(wiring))
-    found = tuple(_with_default(service, messages) for service in services) if messages else services
+    is_driving = operator.attrgetter("parameter.driving")
+    found = tuple(_with_default(each, messages, is_driving) for each in services) if messages else services
     return (services, wiring) if all(map(operator.is_, found, services)) else (found, wire(found, declared))
 
 
-def _with_default(service: ResolvedService, messages: str) -> ResolvedService:
+def _with_default(service: ResolvedService, text: str, is_meant: Callable[[Argument], bool]) -> ResolvedService:
     changed = {
-        name: replace(each, value=replace(each.value, text=messages))
+        name: replace(each, value=replace(each.value, text=text))
         for name, each in service.arguments.items()
-        if each.parameter.driving and each.entry is None and each.value and each.value.text != messages
+        if is_meant(each) and each.entry is None and each.value and each.value.text != text
     }
     return replace(service, arguments={**service.arguments, **changed}) if changed else service
+
+
+def takes_old_frames(wiring: Wiring, own: tuple[Path, ...]) -> bool:
+    """Whether the application takes Frame, and means that of message set 0.9."""
+    old = (each for each in odvd.load(STANDARD_0_9) if each.name == FRAME)
+    takes = any(end.port.name == FRAME for end in wiring.application_consumes)
+    return takes and all(map(known_messages(own)[FRAME].fits, old))
 
 
 def _arguments(test: ResolvedTest | None, layer: str, name: str) -> Mapping[str, Argument] | None:

@@ -7,6 +7,7 @@ Parameters fit the manifest: known, complete, of the right type and unit, within
 ``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
 ``missing-file``, ``path-escape``. ``unused-parameter``: those that are set have an effect beside the others.
 ``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
+``wrong-messages``: the deployment's do not give what DoDo's services use another meaning.
 ``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
 ``camera-source``: what a rig's computer can take frames from, in which sizes, and how often.
 ``camera-size``: a camera's optics, as they were measured, are those of frames of one size. ``out-of-range``: sizes
@@ -18,11 +19,13 @@ from collections.abc import Collection, Iterator
 from pathlib import PurePath
 
 from dodo_dsl.application.model import PrintedLine
+from dodo_dsl.check import resolve
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import known_messages
+from dodo_dsl.check.senders import is_shipped, told
 from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
+from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
-from dodo_dsl.spec.arguments import Argument, ResolvedService
+from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
 from dodo_dsl.spec.deployment import MANIFEST
 from dodo_dsl.spec.manifest import holds
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
@@ -98,6 +101,9 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
             yield argument.problem
         elif not holds(argument.parameter.when, service.texts):
             yield _without_effect(service, argument, entry)
+        elif argument.parameter.deprecated:
+            message = f"parameter '{name}' is deprecated: {argument.parameter.deprecated}"
+            yield Diagnostic(entry.key, "unused-parameter", message, "remove it", "warning")
 
 
 def _without_effect(service: ResolvedService, argument: Argument, entry: Entry) -> Diagnostic:
@@ -180,13 +186,49 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
         yield from _lines(context, own.lines if own else ())
 
 
+def check_own_messages(context: RuleContext) -> Iterator[Diagnostic]:
+    """``wrong-messages``: the deployment gives a name or an id another meaning than services of DoDo's."""
+    standard, known = resolve.known_messages(()), resolve.known_messages(context.deployment.messages)
+    theirs = [each for each in known.values() if each != standard.get(each.name)]
+    takes_old = resolve.takes_old_frames(context.wiring, context.deployment.messages)
+    found: dict[str, Diagnostic] = {}
+    for service, name, is_heard in _used(context) if theirs else ():
+        ours = standard[name]
+        sends_both = takes_old and name == FRAME and resolve.EULER in service.arguments
+        for own in (each for each in theirs if name == each.name or ours.id == each.id):
+            is_former = own.name.startswith("opendlv.") and own.name not in standard
+            if own.name == name:
+                is_right = own.fits(ours) or sends_both or not is_heard
+                message = f"'{name}' is not as service '{service.manifest.name}' knows it"
+            else:
+                is_right = is_former and own.fits(ours)
+                message = f"id {own.id} of '{own.name}' is that of {name}, which '{service.manifest.name}' uses"
+            if not is_right:
+                found.setdefault(own.name, Diagnostic(Span(*own.place), "wrong-messages", message, f"DoDo's is {ours}"))
+    yield from found.values()
+
+
+def _used(context: RuleContext) -> Iterator[tuple[ResolvedService, str, bool]]:
+    """The standard messages that DoDo's services name themselves; whether the application hears or sends them."""
+    wiring, standard = context.wiring, resolve.known_messages(())
+    said = {end.port.name for end in told(wiring)}
+    for service in filter(lambda each: is_shipped(each.manifest.process), context.services):
+        named = {each.text for each in service.arguments.values() if each.parameter.type == "message"}
+        for end in (*wiring.produced, *wiring.consumed):
+            name = end.port.name
+            if end.service == service.use.name and name in standard and name not in named:
+                is_secret = wiring.judges_by(end.port) or wiring.is_truth(end.port)
+                is_heard = end in wiring.produced and name in said if is_of_the_world(name) else not is_secret
+                yield service, name, is_heard
+
+
 def _lines(context: RuleContext, lines: Collection[PrintedLine]) -> Iterator[Diagnostic]:
     """What is wrong with lines that become messages; what reads patterns is loaded if there are any."""
     if lines:
         from dodo_dsl.application.printed_lines import line_problems
 
         for line in lines:
-            yield from line_problems(line, known_messages(context.deployment.messages))
+            yield from line_problems(line, resolve.known_messages(context.deployment.messages))
 
 
 def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:

@@ -133,8 +133,9 @@ def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
     places = {word.text: word.span for word in pool.names}
     for number, rig in enumerate(found):
         span = places.get(rig.name, pool.kind.span if pool.kind else context.spec.span("rig"))
-        if rig.kind != found[0].kind:
-            message = f"rig '{rig.name}' is {rig.kind}, and '{found[0].name}' is {found[0].kind}"
+        what, first = (f"{'emulated, ' * one.is_emulated}{one.kind}" for one in (rig, found[0]))
+        if what != first:
+            message = f"rig '{rig.name}' is {what}, and '{found[0].name}' is {first}"
             yield Diagnostic(span, "rig-pool", message, "rigs of one kind can replace each other")
         for other in found[:number]:
             if device := _same_device(other, rig):
@@ -161,7 +162,7 @@ def _kind(word: Scalar, rigs: dict[str, Rig]) -> Iterator[Diagnostic]:
 def _same_device(one: Rig, other: Rig) -> str:
     """What distinguishes rigs, where both have the same: the port, or the camera of rigs without one."""
     own = one.text(PORT) or one.text(CAMERA_SOURCE)
-    return own if own == (other.text(PORT) or other.text(CAMERA_SOURCE)) else ""
+    return own if own != EMULATED and own == (other.text(PORT) or other.text(CAMERA_SOURCE)) else ""
 
 
 def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:
@@ -169,7 +170,8 @@ def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:
     spec = context.spec
     if spec.level == "hil" and "rig" not in spec.spans:
         message = "a hil test needs a rig to run on"
-        yield Diagnostic(spec.span("level"), "rig-level", message, "write 'rig: emulated', or a rig of dodo.yml")
+        hint = "write the kind of the rig, such as 'rig: dynamic', or the name of one in dodo.yml"
+        yield Diagnostic(spec.span("level"), "rig-level", message, hint)
     if spec.level in ("sil", "dil") and (spec.rig or spec.pool):
         message = f"a {spec.level} test runs without a rig"
         yield Diagnostic(spec.span("rig"), "rig-level", message, "remove it, or use level hil")
@@ -177,7 +179,7 @@ def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:
         return
     rig = context.rig
     if rig is None:
-        hint = did_you_mean(spec.rig, [*EMULATED_RIGS, *context.deployment.rigs])
+        hint = did_you_mean(spec.rig, [*EMULATED_RIGS, *KIND_TAGS, *context.deployment.rigs])
         yield Diagnostic(spec.span("rig"), "unknown-rig", f"unknown rig '{spec.rig}'", hint)
     elif not rig.is_emulated and spec.isolation == "network":
         message = f"rig '{rig.name}' is reached through the host, so a test on it cannot have its own network"

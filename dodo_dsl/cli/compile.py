@@ -132,7 +132,7 @@ def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -
     from dodo_dsl.report.for_gitlab import xml_text
 
     by_file = {file: list(found) for file, found in groupby(diagnostics, lambda d: d.span.file)}
-    suite = TestSuite("dodo compile --check")
+    cases = []
     for file in sorted({*files, *by_file}):
         name = xml_text(shown_path(file))
         case = TestCase(name, classname="dodo")
@@ -145,7 +145,9 @@ def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -
             case.result = [failure]
         if warnings:
             case.system_out = xml_text(format_text(warnings, WIDE))
-        suite.add_testcase(case)
+        cases.append(case)
+    suite = TestSuite("dodo compile --check")
+    suite.add_testcases(cases)  # one by one, each is counted with all before it
     document = JUnitXml("dodo")
     document.add_testsuite(suite)
     document.update_statistics()  # type: ignore[no-untyped-call]
@@ -275,8 +277,10 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
-    if checked.ok and checked.application is not None and checked.specs:
-        made = plan(checked, options.output, _searches(options), pipeline_options.job_options(options))
+    sound = checked if checked.ok else checked.sound()
+    if sound.ok and sound.application is not None and sound.specs:
+        searches = _searches(options) if sound is checked else []
+        made = plan(sound, options.output, searches, pipeline_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)

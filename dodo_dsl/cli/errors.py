@@ -117,8 +117,7 @@ def _machine_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.images.build_context import WheelsError
     from dodo_dsl.images.docker_command import DockerError
     from dodo_dsl.images.sbom import SbomError
-    from dodo_dsl.run.leases import LeaseTimeout
-    from dodo_dsl.run.rigs.problems import RigProblem
+    from dodo_dsl.run.protocol import BackendError
     from dodo_dsl.search.postgres import StorageProblem
 
-    return DockerError, SbomError, WheelsError, LeaseTimeout, RigProblem, StorageProblem
+    return DockerError, SbomError, WheelsError, BackendError, StorageProblem

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import stack
-from dodo_dsl.application.application_problems import takes_cid
+from dodo_dsl.application.application_problems import on_other_buses, takes_cid, written_cids
 from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.pictures import pictures_of
@@ -32,7 +32,12 @@ _SKIPPED = ("build", "node_modules", "third_party", "venv")
 _COMMENTS = re.compile(r"/\*.*?(?:\*/|\Z)|(?://|#(?!include))[^\n]*", re.DOTALL)
 """Also one without an end, which the search would begin again in each place."""
 _MESSAGE = re.compile(r"opendlv(?:::|_|\.)proxy(?:::|_|\.)(?P<name>[A-Z][A-Za-z]+)")
-_HEARD = re.compile(r"dataTrigger\s*\(\s*opendlv::proxy::(?P<name>[A-Z][A-Za-z]+)::ID")
+_HEARD = re.compile(
+    r"opendlv::proxy::([A-Z][A-Za-z]+)::ID\b"
+    r"|extractMessage\s*<\s*opendlv::proxy::([A-Z][A-Za-z]+)\s*>"
+    r"|(?P<variable>\b\w+)\s*=\s*[\w.]*opendlv(?:_|\.)proxy(?:_|\.)([A-Z][A-Za-z]+)\(\)\s*(?P=variable)\.(?:Parse|Merge)From"
+)
+"""What a program compares with a message's id, or takes out of an envelope."""
 _SENDS = re.compile(r"\.\s*send\s*\(")
 _CID = re.compile(r"\bOD4Session\s*(?:\w+\s*)?[({]\s*(?:cid\s*=\s*)?(?P<cid>[0-9]{1,3})\b")
 _PLAIN = re.compile(r"[A-Za-z][\w.-]*", re.ASCII)
@@ -63,7 +68,7 @@ class Pictures:
 
 def pictures(application: ApplicationSource | None) -> Pictures:
     """The pictures of the first service with a memory's name in its command, if that is none of the stack's."""
-    own = {service.name for service in _own(application)} if application else set()
+    own = {service.name for service in own_services(application)} if application else set()
     for asked in pictures_of(application) if application else ():
         if asked.service in own:
             memories: dict[str, str] = {}
@@ -74,7 +79,7 @@ def pictures(application: ApplicationSource | None) -> Pictures:
     return Pictures()
 
 
-def _own(application: ApplicationSource) -> Iterator[ComposeService]:
+def own_services(application: ApplicationSource) -> Iterator[ComposeService]:
     """The services that are none of the stack's."""
     others = stack.parts(application)
     return (service for name, service in application.services.items() if name not in others)
@@ -98,30 +103,38 @@ def declarable(file: Path) -> Declarable | None:
     if application is None:
         return None
     without = {_item(name): part.instead for name, (_, part) in stack.parts(application).items()}
-    services = {_item(each.name): text for each in _own(application) if (text := _said(each, application))}
+    found = {_item(service.name): _found(service, application) for service in own_services(application)}
+    others = on_other_buses([cids for cids, _ in found.values()])
+    without |= {
+        name: f"it is on CID {', '.join(map(str, cids))}, another bus"
+        for name, (cids, _) in found.items()
+        if cids in others
+    }
+    services = {name: said for name, (_, said) in found.items() if said and name not in without}
     return Declarable(_item(file.name), without, services) if without or services else None
 
 
-def _said(service: ComposeService, application: ApplicationSource) -> str:
-    """The keys of x-dodo that a service's sources show, where its compose file has none."""
-    build = service.node.get("build")
+def _found(service: ComposeService, application: ApplicationSource) -> tuple[set[int], str]:
+    """A service's CIDs, and the keys of x-dodo that its sources show and its compose file lacks."""
+    build, cids = service.node.get("build"), written_cids(service, application)
     context = build.get("context") if isinstance(build, source.Mapping) else build
     if service.declared or not isinstance(context, source.Scalar) or not is_local(context.text):
-        return ""
+        return cids, ""
     if not application.paths.is_own(context.text):
-        return ""
+        return cids, ""
     texts = list(_sources(application.folder / context.text))
-    heard = {match["name"] for text in texts for match in _HEARD.finditer(text)}
+    heard = {name for text in texts for match in _HEARD.finditer(text) for name in match.group(1, 2, 4) if name}
     named = {match["name"] for text in texts if _SENDS.search(text) for match in _MESSAGE.finditer(text)}
     keys = {
         "in": sorted(name for name in heard if name.endswith("Reading")),
         "out": sorted(name for name in named - heard if name.endswith("Request")),
     }
     said = [f"{key}: [{', '.join(f'opendlv.proxy.{n}' for n in names)}]" for key, names in keys.items() if names]
-    built_in = [match["cid"] for text in texts for match in _CID.finditer(text)]
+    built_in = [int(match["cid"]) for text in texts for match in _CID.finditer(text)]
     if built_in and not takes_cid(service):
-        said.append(f"cid: {int(built_in[0])}")
-    return f"{{{', '.join(said)}}}" if said else ""
+        said.append(f"cid: {built_in[0]}")
+        cids = {built_in[0]}
+    return cids, f"{{{', '.join(said)}}}" if said else ""
 
 
 def _sources(folder: Path) -> Iterator[str]:

@@ -43,7 +43,8 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         checked = selection.select([options.word], (), options.application)
     except selection.NoSuchTest as error:
         near = did_you_mean(options.word, rules) if "-" in options.word else ""
-        raise UsageError(f"{error}" + (f"; or the rule: {near}" if near else "")) from None
+        said = str(error).replace("unknown test", "unknown test or rule", 1)
+        raise UsageError(f"{said}; " + (f"or the rule: {near}" if near else "'dodo explain' lists the rules")) from None
     found = [explain(test) for test in checked.tests]
     stdout.write(json_text([asdict(e) for e in found]) if options.json else _text(found))
     stderr.write(selection.left_out(checked))

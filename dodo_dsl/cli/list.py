@@ -118,7 +118,9 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
         checks = (f"{check} ({unit})" if unit else check for check, unit in manifest.checks.items())
         lines.append(f"checks: {', '.join(checks)}")
     if manifest.example is not None:
-        words = shlex.join([*manifest.process, "--cid=128", *manifest.example])
+        folder = "" if Path("services", "base").is_dir() else f"{package_data.root()}/"
+        example = [word.replace("=tests_registry/", f"={folder}tests_registry/") for word in manifest.example]
+        words = shlex.join([*manifest.process, "--cid=128", *example])
         lines.append(f"standalone: {_found_by(manifest)}{words}")
     stdout.writelines(f"{printable(line)}\n" for line in lines)
     return Exit.OK

@@ -1,4 +1,4 @@
-"""dodo lsp: check and complete tests in an editor while they are written."""
+"""dodo lsp: check tests in an editor while they are written."""
 
 import argparse
 import contextlib

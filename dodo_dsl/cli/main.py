@@ -37,7 +37,7 @@ COMMANDS = {
     "rank": Subcommand("rank", "rank applications by the goals of their tests"),
     "stats": Subcommand("stats", "show how many services the tests share"),
     "rec": Subcommand("rec", "inspect, cut and export recordings"),
-    "lsp": Subcommand("lsp", "check and complete tests in an editor while they are written"),
+    "lsp": Subcommand("lsp", "check tests in an editor while they are written"),
     "completion": Subcommand(
         "completion", "print a script that lets a shell complete commands, options, tests, services and rigs"
     ),
@@ -90,6 +90,9 @@ def main(argv: Sequence[str], stdout: TextIO, stderr: TextIO) -> int:
     """Runs one command. What it cannot do is one sentence here, and an exit code; so is argparse's SystemExit."""
     stdout, stderr = harmless_stream(stdout), harmless_stream(stderr)
     os.environ.pop("DODO_SEARCH_STORAGE", None)  # jobs of a pipeline have it for their command line alone
+    if not argv:
+        parser(()).print_help(sys.stderr)
+        return Exit.USAGE
     try:
         options = parser(argv[:1]).parse_args(argv)
     except SystemExit as stop:

@@ -18,11 +18,11 @@ from dodo_dsl.cli.new_files import (
     REGISTRY,
     New,
     application_files,
-    compose_file,
     deployment_files,
     dodo_yml,
     included,
     missing_schemas,
+    own_compose_file,
     say_next,
     write_new,
 )
@@ -32,7 +32,7 @@ from dodo_dsl.diagnostics import Diagnostic, format_text, shown_path
 from dodo_dsl.spec.deployment import FILE_NAME, Deployment
 from dodo_dsl.spec.model import KINDS, LEVEL_WORDS, LEVELS, Spec
 
-_LEVELS = {**LEVEL_WORDS, "hil": f"{LEVEL_WORDS['hil']}, on a rig, at first the emulated one"}
+_LEVELS = {**LEVEL_WORDS, "hil": f"{LEVEL_WORDS['hil']}, on a rig"}
 _KINDS = {
     "closed-loop": "the application drives",
     "open-loop": "the application is carried along, and its signals are judged",
@@ -131,7 +131,7 @@ def destination(checked: Checked) -> Destination:
     root = deployment.root.resolve()
     schemas = missing_schemas(root)
     if deployment.file is None:
-        application = compose_file(root)
+        application = own_compose_file(root)
         files = (dodo_yml(root, application), *schemas)
         return Destination(root, root / REGISTRY, files, "" if application else _NO_APPLICATION)
     todo = "" if deployment.application else _NO_APPLICATION
@@ -199,6 +199,7 @@ def new_deployment(stdout: TextIO, stderr: TextIO) -> int:
         f", or name those that you have in {FILE_NAME}, of {others}: application: {{files: [...]}}" if others else ""
     )
     named = [f"name your services in {name}{instead}" for name in written]
+    named += [] if written or own_compose_file(Path.cwd()) else [_NO_APPLICATION]
     say_next([*named, *included, f"dodo new {_FIRST}", "dodo compile --check", _PUSH], stdout)
     return Exit.OK
 
@@ -225,7 +226,7 @@ def _lack(file: New) -> str:
 EXAMPLES = """examples:
   dodo new                                             asks, or lists what a test can start from
   dodo new sil-my-curve                                a closed-loop simulation that compiles
-  dodo new hil-my-curve --level hil                    the same on a rig, at first the emulated one
+  dodo new hil-my-curve --level hil                    the same on a rig, or emulated by dodo run --emulate
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
   dodo new dil-mine --level dil --rec drive.rec        your own recording, and its signal as the target
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
@@ -341,19 +342,18 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
 
 def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New], str]:
     """The test's own files, its spec first; with a note for the user."""
-    there = compose_file(place.root) if tests.checked.deployment.file is None else ""
-    pictures = existing_application.pictures(
-        tests.checked.application or (as_written(place.root / there) if there else None)
-    )
+    there = own_compose_file(place.root) if tests.checked.deployment.file is None else ""
+    application = tests.checked.application or (as_written(place.root / there) if there else None)
+    pictures = existing_application.pictures(application)
     if wanted.rec:
         from dodo_dsl.cli import recorded_drive  # slow to load, and rarely needed
 
-        declared = tests.checked.application.declared.values() if tests.checked.application else ()
+        declared = application.declared.values() if application else ()
         sent = {name.partition("/")[0] for own in declared if own for name, _ in own.outputs}
         drive = recorded_drive.look(wanted.rec, sent)
         made, note = recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root, pictures)
         note += pictures.note if drive.cameras else ""
-        return made, note + recorded_drive.unpassable(wanted.rec, drive, tests.checked.application, pictures)
+        return made, note + recorded_drive.unpassable(wanted.rec, drive, application, pictures)
     if wanted.extends:
         note = f"copied, because '{wanted.extends}' ships with DoDo and a test extends only tests of its own registry\n"
         return _from_another(wanted.name, wanted.extends, tests, place, note)

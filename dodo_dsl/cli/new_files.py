@@ -13,7 +13,8 @@ from typing import TextIO
 import jinja2
 
 from dodo_dsl import __version__, package_data, source
-from dodo_dsl.cli.existing_application import declarable
+from dodo_dsl.application.read import as_written
+from dodo_dsl.cli.existing_application import declarable, own_services
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.spec.deployment import FILE_NAME
@@ -61,6 +62,13 @@ _MESSAGES = "messages.odvd"
 def compose_file(root: Path) -> str:
     """The name of the compose file in a folder, empty when there is none."""
     return next((name for name in COMPOSE_FILES if (root / name).is_file()), "")
+
+
+def own_compose_file(root: Path) -> str:
+    """The same, also empty if nothing but the stack around an application is in it."""
+    name = compose_file(root)
+    application = as_written(root / name) if name else None
+    return "" if application and not any(own_services(application)) else name
 
 
 def other_compose_files(root: Path) -> list[str]:
@@ -135,7 +143,7 @@ def deployment_files(root: Path, *, images: bool = False) -> list[New]:
     """
     application = compose_file(root) or COMPOSE_FILES[0]
     return [
-        dodo_yml(root, application),
+        dodo_yml(root, application if own_compose_file(root) or not compose_file(root) else ""),
         New(root / application, filled("deployment/docker-compose.yml")),
         New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
         New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", templates=included(images))),

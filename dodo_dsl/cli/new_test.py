@@ -26,7 +26,7 @@ from dodo_dsl.spec.registry import KEYWORDS, SUFFIX
 from dodo_dsl.spec.values import ValueProblem, convert
 
 MAPS = ("maps/straight", "maps/rig-straight")
-TARGET = "targets/straight-ahead.csv"
+TARGET = "targets/weave.csv"
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 _LONGEST = 60
@@ -61,7 +61,7 @@ def test_files(
             shipped = sorted((package_data.registry() / place).iterdir())
             files += [New(registry / place / path.name, path.read_bytes()) for path in shipped]
     if f"../{TARGET}".encode() in spec and not (registry / TARGET).exists():
-        files.append(New(registry / TARGET, filled("tests/straight-ahead.csv")))
+        files.append(New(registry / TARGET, filled("tests/weave.csv")))
     return files
 
 

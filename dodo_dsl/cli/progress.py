@@ -6,7 +6,7 @@ from typing import Self, TextIO
 
 from dodo_dsl.cli import display
 from dodo_dsl.cli.display import Verbosity
-from dodo_dsl.outcome import Outcome
+from dodo_dsl.outcome import ON_EMULATED, Outcome
 from dodo_dsl.plan.model import LAYERS
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.runner import Progress
@@ -17,8 +17,9 @@ _STEPS = ("taking down", *(f"waiting for {layer}" for layer in LAYERS))
 
 
 def ending(outcome: Outcome) -> str:
-    """What follows the word for an outcome: why, where a test did not pass."""
-    return "" if outcome.outcome == "passed" else f": {printable(outcome.reason)}"
+    """What follows the word for an outcome: whether its rig was emulated, and why, where a test did not pass."""
+    where = " (emulated)" if ON_EMULATED in outcome.notes else ""
+    return where if outcome.outcome == "passed" else f"{where}: {printable(outcome.reason)}"
 
 
 class PlainProgress:

@@ -16,6 +16,7 @@ from dodo_dsl.atomic import refuse_existing
 from dodo_dsl.cli.display import progress_bar
 from dodo_dsl.cli.errors import require_extra
 from dodo_dsl.cli.rec_actions import RecJob, messages_for, tell
+from dodo_dsl.opendlv.assets import truth_file
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import coco, csv_table, steering
@@ -76,6 +77,7 @@ def _coco(job: RecJob) -> None:
         export = coco.CocoExport(place, options.pictures, options.all, progress, job.tell)
         result = export.write(recording, images, boxes)
     _tell_lost(job, result.lost, len(images))
+    _tell_boxes(job.tell, result)
     job.stdout.write(f"{folder}: {len(result.images)} frames with {len(result.boxes)} boxes\n")
 
 
@@ -93,7 +95,17 @@ def boxes_of(job: RecJob, rows: Numbers, images: Numbers) -> Mapping[int, list[c
         return coco.detections(job.recording, job.messages, rows, job.options.labels)
     if job.options.labels is not None:
         raise NothingSelected("--truth and --labels exclude each other: boxes come from a file or from a sender")
-    return coco.of_truth(job.recording, images, job.options.truth)
+    found = coco.of_truth(job.recording, images, job.options.truth)
+    for slip in truth_file.corners(job.options.truth):
+        job.tell(f"{slip}; {slip.hint}")
+    return found
+
+
+def _tell_boxes(tell: Callable[[str], None], result: coco.DataSet) -> None:
+    if result.cut:
+        tell(f"cut {result.cut} boxes at the edges of their frames")
+    if result.empty:
+        tell(f"left out {result.empty} boxes without an area in their frames")
 
 
 def _tell_lost(job: RecJob, lost: int, of: int) -> None:
@@ -175,12 +187,19 @@ def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
     parts = split_recordings(files, options.validation, options.seed)
     refuse_existing([folder / part / _TABLES[options.format] for part in parts], options.force)
     numbers = {path: f"{number:03}" for number, path in enumerate(files, 1)} if len(files) > 1 else {}
-    said = []
+    said, sets = [], list[coco.CocoExport]()
     with atomic.files_into(folder) as place:
         for part, chosen in parts.items():
-            write = _coco_set if options.format == "coco" else _steering
-            found = write(options, place / part, [(path, numbers.get(path, "")) for path in chosen], stderr)
+            inputs = [(path, numbers.get(path, "")) for path in chosen]
+            if options.format == "coco":
+                sets.append(_coco_set(options, place / part, inputs, stderr))
+                result = sets[-1].result
+                found = f"{len(result.images)} frames with {len(result.boxes)} boxes of {_count(inputs)}"
+            else:
+                found = _steering(options, place / part, inputs, stderr)
             said.append(f"{folder / part}: {found}\n")
+        for each in sets:
+            each.finish(set[str]().union(*(other.result.classes for other in sets)))
     stdout.writelines(said)
 
 
@@ -197,7 +216,9 @@ def _no_progress(_: int) -> None:
     """Pictures of a recording are counted by its own bar."""
 
 
-def _coco_set(options: argparse.Namespace, folder: Path, files: Sequence[tuple[Path, str]], stderr: TextIO) -> str:
+def _coco_set(
+    options: argparse.Namespace, folder: Path, files: Sequence[tuple[Path, str]], stderr: TextIO
+) -> coco.CocoExport:
     export = coco.CocoExport(folder, options.pictures, options.all, _no_progress, lambda text: tell(stderr, text))
     for path, name in files:
         with _opened(path, options, stderr) as job:
@@ -206,10 +227,10 @@ def _coco_set(options: argparse.Namespace, folder: Path, files: Sequence[tuple[P
             with _counted(job, export, len(images)):
                 export.add(job.recording, images, boxes, name)
     tell_lost(stderr, export.result.lost)
+    _tell_boxes(lambda text: tell(stderr, text), export.result)
     if not export.result.images:
         raise LabelError(f"no frame of {_named(files)} has a detection; --all exports frames without them")
-    export.finish()
-    return f"{len(export.result.images)} frames with {len(export.result.boxes)} boxes of {_count(files)}"
+    return export
 
 
 def _steering(options: argparse.Namespace, folder: Path, files: Sequence[tuple[Path, str]], stderr: TextIO) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import wiring_rules
@@ -24,7 +25,7 @@ from dodo_dsl.opendlv.message_set import OWN_IDS, MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.rec import contents
 from dodo_dsl.rec.contents import MessageStream
-from dodo_dsl.rec.frames import IMAGE
+from dodo_dsl.rec.frames import IMAGE, packets
 
 SIGNALS = {
     "opendlv.proxy.GroundSteeringRequest": "groundSteering",
@@ -38,14 +39,17 @@ SIGNALS = {
 BOUNDS = {"opendlv.proxy.GroundSteeringRequest": "38 deg", "opendlv.proxy.PedalPositionRequest": "1"}
 """The size that answers to pictures may have, by the Kiwi car's vehicle; of other messages any."""
 SHARE_OF_MEAN, SHARE_OF_DISTANCE = 10, 50
-"""Limits of the distance to the recorded signal, in percent of its range."""
+"""Limits of the distance to the recorded signal, in percent of its range; of the mean at most half of a constant's."""
 FEWEST = 10
 DEFAULT_GAP_S = 1
 """Longer gaps are shortened by the player unless it is set otherwise, but not in a target."""
+LONGEST_GAP_S, LONGEST_S = 3600, 86_400
+"""Of what a player plays, and of a test."""
 LARGEST_BYTES = 200 << 20
 _START_UP_S = 10
 _MEMORIES = ("video0.argb", "video0.i420")
 """In which rec-replay shows pictures by default."""
+_SUFFIX = ".rec"
 _APART = 1_000_000
 """Microseconds between the delays of two senders from which on one of them sends by another clock."""
 _PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
@@ -53,11 +57,11 @@ _PLAIN = re.compile(r"[\w.][\w./ -]*", re.ASCII)
 
 @dataclass(frozen=True)
 class RecordedDrive:
-    """What a recording holds: ``cameras`` are sender stamps, that with most pictures first; ``duration`` is in s.
+    """What a recording holds: ``cameras`` are sender stamps, that with most pictures, of ``size``, first.
 
-    ``gap`` is the longest time without a message in s. ``retimed`` are messages with their times of receipt, where
-    sample times come from different drives; None elsewhere. Without a ``target`` the pictures have to be answered, by
-    the message ``answer``.
+    ``duration`` and ``gap``, the longest time without a message, are in s as they are played. ``retimed`` are messages
+    with their times of receipt, where sample times come from different drives; None elsewhere. Without a ``target`` the
+    pictures have to be answered, by the message ``answer``.
     """
 
     duration: float
@@ -69,12 +73,18 @@ class RecordedDrive:
     values: tuple[float, ...]
     requests: tuple[str, ...]
     others: tuple[int, ...]
+    size: tuple[int, int]
 
     @property
     def range(self) -> float:
         """Of the signal; its largest value where it is constant, 1 if that is 0."""
         values = self.values or (0.0,)
         return max(values) - min(values) or max(map(abs, values)) or 1.0
+
+    @property
+    def of_constant(self) -> float:
+        """The mean distance of the signal to the constant that is nearest to it."""
+        return float(np.abs(np.array(self.values) - np.median(self.values)).mean()) if self.values else 0.0
 
 
 def look(path: Path, sent: Collection[str]) -> RecordedDrive:
@@ -85,27 +95,45 @@ def look(path: Path, sent: Collection[str]) -> RecordedDrive:
         _, messages = messages_for(recording, (), lambda _: None)
         index = recording.index
         played = np.flatnonzero(~np.isin(index["data_type"], list(OWN_IDS)))
+        if not len(played):
+            raise UsageError(f"'{path}' has no messages to play")
         if fault := recording_times.fault(recording, played):
             raise UsageError(f"'{path}' cannot be played: {fault}; 'dodo rec cut' writes a part without them")
         received = _receipts(recording, played)
         streams = sorted(contents.streams(recording, messages), key=lambda stream: -stream.count)
-        target = _target(path, streams)
+        signals = [name for name in SIGNALS if not sent or name in sent]
+        target = _target(path, streams, signals)
         values = _values(path, recording, messages, target) if target else ()
+        cameras = tuple(stream.sender_stamp for stream in streams if stream.id == IMAGE)
+        first = recording.rows(messages=[IMAGE], sender_stamps=cameras[:1])[:1]
+        size = next(((each.width, each.height) for each in packets(recording, first)), (0, 0))
         times = np.sort(index["time"][played] if received is None else received[played])
-        gap = float(np.diff(times).max(initial=0)) / 1e6
+        gaps = _played_gaps(path, np.diff(times) / 1e6, target)
         retimed = None if received is None else _retimed(recording, received)
     names = {stream.name for stream in streams if stream.name}
     return RecordedDrive(
-        float(times[-1] - times[0]) / 1e6,
-        gap,
+        float(gaps.sum()),
+        float(gaps.max(initial=0)),
         retimed,
-        tuple(stream.sender_stamp for stream in streams if stream.id == IMAGE),
+        cameras,
         target,
-        next((name for name in SIGNALS if name in sent), next(iter(SIGNALS))),
+        next(iter(signals)),
         values,
         tuple(sorted(name for name in names if name.endswith("Request") or name in sent)),
         tuple(s.sender_stamp for s in streams if target and s.id == target.id and s is not target),
+        size,
     )
+
+
+def _played_gaps(path: Path, gaps: NDArray[np.float64], target: MessageStream | None) -> NDArray[np.float64]:
+    """Times between messages in s as a player has them; raises UsageError where no test can have them."""
+    if gaps.max(initial=0) > LONGEST_GAP_S and target is None:
+        gaps = np.minimum(gaps, DEFAULT_GAP_S)
+    longest, whole = float(gaps.max(initial=0)), float(gaps.sum())
+    if longest > LONGEST_GAP_S or math.ceil(whole) + 2 * _START_UP_S > LONGEST_S:
+        found = f"takes {recording_times.span(whole)} with a break of {recording_times.span(longest)}"
+        raise UsageError(f"'{path}' {found}, and a test 24 h with one of 1 h; cut out a part: dodo rec cut --help")
+    return gaps
 
 
 def _receipts(recording: Recording, rows: Numbers) -> Numbers | None:
@@ -124,15 +152,15 @@ def _retimed(recording: Recording, times: Numbers) -> bytes:
     return b"".join(encode_frame(envelope._replace(sample_time=time)) for envelope, time in pairs)
 
 
-def _target(path: Path, streams: list[MessageStream]) -> MessageStream | None:
-    """The signal to judge; None if there are only pictures, which have to be answered."""
-    for name in SIGNALS:
+def _target(path: Path, streams: list[MessageStream], signals: list[str]) -> MessageStream | None:
+    """Which of the ``signals`` to judge; None if there are only pictures, which have to be answered."""
+    for name in signals:
         found = [stream for stream in streams if stream.name == name and stream.count >= FEWEST]
         if found:
             return min(found, key=lambda stream: stream.sender_stamp != 0)  # as applications send it
-    if any(stream.id == IMAGE and stream.count >= FEWEST for stream in streams):
+    if signals and any(stream.id == IMAGE and stream.count >= FEWEST for stream in streams):
         return None
-    expected = ", ".join(SIGNALS)
+    expected = ", ".join(signals) or f"{', '.join(SIGNALS)}, of which the application declares none"
     what = f"expected {FEWEST} or more messages of one of {expected}, or as many pictures"
     raise UsageError(f"'{path}' has no signal to judge, {what}")
 
@@ -153,8 +181,9 @@ def files(
     """The test's files, its spec first, with the recording where the registry has it not yet; and what was found."""
     place = path.resolve()
     copies = []
-    if drive.retimed is not None or not place.is_relative_to(registry.resolve()):
-        name_of_copy = path.name if drive.retimed is None else f"{path.stem}-as-received{path.suffix}"
+    stem = re.sub(r"[\0-\x1f\x7f]", "-", path.stem if path.suffix == _SUFFIX else path.name)
+    if drive.retimed is not None or f"{stem}{_SUFFIX}" != path.name or not place.is_relative_to(registry.resolve()):
+        name_of_copy = f"{stem}{'' if drive.retimed is None else '-as-received'}{_SUFFIX}"
         content = place.read_bytes() if drive.retimed is None else drive.retimed
         copies = [New(registry / "recordings" / name_of_copy, content)]
         place = registry.resolve() / "recordings" / name_of_copy
@@ -178,16 +207,19 @@ def files(
         is_target=drive.target is not None,
         bound=BOUNDS.get(message, ""),
         sender=drive.target.sender_stamp if drive.target else 0,
-        mean=_limit(drive.range * SHARE_OF_MEAN / 100),
+        mean=_limit(min(drive.range * SHARE_OF_MEAN / 100, drive.of_constant / 2 or math.inf)),
         distance=_limit(drive.range * SHARE_OF_DISTANCE / 100),
-        share_of_mean=SHARE_OF_MEAN,
         share_of_distance=SHARE_OF_DISTANCE,
     )
     return [*spec_files(name, registry / name, root, spec), *copies], _found(path, drive, field)
 
 
 def unpassable(path: Path, drive: RecordedDrive, application: ApplicationSource | None, pictures: Pictures) -> str:
-    """A warning if services of the application read pictures, of which the recording has none."""
+    """A warning if services of the application read pictures, of which the recording has none, or of another size."""
+    own, recorded = (f"{width}x{height}" for width, height in ((pictures.width, pictures.height), drive.size))
+    if pictures.service and drive.cameras and recorded != own:
+        found = f"the pictures of '{path.name}' are {recorded}, and '{pictures.service}' seems to take {own}"
+        return f"warning: {found}: it gets the recorded size\n"
     names = (*_MEMORIES, *pictures.memories.values())
     readers = [] if drive.cameras or application is None else wiring_rules.readers(application, names)
     if not readers:

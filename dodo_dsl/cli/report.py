@@ -44,14 +44,14 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     other = read_given(options.against) if options.against else None
     with _child_reports(options.gitlab, stdout) as fetched:
-        folders = [*options.folder, *fetched] or [REPORT]
+        folders = options.folder if options.folder or fetched else [REPORT]
         output = options.output or (REPORT if options.gitlab else None)
-        reports = [read_given(path) for path in folders]
+        reports = [*map(read_given, folders), *fetched]
         target, outcomes = _drawn(reports, output, stdout)
     from dodo_dsl.report.join import write_other_ways
 
     comparison = compare(outcomes, other) if other else None
-    circumstances = results.joined([results.Results(one.outcomes, one.circumstances) for one in reports])
+    circumstances = results.joined(reports)
     write_summaries(target, outcomes, comparison, circumstances)
     write_other_ways(target, comparison, other)
     if comparison:
@@ -61,7 +61,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 
 @contextlib.contextmanager
-def _child_reports(is_job: bool, stdout: TextIO) -> Iterator[list[Path]]:
+def _child_reports(is_job: bool, stdout: TextIO) -> Iterator[list[GivenReport]]:
     """The reports of child pipelines in a folder that lasts as long as this."""
     if not is_job:
         yield []
@@ -69,9 +69,8 @@ def _child_reports(is_job: bool, stdout: TextIO) -> Iterator[list[Path]]:
     from dodo_dsl.report import child_jobs
 
     with tempfile.TemporaryDirectory() as folder:
-        found = list(child_jobs.fetch(child_jobs.of_job(os.environ), Path(folder)))
-        stdout.writelines(f"job '{printable(job)}' has no report\n" for job, report in found if report is None)
-        reports = [report for _, report in found if report is not None]
+        reports, sentences = child_jobs.fetch(child_jobs.of_job(os.environ), Path(folder))
+        stdout.writelines(f"{printable(sentence)}\n" for sentence in sentences)
         if not reports:
             raise UsageError("no job of a child pipeline has a report")
         yield reports

@@ -90,7 +90,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
 
 def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Rig]:
     if options.rig is None:
-        return list(deployment.rigs.values())
+        return [rig for rig in deployment.rigs.values() if not rig.is_emulated]
     rig = deployment.rig(options.rig)
     if rig is None:
         raise UsageError(

@@ -17,6 +17,7 @@ from dodo_dsl.run.rigs.access import query_exclusively
 from dodo_dsl.run.rigs.leases import devices_in
 from dodo_dsl.run.rigs.permission import STILL, refuse_forbidden
 from dodo_dsl.spec.deployment import Deployment
+from dodo_dsl.spec.load import of_test
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.rig import Rig
@@ -86,9 +87,9 @@ def _test(word: str | None, deployment: Deployment) -> tuple[dict[str, Manifest]
     if word is None:
         return load_manifests(deployment.services)[0], None
     checked = selection.select([word], (), [])
-    if len(checked.specs) != 1:
-        names = ", ".join(spec.title for spec in checked.specs[:3])
-        raise TruthError(f"--test {word} matches {len(checked.specs)} tests, expected one: {names} ...")
+    tests = {of_test(spec).title: spec for spec in checked.specs}
+    if len(tests) != 1:
+        raise TruthError(f"--test {word} matches {len(tests)} tests, expected one: {', '.join([*tests][:3])} ...")
     return dict(checked.manifests), checked.specs[0]
 
 

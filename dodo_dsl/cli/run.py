@@ -32,7 +32,6 @@ from dodo_dsl.report.repetitions import Repeated, repeated
 from dodo_dsl.report.results import Circumstances
 from dodo_dsl.run.backends import Backends, Job, Processes
 from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.run.rigs.session import is_real
 from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
@@ -77,7 +76,7 @@ def choose_backend(plans: Sequence[Plan]) -> BackendName:
         return by_application
     from dodo_dsl.run.mixed import may_enter
 
-    if any(is_real(plan) for plan in plans) or (may_enter() and _lacks_images(plans)):
+    if any(plan.is_real for plan in plans) or (may_enter() and _lacks_images(plans)):
         return "mixed"
     return by_application
 
@@ -139,6 +138,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--clock", choices=("realtime", "lockstep", "virtual"), help="override the specs' clock")
     parser.add_argument("--wall-timeout", type=seconds, metavar="S", help="maximum wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
+    parser.add_argument("--emulate", action="store_true", help="take emulated rigs, also in place of those of dodo.yml")
     parser.add_argument(
         "--report", type=Path, default=REPORT, metavar="DIR", help="folder of the report (default: dodo-report)"
     )
@@ -193,7 +193,7 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
 
 def _refuse_to_keep(plans: Sequence[Plan]) -> None:
     for plan in plans:
-        if is_real(plan):
+        if plan.is_real:
             raise UsageError(
                 f"{plan.name} runs on rig '{plan.rig}', which --keep would leave in motion: run it without --keep"
             )

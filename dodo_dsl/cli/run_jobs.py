@@ -1,8 +1,8 @@
 """From a command line of ``dodo run`` to jobs: compiled tests, also at samples, and the folders of their reports.
 
-``--samples`` takes tests at samples of their ranges. Shipped tests on the emulated rig, where that is not built,
-are left out: nobody asked for them. The fork server loads while tests are compiled: on another core, it costs no time
-then.
+``--samples`` takes tests at samples of their ranges. Shipped tests without a rig, or on an emulated one that is not
+built, are left out: nobody asked for them. The fork server loads while tests are compiled: on another core, it costs no
+time then.
 """
 
 import argparse
@@ -25,29 +25,39 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
 from dodo_dsl.plan.runs import named, runs
 from dodo_dsl.plan.test_files import file_problem
+from dodo_dsl.report.results import FILE_NAME
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.history import History
-from dodo_dsl.run.rigs.session import is_real
 from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.registry import SUFFIX
-from dodo_dsl.spec.rig import EMULATED, PORT
+from dodo_dsl.spec.rig import EMULATED, PORT, SIMULATION_TAG
 from dodo_dsl.spec.vary import Values
 from dodo_dsl.terminal import printable
 
 
-def without_unbuilt(checked: Checked, backend: str | None) -> tuple[Checked, str]:
-    """The same without shipped tests on a rig that is not built, and a line on them; containers have it in an image."""
-    if not _runs_processes(checked, backend):
+def without_rigless(checked: Checked, options: argparse.Namespace) -> tuple[Checked, str]:
+    """The same without shipped tests whose rig is not built, or is missing and no word asks for it; lines on them."""
+    from dodo_dsl.run.capabilities import emulator_folder
+
+    unasked = [test for test in checked.tests if test.spec.path in checked.unasked]
+    all_ask = options.test or checked.settings.emulate
+    rigless = {test.spec.path for test in unasked if not all_ask and test.rig and test.rig.is_missing}
+    unbuilt = {test.spec.path for test in unasked if _is_emulated(test)} - rigless
+    if unbuilt and (emulator_folder() or not _runs_processes(checked, options.backend)):
+        unbuilt = set()
+    said = ""
+    for paths, where in (
+        (rigless, "that need a rig, which dodo.yml does not have: {} (--emulate takes an emulated one)"),
+        (unbuilt, "on the emulated rig, which is not built: {} (see dodo doctor)"),
+    ):
+        names = printable(", ".join(sorted({spec.location.stem for spec in checked.specs if spec.path in paths})))
+        said += f"skipped shipped tests {where.format(names)}\n" if paths else ""
+    if not said:
         return checked, ""
-    left_out = {test.spec.path for test in checked.tests if test.spec.path in checked.unasked and _is_emulated(test)}
-    if not left_out or _is_built():
-        return checked, ""
-    known, kept = set(checked.diagnostics), [spec for spec in checked.specs if spec.path not in left_out]
+    known, kept = set(checked.diagnostics), [s for s in checked.specs if s.path not in rigless | unbuilt]
     fewer = narrowed(checked, kept)
-    names = printable(", ".join(sorted({spec.location.stem for spec in checked.specs if spec.path in left_out})))
-    said = f"skipped shipped tests on the emulated rig, which is not built: {names} (see dodo doctor)\n"
     return replace(fewer, diagnostics=tuple(d for d in fewer.diagnostics if d in known)), said
 
 
@@ -61,25 +71,15 @@ def _runs_processes(checked: Checked, backend: str | None) -> bool:
 
 def _is_emulated(test: ResolvedTest) -> bool:
     """Whether the rig's firmware runs in the simulator; for a camera alone, nothing has to be built."""
-    ports = (
-        service.texts.get(name)
-        for service in test.services
-        for name, parameter in service.manifest.parameters.items()
-        if parameter.rig == PORT
-    )
-    return EMULATED in ports
-
-
-def _is_built() -> bool:
-    from dodo_dsl.run.capabilities import emulator_folder
-
-    return emulator_folder() is not None
+    given = (argument for service in test.services for argument in service.arguments.values())
+    return any(argument.parameter.rig == PORT and argument.text == EMULATED for argument in given)
 
 
 def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
     """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
     kept = getattr(options, "keeps_virtual", False)
-    settings = Settings(options.clock, options.isolation, options.seed, options.wall_timeout, options.repeat, kept)
+    emulate, wall = options.emulate, options.wall_timeout
+    settings = Settings(options.clock, options.isolation, options.seed, wall, options.repeat, kept, emulate)
     tests: dict[str, str] = {}
     if options.compiled:
         if options.test or options.level or options.application or options.samples:
@@ -93,6 +93,8 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     else:
         plans, deployment, tests = compile_tests(options, settings, folder, stdout, options.samples)
         folders = {plan.slug: folder / plan.slug for plan in plans}
+    if emulate:
+        plans = [replace(plan, tag=SIMULATION_TAG) for plan in plans]
     report = _usable(options.report, [named(p).slug for p in plans])
     families = {plan.slug: tests.get(plan.slug, named(plan).slug) for plan in plans}
     found: dict[str, Job] = {}
@@ -114,7 +116,9 @@ def load_compiled(folder: Path, settings: Settings) -> Plan:
         raise UsageError(f"{plan.name}: {problem}")
     if settings.clock not in (None, plan.clock):
         raise UsageError(f"this test is compiled for clock {plan.clock}; compile it again for another")
-    if settings.isolation == "network" and is_real(plan):
+    if settings.emulate and plan.is_real:
+        raise UsageError(f"{plan.name} is compiled for the hardware of rig '{plan.rig}', not for --emulate")
+    if settings.isolation == "network" and plan.is_real:
         raise UsageError(f"rig '{plan.rig}' is reached through the host, not with --isolation network")
     return plan
 
@@ -129,20 +133,32 @@ def _deployment(stdout: TextIO) -> Deployment:
 
 
 def _usable(report: Path, slugs: Sequence[str]) -> Path:
-    """The report's folder, made, and then left out of git; a folder of specs or of compiled tests is refused."""
+    """The report's folder, made, and then left out of git; a folder with files of others and no report is refused."""
     is_new = not report.exists()
     try:
         report.mkdir(parents=True, exist_ok=True)
         if is_new:
             atomic.write_text(report / ".gitignore", "*\n")
+        is_ours = not any(report.iterdir()) or any(
+            map(_is_written_by_dodo, (report / ".gitignore", report / FILE_NAME))
+        )
     except OSError as error:
         raise UsageError(f"'{report}' cannot take the report: {error.strerror}") from error
     for slug in slugs:
         if (report / slug / PLAN_FILE).exists() or any((report / slug).glob("*.dodo.yml")):
             raise UsageError(f"'{report}' holds tests; name another folder with --report")
+    if not is_ours:
+        raise UsageError(f"'{report}' holds other files and no report; name a new or empty folder with --report")
     if not os.access(report, os.W_OK):
         raise UsageError(f"'{report}' cannot take the report: no write permission")
     return report.resolve()
+
+
+def _is_written_by_dodo(file: Path) -> bool:
+    try:
+        return regular_file.text(file).startswith(("*\n", '{\n  "dodo": "results"'))
+    except (OSError, ValueError):
+        return False
 
 
 def _load_plan(folder: Path, settings: Settings) -> Plan:
@@ -171,8 +187,8 @@ def compile_tests(
     """
     checked = selection.select(options.test, options.level, options.application, settings)
     stdout.write(selection.left_out(checked))
-    checked, unbuilt = without_unbuilt(checked, options.backend)
-    stdout.write(unbuilt)
+    checked, rigless = without_rigless(checked, options)
+    stdout.write(rigless)
     if not checked.specs:
         raise UsageError("no tests to run")
     if settings.clock:

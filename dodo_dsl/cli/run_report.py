@@ -210,9 +210,11 @@ def _counts(outcomes: Sequence[Outcome]) -> Iterator[Piece]:
 
 def _rates(outcomes: Sequence[Outcome], tests: Mapping[str, str]) -> list[str]:
     """How often each repeated test passed."""
+    found: dict[str, list[str]] = {test: [] for test in tests.values()}
+    for outcome in outcomes:
+        found[tests[outcome.slug]].append(outcome.outcome)
     lines = []
-    for test in dict.fromkeys(tests.values()):
-        runs = [o.outcome for o in outcomes if tests[o.slug] == test]
+    for test, runs in found.items():
         passed = runs.count("passed")
         rate = f" ({passed / len(runs):.1%})" if runs else ""
         lines.append(f"{printable(test)}: {passed} of {len(runs)} passed{rate}")

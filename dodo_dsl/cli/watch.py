@@ -23,7 +23,6 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.comparison import change_lines, compare
 from dodo_dsl.report.results import GivenReport
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.rigs.session import is_real
 from dodo_dsl.run.work_folder import WorkFolder, work_folder
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.terminal import printable
@@ -160,7 +159,7 @@ class Watch:
         """Tests that are compiled otherwise than before, and all where a program of theirs was saved."""
         before, self._compiled = self._compiled, {job.plan.slug: _digest(job.folder) for job in jobs}
         for job in jobs:
-            if is_real(job.plan):
+            if job.plan.is_real:
                 raise UsageError(f"{job.plan.name} runs on rig '{job.plan.rig}', which --watch does not set in motion")
         registries = [folder.resolve() for folder in deployment.registry]
         programs = [folder.resolve() for folder in self._folders(deployment)]

@@ -26,7 +26,7 @@ from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.runs import by_test, named, pooled
 from dodo_dsl.plan.test_files import FileCopy
 from dodo_dsl.spec.model import LEVELS
-from dodo_dsl.spec.rig import EMULATED_RIGS
+from dodo_dsl.spec.rig import SIMULATION_TAG
 
 if TYPE_CHECKING:
     from dodo_dsl.plan.build import Compiled
@@ -127,23 +127,23 @@ def _needs_images(plan: Plan) -> bool:
 def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) -> PipelineJob:
     """The job of a test, of whose Plans there are several if any rig of a pool will do."""
     plan, rig = plans[0], plans[0].rig
+    on_rig = plan.level == "hil" and plan.tag != SIMULATION_TAG
     shared = [tag for tag in plan.more_tags if all(tag in other.more_tags for other in plans)]
-    real = plan.level == "hil" and rig not in EMULATED_RIGS
     return PipelineJob(
         name=named(plan).slug,
         stage=plan.level,
-        tags=(plan.tag, *shared) if real else options.tags,
+        tags=(plan.tag, *shared) if on_rig else options.tags,
         gated=gate and plan.level == "hil",
-        rig=rig if real and not plan.pool else "",
-        pool=tuple(one.rig for one in plans) if plan.pool else (),
+        rig=rig if on_rig and not plan.pool else "",
+        pool=tuple(one.rig for one in plans) if on_rig and plan.pool else (),
         minutes=max(math.ceil((p.timeout_s + sum(s.setup_s for s in p.services)) / 60) for p in plans) + SPARE_MINUTES,
-        interruptible=not real,
+        interruptible=not on_rig,
         tests=(named(plan).slug,),
         folders=tuple(f"{folder}/{one.slug}" for one in plans),
-        image="" if real else options.image,
+        image="" if on_rig else options.image,
         backend=options.backend,
-        services=() if real else options.services,
-        before_script="" if real else options.before_script,
+        services=() if on_rig else options.services,
+        before_script="" if on_rig else options.before_script,
     )
 
 

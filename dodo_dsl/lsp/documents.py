@@ -1,11 +1,10 @@
-"""The open documents of an editor, positions in their texts, and the keys that lead to a position.
+"""The open documents of an editor, and positions in their texts.
 
 YAML counts lines and columns, an editor lines and code units.
 """
 
 import bisect
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import PositionCodec, Workspace
 
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.source import MAX_BYTES, Mapping, Node, Scalar, walk
+from dodo_dsl.source import MAX_BYTES
 
 
 @dataclass(frozen=True)
@@ -81,20 +80,11 @@ class Lines:
         end = min(start + span.length, self._end(bisect.bisect_right(self._starts, start) - 1))
         return Range(self.position(start), self.position(max(start, end)))
 
-    def whole(self) -> Range:
-        return Range(Position(0, 0), self.position(len(self.text)))
-
     def offset(self, line: int, column: int) -> int:
         """The index in the text of a line and column that count from 1."""
         if line > len(self._yaml_starts):
             return len(self.text)
         return min(self._yaml_starts[line - 1] + column - 1, len(self.text))
-
-    def place(self, position: Position) -> tuple[int, int]:
-        """YAML's line and column of an editor's position."""
-        offset = self.index(position)
-        line = bisect.bisect_right(self._yaml_starts, offset)
-        return line, offset - self._yaml_starts[line - 1] + 1
 
     def position(self, offset: int) -> Position:
         line = bisect.bisect_right(self._starts, offset) - 1
@@ -121,58 +111,3 @@ class Lines:
 
 def _starts(line_break: re.Pattern[str], text: str) -> list[int]:
     return [0, *(found.end() for found in line_break.finditer(text))]
-
-
-Steps = tuple[str | int, ...]
-
-
-@dataclass(frozen=True)
-class DocumentPlace:
-    """A key or a scalar of a document, ``steps`` are the keys and indices that lead to it.
-
-    ``value`` is the scalar, or what the key has.
-    """
-
-    steps: Steps
-    is_key: bool
-    span: Span
-    value: Node
-
-    @property
-    def text(self) -> str:
-        return self.value.text if isinstance(self.value, Scalar) else ""
-
-
-def find(node: Node, line: int, column: int, steps: Steps = ()) -> DocumentPlace | None:
-    """The key or scalar at a line and column, which count from 1; None beside all."""
-    if isinstance(node, Scalar):
-        return DocumentPlace(steps, False, node.span, node) if _covers(node.span, line, column) else None
-    if isinstance(node, Mapping):
-        for key, entry in node.entries.items():
-            if _covers(entry.key, line, column):
-                return DocumentPlace((*steps, key), True, entry.key, entry.value)
-        children: Iterable[tuple[str | int, Node]] = ((key, entry.value) for key, entry in node.entries.items())
-    else:
-        children = enumerate(node.items)
-    return next((found for step, child in children if (found := find(child, line, column, (*steps, step)))), None)
-
-
-def below(node: Node | None, *steps: str) -> Node | None:
-    """What is below the keys; None if one of them is missing."""
-    for step in steps:
-        node = node.get(step) if isinstance(node, Mapping) else None
-    return node
-
-
-def text_of(node: Node | None) -> str:
-    """A scalar's text; empty for anything else."""
-    return node.text if isinstance(node, Scalar) else ""
-
-
-def last(node: Node) -> Span:
-    """The span that ends last of a node and everything below it."""
-    return max((part.span for part in walk(node)), key=lambda span: (span.line, span.column + span.length))
-
-
-def _covers(span: Span, line: int, column: int) -> bool:
-    return span.line == line and span.column <= column <= span.column + span.length

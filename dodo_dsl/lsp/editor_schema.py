@@ -1,11 +1,10 @@
-"""What editors complete and explain: the schema of specs with services and parameters, and keys of schemas.
+"""What editors complete and explain: the schema of specs with services and parameters.
 
 Only `$defs.use.allOf` and the `$defs` named `with-...` are generated. DoDo validates without the former, because its
 rules give better messages. ``scripts/make-schema`` writes the file. What schemas say of keys is that of tests and of
 ``dodo.yml``.
 """
 
-import functools
 import json
 import re
 from collections.abc import Iterable, Mapping
@@ -14,11 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.lsp.documents import Steps
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Manifest, Parameter, in_words, load_manifests
-from dodo_dsl.spec.schema_errors import written_schema
 
 Schema = dict[str, Any]
 
@@ -161,48 +158,6 @@ def write(file: Path | None = None) -> None:
     """Generates the schema's file from the shipped services."""
     target = file or schema_path()
     atomic.write_text(target, generate(target.read_text(encoding="utf-8"), load_manifests()[0]))
-
-
-@functools.cache
-def _document(name: str) -> Schema:
-    return written_schema(name)
-
-
-def keys_at(name: str, steps: Steps) -> Schema | None:
-    """The part of a schema that describes what is below the keys; None for unknown ones."""
-    part: Schema | None = _document(name)
-    for step in steps:
-        if part is None:
-            return None
-        part = _below(_whole(name, part), step)
-    return _whole(name, part) if part is not None else None
-
-
-def _below(part: Schema, step: str | int) -> Schema | None:
-    if isinstance(step, int):
-        found = part.get("items")
-    else:
-        found = part.get("properties", {}).get(step, part.get("additionalProperties"))
-    return found if isinstance(found, dict) else None
-
-
-def _whole(name: str, part: Schema) -> Schema:
-    """A part with what it refers to."""
-    reference = part.get("$ref", "")
-    if not reference.startswith("#/$defs/"):
-        return part
-    target: Schema = _document(name)["$defs"][reference.removeprefix("#/$defs/")]
-    return {**target, **part}
-
-
-def schema_values(part: Schema) -> list[str]:
-    """The values that are allowed, or examples."""
-    if "const" in part:
-        return [str(part["const"])]
-    if part.get("type") == "boolean":
-        return ["true", "false"]
-    written: list[Any] = part.get("enum") or part.get("examples") or []
-    return [str(value) for value in written if not isinstance(value, list | dict)]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The tests around the open files: which belong together, what is wrong with them, and each document among them.
+"""The tests around the open files: which belong together, and what is wrong with them.
 
 What the editor shows counts in place of what the files hold. What a change cannot affect is not checked again.
 """
@@ -9,16 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl.check import check, forget_files
-from dodo_dsl.check.resolve import ResolvedTest, resolve
+from dodo_dsl.check.resolve import resolve
 from dodo_dsl.compiler import Checked, CheckInputs, Ruled, Sources, load, plan, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.lsp.documents import DocumentPlace, Lines, Steps, below, text_of
 from dodo_dsl.source import Node, Reader, parse_bytes, read
-from dodo_dsl.spec.arguments import ResolvedService
-from dodo_dsl.spec.deployment import FILE_NAME, Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.deployment import FILE_NAME, find_deployment, load_deployment
 from dodo_dsl.spec.load import Loaded, load_spec
-from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
-from dodo_dsl.spec.model import LAYERS, Spec
+from dodo_dsl.spec.manifest import load_manifests
+from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import SUFFIX, Location
 
 Parsed = tuple[Node | None, list[Diagnostic]]
@@ -188,55 +186,3 @@ def by_file(found: Iterable[Diagnostic]) -> Mapping[Path, list[Diagnostic]]:
     for diagnostic in found:
         grouped.setdefault(Path(diagnostic.span.file).resolve(), []).append(diagnostic)
     return grouped
-
-
-WITH, USES = "with", "uses"
-
-
-@dataclass(frozen=True)
-class DocumentContext:
-    """``root`` is the document as far as its text can be parsed; ``test`` is what the last check made of it."""
-
-    path: Path
-    lines: Lines
-    root: Node | None
-    manifests: Mapping[str, Manifest]
-    deployment: Deployment | None = None
-    test: ResolvedTest | None = None
-
-    @property
-    def schema(self) -> str:
-        return "deployment" if self.path.name == FILE_NAME else "dodo"
-
-    def service(self, layer: str, name: str) -> ResolvedService | None:
-        """A service of the test as it was resolved last."""
-        services = self.test.services if self.test else ()
-        return next((s for s in services if (s.use.layer, s.use.name) == (layer, name)), None)
-
-    def manifest(self, steps: Steps, uses: str = "") -> Manifest | None:
-        """The manifest of the service that a position belongs to, which an extended test may name."""
-        if len(steps) < 2 or steps[0] not in LAYERS or self.schema != "dodo":
-            return None
-        layer, name = str(steps[0]), str(steps[1])
-        written = uses or text_of(below(self.root, layer, name, USES))
-        if not written and (service := self.service(layer, name)):
-            return service.manifest
-        return self.manifests.get(written)
-
-    def parameter(self, place: DocumentPlace) -> Parameter | None:
-        """The parameter that a position belongs to."""
-        manifest = self.manifest(place.steps)
-        if manifest is None or len(place.steps) < 4 or place.steps[2] != WITH:
-            return None
-        return manifest.parameters.get(str(place.steps[3]))
-
-
-def scene(path: Path, lines: Lines, projects: Sequence[OpenProject]) -> DocumentContext:
-    """A document with what was found about its test when it was checked last."""
-    root, _ = parse_text(lines.text, path)
-    for project in projects:
-        checked = project.checked
-        test = next((test for test in checked.tests if test.spec.path == path), None)
-        if test or checked.deployment.file == path:
-            return DocumentContext(path, lines, root, checked.manifests, checked.deployment, test)
-    return DocumentContext(path, lines, root, load_manifests()[0])

@@ -1,25 +1,21 @@
-"""The language server: it listens to the editor, answers it, and shows what is wrong a moment after a change."""
+"""The language server: it listens to the editor, and shows what is wrong a moment after a change, and its fixes."""
 
 import asyncio
 import contextlib
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO
 
 from lsprotocol import types
 from lsprotocol.types import Diagnostic as ShownDiagnostic
-from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 
 from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.lsp.completion import TRIGGERS, completion
 from dodo_dsl.lsp.documents import Document, Lines, opened, path_of, saved_text, uri_of
-from dodo_dsl.lsp.edits import prepare, quick_fixes, rename
-from dodo_dsl.lsp.hover import hover
-from dodo_dsl.lsp.navigation import definition, outline
-from dodo_dsl.lsp.project import DocumentContext, OpenProject, Projects, by_file, is_ours, scene
+from dodo_dsl.lsp.edits import quick_fixes
+from dodo_dsl.lsp.project import OpenProject, Projects, by_file, is_ours
 from dodo_dsl.terminal import printable
 
 PAUSE_S = 0.05
@@ -46,13 +42,6 @@ class DodoServer(LanguageServer):
     def lines(self, text: str) -> Lines:
         return Lines(text, self.workspace.position_codec)
 
-    def scene(self, uri: str) -> DocumentContext | None:
-        """An open document of a test or deployment with what the last check found; None for any other."""
-        path = path_of(uri)
-        if path is None or not is_ours(path):
-            return None
-        return scene(path, self.lines(self.workspace.get_text_document(uri).source), self.projects)
-
     def quick_fixes(self, params: types.CodeActionParams) -> list[types.CodeAction]:
         """The fixes of the problems that the last check found in a document, of whatever kind its file is."""
         uri = params.text_document.uri
@@ -65,9 +54,7 @@ class DodoServer(LanguageServer):
         self.window_log_message(types.LogMessageParams(types.MessageType.Error, printable(message)))
 
     def report_server_error(self, error: Exception, source: Any) -> None:
-        """Errors are messages of the log and not of a window; what the editor's answer says needs none."""
-        if isinstance(error, JsonRpcInvalidParams):
-            return
+        """Errors are messages of the log and not of a window."""
         log.error("%s", error, exc_info=error)
         self.say(f"internal error: {error}")
 
@@ -141,7 +128,6 @@ def _shown(lines: Lines, diagnostic: Diagnostic) -> ShownDiagnostic:
 
 
 _WATCHED = "**/*.{yml,yaml,json,odvd,env}"
-_Answer = TypeVar("_Answer")
 
 
 def build() -> DodoServer:
@@ -184,49 +170,11 @@ def _changes(server: DodoServer) -> None:
 
 
 def _requests(server: DodoServer) -> None:
-    @server.feature(types.TEXT_DOCUMENT_HOVER)
-    def _hover(params: types.HoverParams) -> types.Hover | None:
-        return _answer(server, params, lambda scene: hover(scene, params.position))
-
-    @server.feature(types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=TRIGGERS))
-    def _completion(params: types.CompletionParams) -> types.CompletionList | None:
-        return _answer(server, params, lambda scene: completion(scene, params.position))
-
-    @server.feature(types.TEXT_DOCUMENT_DEFINITION)
-    def _definition(params: types.DefinitionParams) -> types.Location | None:
-        codec = server.workspace.position_codec
-        return _answer(server, params, lambda scene: definition(scene, params.position, codec))
-
-    @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
-    def _outline(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol] | None:
-        return _answer(server, params, outline)
-
-    @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
-    def _prepare_rename(params: types.PrepareRenameParams) -> types.Range | None:
-        return _answer(server, params, lambda scene: prepare(scene, params.position))
-
-    @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
-    def _rename(params: types.RenameParams) -> types.WorkspaceEdit | None:
-        return _answer(server, params, lambda scene: rename(scene, params.position, params.new_name))
-
     @server.feature(
         types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
     )
     def _code_action(params: types.CodeActionParams) -> list[types.CodeAction]:
         return server.quick_fixes(params)
-
-
-def _answer(server: DodoServer, params: Any, work: Callable[[DocumentContext], _Answer]) -> _Answer | None:
-    """The answer to a request about a document; None if it fails, which the log then says."""
-    try:
-        scene = server.scene(params.text_document.uri)
-        return work(scene) if scene else None
-    except JsonRpcInvalidParams:
-        raise  # a sentence for the user
-    except Exception as error:
-        log.exception("a request failed")
-        server.say(f"a request failed: {type(error).__name__}: {error}")
-        return None
 
 
 def _watch(server: DodoServer) -> None:

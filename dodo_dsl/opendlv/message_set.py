@@ -2,7 +2,7 @@
 
 import builtins
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -102,16 +102,16 @@ class MessageSet:
         return _standard()
 
     @classmethod
-    def load(cls, *paths: Path, standard: Sequence[Definition] = ()) -> "MessageSet":
+    def load(cls, *paths: Path, kept: Container[str] = ()) -> "MessageSet":
         """The standard messages and those of the files, which replace standard ones of the same name or id.
 
-        Other messages than those that DoDo knows by itself may be the standard. Raises OdvdError, also if two of
-        the files disagree or use DoDo's own ids.
+        Standard ones whose names are ``kept`` are not replaced; their ids may have two meanings. Raises OdvdError, also
+        if two of the files disagree or use what is DoDo's own.
         """
-        if not paths and not standard:
+        if not paths:
             return _standard()
-        own = _merged(definition for path in paths for definition in odvd.load(path))
-        return cls([*besides(own, standard or shipped()), *own])
+        own = [each for each in merged(paths) if each.name not in kept]
+        return cls([*besides(own, shipped(), kept), *own])
 
     def names(self) -> tuple[str, ...]:
         """All full names, sorted."""
@@ -173,10 +173,10 @@ class MessageSet:
         return f"there is no message '{key}'" + (f": did you mean '{close[0]}'?" if close else "")
 
 
-def besides(first: Iterable[Definition], others: Iterable[Definition]) -> list[Definition]:
-    """Those of the others whose name and id no message of the first has."""
+def besides(first: Iterable[Definition], others: Iterable[Definition], kept: Container[str] = ()) -> list[Definition]:
+    """Those of the others whose name and id no message of the first has, and those whose names are ``kept``."""
     taken = {key for definition in first for key in (definition.name, definition.id)}
-    return [definition for definition in others if taken.isdisjoint((definition.name, definition.id))]
+    return [each for each in others if each.name in kept or taken.isdisjoint((each.name, each.id))]
 
 
 @cache
@@ -190,11 +190,12 @@ def _standard() -> MessageSet:
     return MessageSet(shipped())
 
 
-def _merged(definitions: Iterable[Definition]) -> list[Definition]:
+def merged(paths: Iterable[Path]) -> list[Definition]:
+    """The messages of ODVD files, each once; raises OdvdError."""
     by_key: dict[str | int, Definition] = {}
-    for definition in definitions:
-        if definition.id in OWN_IDS:
-            raise OdvdError(f"{definition.place}: ids 2900 to 2999 are DoDo's own")
+    for definition in (definition for path in paths for definition in odvd.load(path)):
+        if definition.id in OWN_IDS or definition.name.startswith("dodo."):
+            raise OdvdError(f"{definition.place}: ids 2900 to 2999 and names that begin with 'dodo.' are DoDo's own")
         for key in (definition.name, definition.id):
             earlier = by_key.setdefault(key, definition)
             if not earlier.same_layout(definition):

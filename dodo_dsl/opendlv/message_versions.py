@@ -6,7 +6,7 @@ from pathlib import Path
 from dodo_dsl.opendlv import message_columns, odvd
 from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
-from dodo_dsl.opendlv.message_set import MessageSet, besides, shipped
+from dodo_dsl.opendlv.message_set import MessageSet, besides, merged, shipped
 from dodo_dsl.opendlv.odvd import STANDARD_0_9, Definition
 from dodo_dsl.opendlv.recording import Recording
 
@@ -20,9 +20,12 @@ _LOOKS = 500  # messages of each id that are looked at
 def load(version: str, *own: Path) -> MessageSet:
     """The messages of set 0.9 or 1.0 and those of the files, which replace them; raises OdvdError.
 
-    Either set also has what only the other has, as far as names and ids are free.
+    Either set also has what only the other has, as far as names and ids are free. A file's copy of what is in one of
+    them replaces nothing.
     """
-    return MessageSet.load(*own, standard=_standard(version)) if own else _set(version)
+    known = [*odvd.load(STANDARD_0_9), *shipped()] if own else []
+    theirs = [each for each in merged(own) if not any(map(each.same_layout, known))]
+    return MessageSet([*besides(theirs, _standard(version)), *theirs]) if theirs else _set(version)
 
 
 def version_of(recording: Recording) -> str:
@@ -51,7 +54,7 @@ def _fitting(recording: Recording, messages: MessageSet, id_: int, rows: Numbers
 
 @cache
 def _set(version: str) -> MessageSet:
-    return MessageSet.load(standard=_standard(version))
+    return MessageSet(_standard(version))
 
 
 @cache

@@ -145,8 +145,33 @@ class Definition:
         """Whether both describe the same name, id and fields, wherever they are defined."""
         return self._layout() == other._layout()
 
+    def fits(self, standard: "Definition") -> bool:
+        """Whether programs that know only one of both understand each other: this may have more fields.
+
+        An only field may have another name.
+        """
+        fields = {each.number: each for each in self.fields}
+        is_only = len(self.fields) == len(standard.fields) == 1
+        return self.id == standard.id and all(
+            (mine := fields.get(each.number)) is not None
+            and (is_only or mine.name == each.name)
+            and _form(mine.type) == _form(each.type)
+            for each in standard.fields
+        )
+
+    def __str__(self) -> str:
+        fields = "".join(f"{each.type} {each.name} [id = {each.number}]; " for each in self.fields)
+        return f"{self.name} [id = {self.id}] {{ {fields}}}"
+
     def _layout(self) -> tuple[object, ...]:
         return (self.name, self.id, [(f.name, f.type, f.number, f.default) for f in self.fields])
+
+
+def _form(type_: str) -> str:
+    """What protobuf writes alike has the same form."""
+    if type_ in INTEGER_BITS:
+        return "int" if type_.startswith("int") else "uint"
+    return {"bool": "uint", "string": "bytes"}.get(type_, type_)
 
 
 def load(path: Path) -> tuple[Definition, ...]:

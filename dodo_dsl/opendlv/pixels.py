@@ -30,14 +30,6 @@ def size(format_: str, width: int, height: int) -> int:
     return width * height * HALF_BYTES[format_] // 2
 
 
-def format_of(name: str, memory_size: int, width: int, height: int) -> str:
-    """The format of a memory by its size (names lie: some ``.argb`` have 3 bytes a pixel); raises PixelError."""
-    for format_, half_bytes in HALF_BYTES.items():
-        if 0 < memory_size == width * height * half_bytes // 2:
-            return "rgb" if format_ == "bgr" and name.endswith(".rgb") else format_
-    raise PixelError(f"memory '{name}' has {memory_size} bytes, not an image of {width} x {height} pixels")
-
-
 def view(data: Any, format_: str, width: int, height: int) -> Picture:
     """The bytes of a memory as an array, without a copy; raises PixelError if there are too few.
 

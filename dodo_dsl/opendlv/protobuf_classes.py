@@ -100,17 +100,18 @@ class _Builder:
         file.dependency.extend(sorted({layout.definition.name for layout in inner.values()}))
         message = file.message_type.add(name=short_name)
         for field in definition.fields:
+            if hasattr(Message, field.name):
+                raise OdvdError(f"{field.place}: the name '{field.name}' is protobuf's own, expected another")
             message.field.append(_field(field, inner))
         try:
             self._pool.AddSerializedFile(file.SerializeToString())
             return message_factory.GetMessageClass(self._pool.FindMessageTypeByName(definition.name))
-        except (TypeError, KeyError):
-            clash = f"the name '{definition.name}' or the name of a field in it clashes with another"
-            raise OdvdError(f"{definition.place}: {clash}") from None
+        except (TypeError, KeyError) as error:
+            raise OdvdError(f"{definition.place}: protobuf cannot hold '{definition.name}': {error}") from None
 
 
 def _field(field: Field, inner: Mapping[str, Layout]) -> "descriptor_pb2.FieldDescriptorProto":
-    proto = _Proto(name=field.name, number=field.number, label=_Proto.LABEL_OPTIONAL)
+    proto = _Proto(name=field.name, json_name=field.name, number=field.number, label=_Proto.LABEL_OPTIONAL)
     if field.name in inner:
         proto.type, proto.type_name = _Proto.TYPE_MESSAGE, "." + inner[field.name].definition.name
         return proto

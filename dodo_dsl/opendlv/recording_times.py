@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
-from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.message_set import OWN_IDS, MessageSet
 from dodo_dsl.opendlv.recording import Recording
 
 DAY = 86_400_000_000
@@ -34,6 +34,28 @@ def within(recording: Recording, rows: Numbers) -> Numbers:
     times: Numbers = recording.index["time"][rows]
     others = times[~np.isin(recording.index["data_type"][rows], list(TOOLS))]
     return np.clip(times, others.min(), others.max()) if len(others) else times
+
+
+def played(
+    recording: Recording, start: float, end: float | None, max_gap: int, timemod: float
+) -> tuple[Numbers, Numbers, Numbers]:
+    """The rows that a player plays from ``start`` to ``end`` (s since the first message), in its order.
+
+    With them are their times, and when they are due, in us, with gaps of ``max_gap`` us at most. A message without a
+    sample time has its place by when it was received, or else sent. Gaps are those between neighbours, whatever of
+    them is chosen; then all goes ``timemod`` times faster. DoDo's messages are left out.
+    """
+    index, second = recording.index, 1_000_000
+    begin = int(index["time"][index["time"] > 0].min(initial=1 << 62))
+    # the whole recording includes messages without a time, a part does not
+    part = (begin + round(start * second) if start else None, None if end is None else begin + round(end * second))
+    rows = recording.rows(start=part[0], end=part[1])
+    rows = rows[~np.isin(index["data_type"][rows], list(OWN_IDS))]
+    times = within(recording, rows)
+    order = np.argsort(times, kind="stable")
+    rows, times = rows[order], times[order]
+    gaps = np.minimum(np.diff(times, prepend=times[:1]), max_gap)
+    return rows, times, np.rint(np.cumsum(gaps) / timemod).astype(np.int64)
 
 
 def fault(recording: Recording, rows: Numbers, in_order: bool = True) -> str:

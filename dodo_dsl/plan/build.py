@@ -30,7 +30,7 @@ from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import VIRTUAL
-from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT
+from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.values import Value, default_value
 
@@ -256,13 +256,14 @@ class _Builder:
             seed=spec.seed,
             cid=self.cid,
             subnet=self._subnet(services) if isolated == "network" else "",
-            tag=rig.tag if rig else "sil",
+            tag=rig.tag if rig else SIMULATION_TAG,
             sandbox_image=self._image("sandbox"),
             services=services,
             application=self.shared.rewritten(setting),
             lockstep=lockstep(spec, self.application.declared, self.shared.settings.wall_timeout_s),
             resources=spec.resources,
             rig=rig.name if rig else "",
+            emulated=rig is not None and rig.is_emulated,
             more_tags=rig.more_tags if rig else (),
             pool=self._pooled() if spec.pool else None,
             messages=messages,
@@ -379,9 +380,10 @@ class _Builder:
 
     def _file_flag(self, parameter: Parameter, value: Value, span: Span) -> Flag:
         path = value.path or Path()
+        needed = path.parent if parameter.format == "map" and path.suffix == ".json" else path  # meshes stand beside it
         root = self.spec.location.root.resolve()
         try:
-            found = self.shared.tree(path, root)
+            found = self.shared.tree(needed, root)
         except FilesError as error:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         else:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from dodo_dsl.application.access.model import Access
 from dodo_dsl.spec import model as spec_model
 from dodo_dsl.spec.model import Goal, RecordedValue, ResourceLimits
+from dodo_dsl.spec.rig import EMULATED_RIGS, KIND_TAGS
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _DEVICE = re.compile(r"/dev(/[A-Za-z0-9_:.-]*[A-Za-z0-9_:-][A-Za-z0-9_:.-]*)+")
@@ -69,6 +70,7 @@ class ApplicationService:
 
     ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``. ``after`` are
     the services for which it waits, each with its condition; without the ``optional`` ones of them it starts, too.
+    ``raw_files`` are those of ``env_files`` whose values are as they are written.
     """
 
     name: str
@@ -78,6 +80,7 @@ class ApplicationService:
     takes_cid: bool = False
     takes_memory: bool = False
     env_files: tuple[str, ...] = ()
+    raw_files: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     after: dict[str, str] = field(default_factory=dict)
@@ -143,9 +146,9 @@ class Pooled:
 class Plan:
     """One instance of a test. Times in seconds, ``subnet`` an IPv4 network or empty under host isolation.
 
-    ``lockstep`` is None in real time, ``rig`` empty below level hil; ``more_tags`` are its runner's besides
-    ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the deployment,
-    relative to ``files/``; ``senders`` has the only senders of a message, as ``opendlv.sim.Frame/0=pose``.
+    ``lockstep`` is None in real time, ``rig`` empty below level hil, ``emulated`` says whether it is; ``more_tags`` are
+    its runner's besides ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the
+    deployment, relative to ``files/``; ``senders`` has the only senders of a message, as ``opendlv.sim.Frame/0=pose``.
     ``goals`` score a passed test and never change its outcome; checks must not be worse than those of the ``baseline``.
     ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
@@ -188,6 +191,17 @@ class Plan:
     shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)
     timed: tuple[str, ...] = ()
+    emulated: bool = False
+
+    @property
+    def is_real(self) -> bool:
+        """Whether a test runs on hardware, which has its own CID."""
+        return bool(self.rig) and not self.emulated and self.rig not in EMULATED_RIGS
+
+    @property
+    def lacks_rig(self) -> bool:
+        """Whether the deployment has no rig of its kind, and does not say that such a rig is emulated."""
+        return self.emulated and KIND_TAGS.get(self.rig) == self.tag
 
     @property
     def variables(self) -> dict[str, str]:

@@ -2,12 +2,13 @@
 
 A detection is a DetectionBoundingBox; its class is the DetectionProperty (without ``color:``) or else the DetectionType
 of the same sender, sample time and detection. It belongs to the frame of the same sample time. If nothing moves, the
-labels of all frames may be those of a truth file.
+labels of all frames may be those of a truth file. A class has the same number in every data set: by its name alone.
 Reference: cocodataset.org, "Data format", object detection.
 """
 
 import json
 import math
+import zlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -28,6 +29,10 @@ ANNOTATIONS = "annotations.json"
 PICTURES = "images"
 _PREFIX = "opendlv.logic.perception.Detection"
 _KINDS = ("BoundingBox", "Property", "Type")
+_SLACK = 1e-6
+"""Part of a frame by which rounded fractions may reach over its edge."""
+_CLASSES = ("blue", "yellow", "red", "orange", "car", "object")
+"""Classes with the numbers from 1; others have the CRC-32 of their names, without its uppermost bit."""
 
 
 class DetectionKey(NamedTuple):
@@ -59,11 +64,21 @@ class DataSet:
     images: list[dict[str, Any]] = field(default_factory=list)
     boxes: list[tuple[int, str, list[float]]] = field(default_factory=list)
     lost: int = 0
+    cut: int = 0
+    empty: int = 0
+    """How many boxes reached over an edge of their frames, and how many had no area in them."""
 
-    def text(self) -> str:
-        """The content of annotations.json."""
-        names = sorted({name for _, name, _ in self.boxes})
-        numbers = {name: number for number, name in enumerate(names, 1)}
+    @property
+    def classes(self) -> set[str]:
+        """Those of all boxes."""
+        return {name for _, name, _ in self.boxes}
+
+    def text(self, others: Iterable[str] = ()) -> str:
+        """The content of annotations.json, with the classes of ``others``, too; raises LabelError."""
+        numbers = {name: class_number(name) for name in self.classes.union(others)}
+        by_number = {number: name for name, number in numbers.items()}
+        if one := next((name for name, number in numbers.items() if by_number[number] != name), ""):
+            raise LabelError(f"the classes '{one}' and '{by_number[numbers[one]]}' have the same number: rename one")
         annotations = [
             {
                 "id": number,
@@ -75,13 +90,18 @@ class DataSet:
             }
             for number, (image, name, box) in enumerate(self.boxes, 1)
         ]
-        categories = [{"id": number, "name": name, "supercategory": ""} for name, number in numbers.items()]
+        categories = [{"id": number, "name": name, "supercategory": ""} for name, number in sorted(numbers.items())]
         content = {"images": self.images, "annotations": annotations, "categories": categories}
         return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
+def class_number(name: str) -> int:
+    """The number of a class in every data set."""
+    return _CLASSES.index(name) + 1 if name in _CLASSES else zlib.crc32(name.encode()) & 0x7FFFFFFF
+
+
 class LabelError(ValueError):
-    """Missing labels; one sentence."""
+    """Labels that are missing or cannot be written; one sentence."""
 
 
 def detections(
@@ -127,24 +147,27 @@ class CocoExport:
         (self.folder / PICTURES).mkdir(parents=True, exist_ok=True)
         for done, (packet, frame) in enumerate(decoded(recording, images, self.problem), 1):
             wanted = labels.get(packet.sample_time, ())
+            boxes = [] if frame is None else _boxes(self.result, frame, wanted)
             if frame is None:
                 self.result.lost += 1
-            elif wanted or self.everything:
+            elif boxes or self.everything:
                 parts = [*([name] if name else []), packet.sender_stamp, packet.sample_time]
                 path = f"{PICTURES}/{'-'.join(map(str, parts))}.{self.picture_type}"
                 write_picture(self.folder / path, frame)
-                _add(self.result, packet, frame, path, wanted)
+                _add(self.result, packet, frame, path, boxes)
                 if name:
                     self.result.images[-1]["recording"] = str(recording.path)
             self.progress(done)
 
-    def finish(self) -> None:
-        """Writes annotations.json; raises OSError."""
-        (self.folder / ANNOTATIONS).write_text(self.result.text(), encoding="utf-8")
+    def finish(self, classes: Iterable[str] = ()) -> None:
+        """Writes annotations.json, with these ``classes``, too; raises LabelError and OSError."""
+        (self.folder / ANNOTATIONS).write_text(self.result.text(classes), encoding="utf-8")
 
     def write(self, recording: Recording, images: Numbers, labels: Mapping[int, list[Detection]]) -> DataSet:
         """Writes frames and annotations.json; raises LabelError if not one frame is wanted, and OSError."""
         self.add(recording, images, labels)
+        if not self.result.images and self.result.empty:
+            raise LabelError(f"no detection of {recording.path} has a box with an area in its frame")
         if not self.result.images:
             raise LabelError(f"no frame of {recording.path} could be decoded at the sample time of a detection")
         self.finish()
@@ -161,22 +184,33 @@ def _take(detection: Detection, kind: str, message: Any) -> None:
         detection.type = message.type
 
 
-def _add(result: DataSet, packet: Packet, frame: DecodedFrame, name: str, wanted: Iterable[Detection]) -> None:
+LabelledBox = tuple[str, list[float]]
+"""A class, and x, y, width and height in pixels."""
+
+
+def _boxes(result: DataSet, frame: DecodedFrame, wanted: Iterable[Detection]) -> list[LabelledBox]:
+    """What of the detections' boxes is in their frame, if that has an area."""
+    found = []
+    for detection in wanted:
+        x, y, width, height = detection.box or (0.0, 0.0, 0.0, 0.0)
+        ends = (x, frame.width), (y, frame.height), (x + width, frame.width), (y + height, frame.height)
+        left, top, right, low = (round(min(max(end, 0.0), 1.0) * side, 3) for end, side in ends)
+        if width <= 0 or height <= 0 or left >= right or top >= low:
+            result.empty += 1
+            continue
+        result.cut += min(x, y) < -_SLACK or max(x + width, y + height) > 1 + _SLACK
+        found.append((detection.category, [left, top, round(right - left, 3), round(low - top, 3)]))
+    return found
+
+
+def _add(result: DataSet, packet: Packet, frame: DecodedFrame, name: str, boxes: Iterable[LabelledBox]) -> None:
     number = len(result.images) + 1
     size = {"width": frame.width, "height": frame.height}
     result.images.append({"id": number, "file_name": name, **size, "sample_time": packet.sample_time})
-    for detection in wanted:
-        x, y, width, height = detection.box or (0.0, 0.0, 0.0, 0.0)
-        box = [x * frame.width, y * frame.height, width * frame.width, height * frame.height]
-        result.boxes.append((number, detection.category, [round(value, 3) for value in box]))
+    result.boxes += [(number, label, box) for label, box in boxes]
 
 
 def of_truth(recording: Recording, images: Numbers, path: Path) -> Mapping[int, list[Detection]]:
     """The boxes of a truth file for each image message, as of a rig if nothing moves; raises TruthError."""
-    (width, height), marks = truth.load(path)
-    truth.check(marks, width, height, ())
-    if not marks:
-        raise truth.TruthError(f"{path}: has no boxes")
-    boxes = [(m.label, (m.x / width, m.y / height, m.width / width, m.height / height)) for m in marks]
-    found = [Detection(box, label) for label, box in boxes]
+    found = [Detection(box, label) for label, box in truth.boxes(path)]
     return dict.fromkeys((e.sample_time for e in recording.envelopes(images)), found)

@@ -25,6 +25,7 @@ from mcap_protobuf.schema import register_schema
 
 from dodo_dsl import __version__
 from dodo_dsl.opendlv import message_versions
+from dodo_dsl.opendlv.attitude import quaternion
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
@@ -68,17 +69,8 @@ def _pose(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
 
 def _pose_of_angles(message: Any, stamp: int, time: int) -> tuple[str, Message] | None:
     """Set 0.9 has roll, pitch and yaw in rad, turned about x, y and z in this order."""
-    angles = message.roll / 2, message.pitch / 2, message.yaw / 2
-    if not all(map(math.isfinite, angles)):
-        return None
-    (cr, cp, cy), (sr, sp, sy) = map(math.cos, angles), map(math.sin, angles)
-    rotation = (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
-    return _transform(message, rotation, stamp, time)
+    angles = message.roll, message.pitch, message.yaw
+    return _transform(message, quaternion(*angles), stamp, time) if all(map(math.isfinite, angles)) else None
 
 
 def _transform(message: Any, rotation: tuple[float, ...], stamp: int, time: int) -> tuple[str, Message] | None:

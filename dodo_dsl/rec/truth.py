@@ -4,22 +4,21 @@ Reference: cocodataset.org, "Data format", object detection; boxes are in pixels
 On disk a truth is the COCO file, its frame, and the same frame with the boxes drawn.
 """
 
-import json
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import numbers, regular_file
+from dodo_dsl.opendlv.assets import truth_file
 from dodo_dsl.opendlv.picture_size import problem_of
 
 if TYPE_CHECKING:
     from dodo_dsl.opendlv.pixels import Picture
 
 
-MOST_BYTES, MOST_BOXES, MOST_PIXELS = 16_000_000, 10_000, 100_000
 _SLACK = 0.01
 """px by which a rounded box may reach over the frame's edge."""
 _LEAST_SHOWN = 1000
@@ -72,23 +71,22 @@ def check(marks: Sequence[Mark], width: int, height: int, classes: Collection[st
 
 def read(path: Path, width: int, height: int) -> list[Mark]:
     """The boxes of a COCO file of one frame of this size; raises TruthError."""
-    size, marks = load(path)
+    fractions = boxes(path)
+    size = truth_file.size(path)
     if size != (width, height):
         has = f"a frame of {size[0]} x {size[1]} pixels"
         raise TruthError(f"{path}: has boxes of {has}, expected one of {width} x {height} pixels")
-    return marks
+    sides = (width, height, width, height)
+    return [Mark(name, *(round(f * s, 6) for f, s in zip(box, sides, strict=True))) for name, box in fractions]
 
 
-def load(path: Path) -> tuple[tuple[int, int], list[Mark]]:
-    """Width and height of the one frame of a COCO file, and its boxes; raises TruthError."""
-    document = _document(path)
-    images = _entries(document, "images", path)
-    if len(images) != 1:
-        raise TruthError(f"{path}: has {len(images)} images, expected one")
-    width, height = (_side(images[0].get(name), name, path) for name in ("width", "height"))
-    names = {_key(entry.get("id")): entry.get("name") for entry in _entries(document, "categories", path)}
-    boxes = enumerate(_entries(document, "annotations", path))
-    return (width, height), [_read_one(entry, names, f"{path}: annotations[{index}]") for index, entry in boxes]
+def boxes(path: Path) -> list[tuple[str, truth_file.Area]]:
+    """The classes and boxes of a COCO file of one frame, as fractions of it; raises TruthError."""
+    try:
+        (found,) = truth_file.read(path, "one").values()
+    except truth_file.TruthFileError as error:
+        raise TruthError(str(error)) from None
+    return found
 
 
 def truth_text(marks: Sequence[Mark], picture: str, width: int, height: int) -> str:
@@ -118,44 +116,6 @@ def drawn_boxes(picture: "Picture", marks: Sequence[Mark]) -> "Picture":
 
 _COLOURS = ((255, 80, 255), (255, 255, 60), (80, 255, 120), (255, 255, 255), (60, 160, 255))
 """B, G, R; none is the colour of a cone."""
-
-
-def _document(path: Path) -> Any:
-    try:
-        document = json.loads(regular_file.text(path, MOST_BYTES))
-    except (OSError, ValueError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise TruthError(f"{path}: cannot be read as COCO JSON: {reason}") from None
-    if document is None:
-        raise TruthError(f"{path}: is empty")
-    return document
-
-
-def _entries(document: Any, name: str, path: Path) -> list[dict[str, Any]]:
-    entries = document.get(name) if isinstance(document, dict) else None
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise TruthError(f"{path}: expected an object with a list of objects '{name}'")
-    if len(entries) > MOST_BOXES:
-        raise TruthError(f"{path}: has {len(entries)} {name}, expected at most {MOST_BOXES}")
-    return entries
-
-
-def _side(pixels: Any, name: str, path: Path) -> int:
-    if not isinstance(pixels, int) or not 0 < pixels <= MOST_PIXELS:
-        raise TruthError(f"{path}: images[0].{name}: expected a whole number of pixels above 0")
-    return pixels
-
-
-def _read_one(entry: dict[str, Any], names: dict[str, Any], place: str) -> Mark:
-    label, numbers = names.get(_key(entry.get("category_id"))), entry.get("bbox")
-    if not isinstance(label, str):
-        raise TruthError(f"{place}.category_id: there is no class of this id")
-    return mark(label, numbers if isinstance(numbers, list) else (), place)
-
-
-def _key(number: Any) -> str:
-    """Any JSON value of an id as a key for lookups."""
-    return json.dumps(number)
 
 
 MOST_FILE_BYTES = 64_000_000

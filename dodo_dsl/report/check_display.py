@@ -44,7 +44,7 @@ MEANINGS = {
     "share": "share of the time within the band around the target",
     "sign-share": "share of the frames whose sample has the sign of the target",
     "silence": "longest time between two requests of the application",
-    "std": "standard deviation of the distance from the target, divided by the number of samples",
+    "std": "population standard deviation of the distance from the target",
     "std-over-time": "the same deviation, each sample weighted by the time that it holds",
     "time-to-cover": "test time until enough of the area was covered",
     "time-to-goal": "test time until the vehicle reached the goal",
@@ -84,7 +84,7 @@ def meaning(check: Check, others: Collection[str] = ()) -> str:
         return f"{found}; the limit is the recorded value with its tolerance" if found else ""
     if name == "distance" and "mean" in others:
         return _FROM_TARGET
-    if "delay" in others and name in _OF_RESPONDS:
+    if name in _OF_RESPONDS and "delay" in others:
         return _OF_RESPONDS[name]
     prefixed = (words for prefix, words in _PREFIXES.items() if name.startswith(f"{prefix}-"))
     return MEANINGS.get(name) or next(prefixed, "")

@@ -4,7 +4,7 @@ Source: https://docs.gitlab.com/api/jobs/ and https://docs.gitlab.com/api/job_ar
 """
 
 import json
-import shutil
+import lzma
 import stat
 import urllib.error
 import urllib.request
@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from dodo_dsl.report.join import MOST_BYTES
+from dodo_dsl.report.results import FILE_NAME, GivenReport, ResultsError, read_given
 
 VARIABLE = "DODO_API_TOKEN"
 """The variable with a token of scope ``read_api``; without it the job's own is used."""
@@ -23,8 +24,12 @@ FOLDER = "dodo-report"
 """Of a job's report among its artifacts."""
 _NEEDED = ("CI_API_V4_URL", "CI_PROJECT_ID", "CI_PIPELINE_ID")
 _PATIENCE_S = 60.0
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError)
-"""Raised by zipfile for damage, and the last for what is encrypted or compressed in a way that it does not know."""
+_UNREADABLE = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, RuntimeError, ValueError, LookupError, OSError
+)  # fmt: skip
+"""Raised by zipfile for damage, what is encrypted or compressed in ways that it does not know, and impossible names."""
+_SHOWN_NAME = 60
+_PART = 1 << 20
 _MOST_JSON = 16 << 20
 _MOST_PAGES = 100
 
@@ -78,64 +83,69 @@ def of_job(environment: Mapping[str, str]) -> ParentPipeline:
     return ParentPipeline(f"{api}/projects/{project}", number, header)
 
 
-def fetch(pipeline: ParentPipeline, folder: Path) -> Iterator[tuple[str, Path | None]]:
-    """The jobs of all child pipelines by name, each with its report in ``folder``, or None; raises NoChildJobs."""
+def fetch(pipeline: ParentPipeline, folder: Path) -> tuple[list[GivenReport], list[str]]:
+    """The reports of the jobs of all child pipelines, kept in ``folder``, and sentences on those without a whole one.
+
+    Raises NoChildJobs where GitLab does not list them.
+    """
+    reports, sentences = list[GivenReport](), list[str]()
     try:
         children = [each.get("downstream_pipeline") for each in pipeline.json(f"pipelines/{pipeline.number}/bridges")]
         jobs = [job for child in children if child for job in pipeline.json(f"pipelines/{int(child['id'])}/jobs")]
         for job in sorted(jobs, key=lambda each: int(each["id"])):
             name, number = str(job["name"]), int(job["id"])
-            if job.get("artifacts_file"):
-                yield name, _fetched(pipeline, number, folder / str(number))
-            elif job.get("status") != "success":
-                yield name, None
+            place = folder / str(number)
+            try:
+                if job.get("artifacts_file"):
+                    _fetch(pipeline, number, place)
+                if (place / FOLDER).is_dir():
+                    reports.append(read_given(place / FOLDER))
+                elif job.get("artifacts_file") or job.get("status") != "success":
+                    sentences.append(f"job '{name}' has no report")
+            except (NoChildJobs, ResultsError) as problem:
+                sentences.append(f"job '{name}' is left out: {str(problem).replace(f'{place}/', '')}")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise error if isinstance(error, NoChildJobs) else NoChildJobs("GitLab's answer lists no jobs") from error
+    return reports, sentences
 
 
-def _fetched(pipeline: ParentPipeline, number: int, folder: Path) -> Path | None:
+def _fetch(pipeline: ParentPipeline, number: int, folder: Path) -> None:
+    """Writes the report among a job's artifacts; raises NoChildJobs."""
     folder.mkdir()
     archive = folder / "artifacts.zip"
-    with pipeline.opened(f"jobs/{number}/artifacts") as response, archive.open("xb") as file:
-        _copy(response, file, MOST_BYTES)
     try:
+        with pipeline.opened(f"jobs/{number}/artifacts") as response, archive.open("xb") as file:
+            _copy(response, file, MOST_BYTES)
         with zipfile.ZipFile(archive) as opened:
             _extract(opened, folder)
+    except NoChildJobs:
+        raise
     except _UNREADABLE as error:
-        raise NoChildJobs(f"the artifacts of job {number} cannot be read: {error}") from None
-    archive.unlink()
-    return folder / FOLDER if (folder / FOLDER).is_dir() else None
+        said = f"its artifacts, job {number}, cannot be read ({str(error) or type(error).__name__})"
+        raise NoChildJobs(f"{said}, expected a zip archive with {FOLDER}/{FILE_NAME}") from None
+    finally:
+        archive.unlink(missing_ok=True)
 
 
 def _extract(archive: zipfile.ZipFile, folder: Path) -> None:
-    """The regular files of the report, by names that stay inside."""
+    """The regular files of the report; names that would not stay inside are refused."""
     left = MOST_BYTES
     for entry in archive.infolist():
         path = PurePosixPath(entry.filename)
         mode = entry.external_attr >> 16
-        is_file = not entry.is_dir() and (stat.S_ISREG(mode) or not stat.S_IFMT(mode))
-        if not is_file or path.parts[:1] != (FOLDER,) or ".." in path.parts:
-            continue
-        target = folder / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with archive.open(entry) as content, target.open("xb") as file:
-            left -= _copy(content, file, left)
+        if path.is_absolute() or ".." in path.parts:
+            raise ValueError(f"'{entry.filename[:_SHOWN_NAME]}' lies outside")
+        if path.parts[:1] == (FOLDER,) and not entry.is_dir() and (stat.S_ISREG(mode) or not stat.S_IFMT(mode)):
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(entry) as content, target.open("xb") as file:
+                left -= _copy(content, file, left)
 
 
 def _copy(source: IO[bytes], target: IO[bytes], most: int) -> int:
-    shutil.copyfileobj(_Limited(source, most), target)
-    return target.tell()
-
-
-class _Limited:
-    """A stream of at most ``left`` bytes; raises NoChildJobs beyond them."""
-
-    def __init__(self, stream: IO[bytes], left: int) -> None:
-        self._stream, self._left = stream, left
-
-    def read(self, size: int = -1) -> bytes:
-        data = self._stream.read(size)
-        self._left -= len(data)
-        if self._left < 0:
+    """Copies at most so many bytes, and returns how many; raises NoChildJobs beyond them."""
+    while data := source.read(_PART):
+        if target.tell() + len(data) > most:
             raise NoChildJobs("the artifacts are larger than a report may be")
-        return data
+        target.write(data)
+    return target.tell()

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import Outcome, differs_each_run, with_margin
+from dodo_dsl.outcome import Outcome, differs_each_run, numbered, with_margin
 from dodo_dsl.report.results import GivenReport
 from dodo_dsl.terminal import printable
 
@@ -32,8 +32,8 @@ Check = Mapping[str, Any]
 
 def only_follows(check: Check, checks: Sequence[Check]) -> bool:
     """Whether a check of a test is not met only as another one ended the drive."""
-    ended = any(not other["ok"] and other["name"] in _ENDING for other in checks)
-    return ended and not check["ok"] and check["name"] in _OF_THE_WAY
+    may_follow = not check["ok"] and check["name"] in _OF_THE_WAY
+    return may_follow and any(not other["ok"] and other["name"] in _ENDING for other in checks)
 
 
 def is_exclusive(check: Check) -> bool:
@@ -69,6 +69,8 @@ NEGLIGIBLE = 0.01
 
 Direction = Literal["worse", "better", "different", "unchanged"]
 """``different`` is a change of a value that has no limit, or whose limits say nothing of the direction."""
+DIRECTIONS: tuple[Direction, ...] = ("worse", "better", "different")
+"""Of changes that are shown."""
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,9 @@ class TestChange:
     new_checks: Sequence[str] = ()
     gone_checks: Sequence[str] = ()
 
+    def by_index(self) -> dict[int, CheckChange]:
+        return {check.index: check for check in self.checks}
+
     @property
     def latest(self) -> Outcome:
         found = self.after or self.before
@@ -255,7 +260,7 @@ def compare(outcomes: Sequence[Outcome], other: GivenReport) -> Comparison:
 def _change(before: Outcome | None, after: Outcome | None) -> TestChange:
     if before is None or after is None:
         return TestChange("new" if before is None else "gone", before, after)
-    was, now = _numbered(before.checks), _numbered(after.checks)
+    was, now = numbered(before.checks), numbered(after.checks)
     return TestChange(
         _kind(before.outcome == "passed", after.outcome == "passed"),
         before,
@@ -270,18 +275,6 @@ def _kind(was_passed: bool, is_passed: bool) -> Kind:
     if was_passed:
         return "still passing" if is_passed else "newly failing"
     return "fixed" if is_passed else "still failing"
-
-
-def _numbered(checks: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], Mapping[str, Any]]:
-    """By name, and how many of that name came before it, as several evaluators may have one."""
-    return dict(_keys(checks))
-
-
-def _keys(checks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[tuple[str, int], Mapping[str, Any]]]:
-    counts: Counter[str] = Counter()
-    for check in checks:
-        yield (check["name"], counts[check["name"]]), check
-        counts[check["name"]] += 1
 
 
 def value_text(number: float | None, unit: str) -> str:
@@ -317,8 +310,6 @@ _MARK = "<!-- written by dodo report -->"
 _MOST_TEXT = 300
 _SECTION = 3
 """Lines of a section without its items: a blank one, the title, and how many more there are."""
-_TESTS: tuple[Kind, ...] = ("newly failing", "still failing", "new", "gone", "fixed")
-_CHECKS: tuple[Direction, ...] = ("worse", "better", "different")
 
 
 def to_markdown(comparison: Comparison, matrices: Sequence[str] = ()) -> str:
@@ -326,9 +317,9 @@ def to_markdown(comparison: Comparison, matrices: Sequence[str] = ()) -> str:
 
     ``matrices`` says how the instances of each did.
     """
-    sections = [(kind.capitalize(), [_test(test) for test in comparison.of(kind)]) for kind in _TESTS]
+    sections = [(kind.capitalize(), [_test(test) for test in comparison.of(kind)]) for kind in KINDS[:-1]]
     sections.append(("Matrices", [code(line) for line in matrices]))
-    for direction in _CHECKS:
+    for direction in DIRECTIONS:
         items = [_check(test, change_words(check), check.name) for test, check in comparison.checks(direction)]
         sections.append((f"Checks: {direction}", items))
     sections = [(title, items) for title, items in sections if items]
@@ -391,21 +382,18 @@ def _check(test: TestChange, change: str, name: str) -> str:
     return f"{code(test.latest.name)} {code(name)}: {code(change)}"
 
 
-_SHOWN: tuple[Direction, ...] = ("worse", "better", "different")
-
-
 def change_lines(comparison: Comparison) -> Iterator[str]:
     """A line a test that does not pass as before, one a check whose value changed, and counts of the rest."""
     yield f"compared with {printable(comparison.other)}: {comparison.in_words()}"
-    for kind in KINDS:
-        for test in comparison.of(kind) if kind != "still passing" else ():
+    for kind in KINDS[:-1]:
+        for test in comparison.of(kind):
             outcome = test.latest
             reason = printable(outcome.reason)
             yield f"  {kind.upper():13}  {printable(outcome.name)}  {outcomes(test)}  {reason}"
     for test in comparison.tests:
         for what, names in (("new check", test.new_checks), ("gone check", test.gone_checks)):
             yield from (f"  {what:13}  {printable(test.latest.name)}  {printable(name)}" for name in names)
-    for direction in _SHOWN:
+    for direction in DIRECTIONS:
         for test, check in comparison.checks(direction):
             told = printable(f"{check.name}  {change_words(check)}")
             yield f"  {direction:13}  {printable(test.latest.name)}  {told}"

@@ -3,16 +3,12 @@
 Every run ends with it, so that it must cost little: a plotting library takes a second to load.
 """
 
-import functools
 import math
 import statistics
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import jinja2
-
-from dodo_dsl import package_data
-from dodo_dsl.template_cache import compiled_templates
+from dodo_dsl.report.overview import environment
 
 Times = tuple[float, float]
 """Seconds of set-up and of execution."""
@@ -50,30 +46,24 @@ def draw(tests: Mapping[str, Sequence[Times]], machine: str) -> str:
     step = round_step(max(longest, 0.001) / _INTERVALS)
     scale = (_WIDTH - _LEFT - _RIGHT) / max(longest, step)
     bottom = _TOP + _ROW * len(names)
-    return _template().render(
-        width=_WIDTH,
-        height=bottom + 28,
-        left=_LEFT,
-        top=_TOP - 4,
-        bottom=bottom,
-        machine=machine,
-        runs=sum(len(tests[name]) for name in names),
-        ticks=[
-            Tick(round(_LEFT + n * step * scale, 1), f"{n * step:g} s") for n in range(math.floor(longest / step) + 1)
-        ],
-        rows=[_row(number, name, tests[name], scale) for number, name in enumerate(names)],
+    return (
+        environment()
+        .get_template("times.svg.j2")
+        .render(
+            width=_WIDTH,
+            height=bottom + 28,
+            left=_LEFT,
+            top=_TOP - 4,
+            bottom=bottom,
+            machine=machine,
+            runs=sum(len(tests[name]) for name in names),
+            ticks=[
+                Tick(round(_LEFT + n * step * scale, 1), f"{n * step:g} s")
+                for n in range(math.floor(longest / step) + 1)
+            ],
+            rows=[_row(number, name, tests[name], scale) for number, name in enumerate(names)],
+        )
     )
-
-
-@functools.cache
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        bytecode_cache=compiled_templates(),
-        loader=jinja2.FileSystemLoader(package_data.templates()),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-    )
-    return environment.get_template("times.svg.j2")
 
 
 def _row(number: int, name: str, runs: Sequence[Times], scale: float) -> Bar:

@@ -4,9 +4,11 @@ In JUnit failed is a failure, error an error, the class name is the level. The m
 compares between branches.
 """
 
+import json
+import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +42,8 @@ def write_junit(
     if len(runs) == 1:
         suite.timestamp = runs[0].date.partition("+")[0]
         suite.hostname = xml_text(runs[0].host)
-    for outcome in outcomes:
-        suite.add_testcase(_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)))
-    for test in not_run:
-        suite.add_testcase(_skipped(test))
+    cases = [_case(outcome, attachments.get(outcome.slug), links.get(outcome.slug)) for outcome in outcomes]
+    suite.add_testcases([*cases, *map(_skipped, not_run)])  # one by one, each is counted with all before it
     document = JUnitXml("dodo")
     document.add_testsuite(suite)
     document.update_statistics()  # type: ignore[no-untyped-call]
@@ -92,49 +92,60 @@ def xml_text(text: str) -> str:
     return _NOT_XML.sub("\ufffd", text)
 
 
+_METRICS = {
+    "dodo_setup_seconds": "Time until all services were ready",
+    "dodo_execution_seconds": "Time from ready to the end",
+    "dodo_passed": "1 when the test passed",
+    "dodo_check_value": "Value of an evaluator's check",
+    "dodo_check_margin": "Distance of the value to its limit",
+    "dodo_worst_margin": "Least margin of the checks, -1 to 1",
+    "dodo_processor_seconds": "Processor time",
+    "dodo_peak_memory_bytes": "Most memory at any time",
+}
+
+
 def metrics_text(outcomes: Sequence[Outcome]) -> str:
     """``metrics.txt``: duration of set-up and execution, outcome, margins, checks' values, the application's use.
 
-    All are labelled with the test.
+    All are labelled with the test. Source: the text format of OpenMetrics 1.0, in which a sample occurs once.
     """
-    from prometheus_client import CollectorRegistry, Gauge
-    from prometheus_client.openmetrics.exposition import generate_latest
-
-    registry = CollectorRegistry()
-    setup = Gauge("dodo_setup_seconds", "Time until all services were ready", ["test"], registry=registry)
-    execution = Gauge("dodo_execution_seconds", "Time from ready to the end", ["test"], registry=registry)
-    passed = Gauge("dodo_passed", "1 when the test passed", ["test"], registry=registry)
-    value = Gauge("dodo_check_value", "Value of an evaluator's check", ["test", "check", "unit"], registry=registry)
-    margin = Gauge(
-        "dodo_check_margin", "Distance of the value to its limit", ["test", "check", "unit"], registry=registry
-    )
-    worst = Gauge("dodo_worst_margin", "Least margin of the checks, -1 to 1", ["test"], registry=registry)
-    processor = Gauge("dodo_processor_seconds", "Processor time", ["test", "service"], registry=registry)
-    memory = Gauge("dodo_peak_memory_bytes", "Most memory at any time", ["test", "service"], registry=registry)
+    found: dict[str, dict[str, float]] = {name: {} for name in _METRICS}
     for outcome in outcomes:
-        slug = printable(outcome.slug)
-        passed.labels(slug).set(outcome.outcome == "passed")
-        if outcome.setup_s is not None:
-            setup.labels(slug).set(round(outcome.setup_s, 3))
-        if outcome.execution_s is not None:
-            execution.labels(slug).set(round(outcome.execution_s, 3))
-        if (share := worst_margin(outcome)) is not None:
-            worst.labels(slug).set(share)
-        for use in outcome.resources:
-            processor.labels(slug, printable(use.service)).set(round(use.processor_s, 3))
-            memory.labels(slug, printable(use.service)).set(use.peak_memory_bytes)
-        for check in outcome.checks:
-            if check["value"] is not None:
-                value.labels(slug, *_labels(check)).set(check["value"])
-            if check.get("margin") is not None:
-                margin.labels(slug, *_labels(check)).set(check["margin"])
-    text: str = generate_latest(registry).decode()  # type: ignore[no-untyped-call]
-    return text
+        for name, value, labels in _samples(outcome):
+            if value is not None:
+                texts = (f"{key}={json.dumps(printable(labels[key]), ensure_ascii=False)}" for key in sorted(labels))
+                found[name][",".join(texts)] = float(value)
+    lines = list[str]()
+    for name, samples in found.items():
+        lines += [f"# HELP {name} {_METRICS[name]}", f"# TYPE {name} gauge"]
+        lines += [f"{name}{{{labels}}} {_number(value)}" for labels, value in samples.items()]
+    return "\n".join([*lines, "# EOF\n"])
 
 
-def _labels(check: Mapping[str, Any]) -> tuple[str, str]:
-    """A check's name and unit, which an evaluator has written, or somebody else a file of results."""
-    return printable(check["name"]), printable(check.get("unit") or "")
+def _samples(outcome: Outcome) -> Iterator[tuple[str, float | None, dict[str, str]]]:
+    """Names, values and labels of what an outcome has; None where it has nothing."""
+    test = {"test": outcome.slug}
+    yield "dodo_passed", outcome.outcome == "passed", test
+    for name, seconds in (("setup", outcome.setup_s), ("execution", outcome.execution_s)):
+        yield f"dodo_{name}_seconds", None if seconds is None else round(seconds, 3), test
+    yield "dodo_worst_margin", worst_margin(outcome), test
+    for use in outcome.resources:
+        labels = {**test, "service": use.service}
+        yield "dodo_processor_seconds", round(use.processor_s, 3), labels
+        yield "dodo_peak_memory_bytes", use.peak_memory_bytes, labels
+    for check in outcome.checks:
+        labels = {**test, "check": check["name"], "unit": check.get("unit") or ""}
+        yield "dodo_check_value", check["value"], labels
+        yield "dodo_check_margin", check.get("margin"), labels
+
+
+def _number(value: float) -> str:
+    """As Go writes it, in whose words the format is defined: with an exponent from a million on."""
+    if not math.isfinite(value):
+        return {math.inf: "+Inf", -math.inf: "-Inf"}.get(value, "NaN")
+    whole, dot, part = repr(value).partition(".")
+    is_large = value > 0 and dot and len(whole) > 6
+    return f"{f'{whole[0]}.{whole[1:]}{part}'.rstrip('0.')}e+{len(whole) - 1:02d}" if is_large else repr(value)
 
 
 def to_moments(outcomes: Sequence[Outcome], pages: Mapping[str, str], folder: str) -> dict[str, str]:

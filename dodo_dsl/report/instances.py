@@ -64,12 +64,9 @@ def decisive_limits(outcome: Outcome) -> str:
 def decisive(outcome: Outcome) -> Mapping[str, Any] | None:
     """The check whose value ``decisive_value`` shows."""
     checks = outcome.checks
-    failed = [check for check in checks if not check["ok"] and not only_follows(check, checks)]
-    shares = (
-        (with_margins(check)["margin_share"], check) for check in outcome.checks if not differs_each_run(check["name"])
-    )
-    judged = sorted(((share, check) for share, check in shares if share), key=lambda pair: pair[0])
-    return next(iter(failed or [check for _, check in judged]), None)
+    failed = (check for check in checks if not check["ok"] and not only_follows(check, checks))
+    judged = (c for c in map(with_margins, checks) if c["margin_share"] and not differs_each_run(c["name"]))
+    return next(failed, None) or min(judged, key=lambda check: check["margin_share"], default=None)
 
 
 class WorstInstance(NamedTuple):

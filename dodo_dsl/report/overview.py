@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from dodo_dsl import __version__, atomic, package_data
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import MachineLoad, Outcome, Wait, megabytes, worst_margin
 from dodo_dsl.report import check_display
 from dodo_dsl.report import comparison as report_comparison
-from dodo_dsl.report.comparison import KINDS, Comparison
+from dodo_dsl.report.comparison import DIRECTIONS, KINDS, Comparison
 from dodo_dsl.report.instances import MatrixGrid, decisive, decisive_value, grids, worst_instances
 from dodo_dsl.report.results import NO_CIRCUMSTANCES, Circumstances
 from dodo_dsl.template_cache import compiled_templates
@@ -72,28 +72,21 @@ def read_history(folder: Path) -> Past:
 
 
 def curve(past: Past, slug: str, check: Mapping[str, Any]) -> Markup:
-    """A check's values as a picture; empty with fewer than two of them, and for what is not a history."""
+    """A check's values as a picture; empty without two different ones, and for what is not a history."""
     try:
         values = [float(run["checks"][check["name"]]) for run in past.get(slug, ()) if check["name"] in run["checks"]]
         limits = [float(limit) for limit in (check.get("limit") or {}).values()]
     except (TypeError, KeyError, ValueError, AttributeError):
         return Markup()
-    if len(values) < 2 or not all(map(math.isfinite, values)):
+    if len(set(values)) < 2 or not all(map(math.isfinite, values)):
         return Markup()
     return _svg(values, limits)
 
 
 def history(past: Past, slug: str, checks: Sequence[Mapping[str, Any]]) -> list[tuple[Mapping[str, Any], Markup]]:
     """The curves of those checks of a test that have a limit and did not have the same value each time."""
-    drawn = ((check, curve(past, slug, check)) for check in checks if check.get("limit") and _varies(past, slug, check))
+    drawn = ((check, curve(past, slug, check)) for check in checks if check.get("limit"))
     return [(check, picture) for check, picture in drawn if picture]
-
-
-def _varies(past: Past, slug: str, check: Mapping[str, Any]) -> bool:
-    try:
-        return len({run["checks"].get(check["name"]) for run in past.get(slug, ())} - {None}) > 1
-    except (TypeError, KeyError, AttributeError):
-        return False
 
 
 def _svg(values: Sequence[float], limits: Sequence[float]) -> Markup:
@@ -102,8 +95,7 @@ def _svg(values: Sequence[float], limits: Sequence[float]) -> Markup:
     low, high = min([low, *near]), max([high, *near])
 
     def y(value: float) -> int:
-        share = (value - low) / (high - low) if high > low else 0.5
-        return round(_HEIGHT - _EDGE - share * (_HEIGHT - 2 * _EDGE))
+        return round(_HEIGHT - _EDGE - (value - low) / (high - low) * (_HEIGHT - 2 * _EDGE))
 
     step = (_WIDTH - 2 * _EDGE) / (len(values) - 1)
     points = [(round(_EDGE + n * step), y(value)) for n, value in enumerate(values)]
@@ -172,17 +164,12 @@ def urgency(outcome: Outcome) -> int:
 
 def rows(outcomes: Sequence[Outcome]) -> list[Row]:
     """What did not pass first, else in the order of the outcomes; instances of a matrix are one row."""
-    found: list[Row] = []
-    taken = set[int]()
     of = {id(o): grid for grid in grids(outcomes) for row in grid.rows for cell in row.cells for o in cell}
+    found: dict[int, tuple[MatrixGrid | None, list[Outcome]]] = {}
     for outcome in outcomes:
         grid = of.get(id(outcome))
-        if grid is None:
-            found.append(Row([outcome]))
-        elif id(grid) not in taken:
-            taken.add(id(grid))
-            found.append(Row(sorted((o for o in outcomes if of.get(id(o)) is grid), key=urgency), grid))
-    return sorted(found, key=lambda row: row.urgency)
+        found.setdefault(id(grid or outcome), (grid, []))[1].append(outcome)
+    return sorted((Row(sorted(each, key=urgency), grid) for grid, each in found.values()), key=lambda row: row.urgency)
 
 
 _BREAKS = re.compile(r"(?=\[)|(?<=,)")
@@ -194,7 +181,6 @@ _MOST_TEXT = 10_000
 _MOST_REPOSITORIES = 4
 _MOST_OF_A_LINE = 56
 """Characters of the reason of a test that passed, which has one line."""
-_DIRECTIONS = ("worse", "better", "different")
 
 
 def render(
@@ -236,9 +222,8 @@ def render(
             comparison=comparison,
             changed=comparison.by_slug() if comparison else {},
             words=report_comparison,
-            check_words=report_comparison,
             kinds=KINDS,
-            directions=_DIRECTIONS,
+            directions=DIRECTIONS,
             script=script,
             style=style(),
             hash=source_hash,
@@ -285,7 +270,7 @@ def breakable(name: str) -> Markup:
 
 def unbroken(text: str) -> Markup:
     """Values whose units stay in the line of their numbers."""
-    return Markup("\u00a0").join(_UNITS.split(_harmless(text)))
+    return Markup(_UNITS.sub("\u00a0", escape(_harmless(text))))  # noqa: S704  (escaped)
 
 
 def source_hash(text: str) -> str:

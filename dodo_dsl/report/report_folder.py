@@ -88,8 +88,7 @@ def write_report(
     they are drawn as well. ``place`` is where ``folder`` will be moved to, if it will. ``drawn`` are the slugs of tests
     that ``draw_test`` has drawn, with its sentences.
     """
-    outcomes = [results.writable(outcome) for outcome in outcomes]
-    circumstances = results.writable_circumstances(circumstances)
+    outcomes, circumstances = results.writable(tuple(outcomes)), results.writable(circumstances)
     folder.mkdir(parents=True, exist_ok=True)
     problems = [problem for outcome in outcomes for problem in drawn.get(outcome.slug, ())]
     with_room = functools.partial(_with_room, folder, drawn, problems.append)

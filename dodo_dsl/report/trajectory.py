@@ -127,5 +127,5 @@ def _edges(outlines: Iterable[map_file.Outline]) -> list[tuple[float, float, flo
 
 
 def colour_of(model: map_file.ModelEntry) -> tuple[float, float, float]:
-    """Red, green and blue from 0 to 1; grey for a texture."""
-    return _GREY if isinstance(model.paint, Path) else model.paint
+    """Red, green and blue from 0 to 1; grey for a texture, or materials."""
+    return model.paint if isinstance(model.paint, tuple) else _GREY

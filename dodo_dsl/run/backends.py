@@ -15,7 +15,8 @@ from dodo_dsl.run.process.commands import own_modules
 from dodo_dsl.run.process.fork_server_client import ForkServer, serving
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.session import RigSession, attended, is_real, refuse_hardware
+from dodo_dsl.run.rigs.permission import refuse_unattended
+from dodo_dsl.run.rigs.session import RigSession, attended
 
 Say = Callable[[str], None]
 
@@ -100,7 +101,7 @@ class Processes:
             way_out = f"{remedy}an application that you trust runs with --isolation host"
             self._problem = f"the application cannot be isolated on this machine: {refusal}; {way_out}"
             return
-        if "host" in wanted or any(is_real(plan) for plan in plans):
+        if "host" in wanted or any(plan.is_real for plan in plans):
             why = await asyncio.to_thread(host_isolation.process_namespace_refusal)
             self._is_apart = not why
             if why:
@@ -117,8 +118,8 @@ class Processes:
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
         plan = self._session.at_home(job.plan) if self._session else job.plan
-        refuse_hardware(plan)
-        isolation = "host" if is_real(plan) else self._isolation or plan.isolation
+        refuse_unattended(plan)
+        isolation = "host" if plan.is_real else self._isolation or plan.isolation
         if isolation == "network":
             if self._problem:
                 raise BackendError(self._problem)
@@ -128,7 +129,7 @@ class Processes:
         async with (
             self._exclusively(plan),
             host_isolation.host_slot(
-                plan, () if is_real(plan) else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
+                plan, () if plan.is_real else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
             ) as leased,
             attended(plan, leased, say, self._roots, self._session) as descriptors,
         ):

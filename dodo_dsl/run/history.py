@@ -6,7 +6,7 @@ import json
 import os
 import statistics
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -44,6 +44,8 @@ class PastRun:
     """Values by name, of names that one check has."""
     timed: bool = False
     """Whether the application acted by its own clock in lockstep."""
+    repository: str = ""
+    """The folder of the repository that it ran in."""
 
 
 def default_path() -> Path:
@@ -54,26 +56,41 @@ def default_path() -> Path:
         return Path(os.devnull)
 
 
+def _repository() -> str:
+    """The folder of the repository that this runs in, else the working folder."""
+    here = Path.cwd()
+    return str(next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here))
+
+
 class History:
-    """A file with a line of JSON for each run of a test. Nothing is kept where it cannot be read or written."""
+    """The ``runs`` in this repository, of a file with a line of JSON each, as far as it can be read and written."""
 
     def __init__(self, path: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         """``clock`` gives seconds since the epoch."""
         self.path = path or default_path()
         self._clock = clock
-        self.runs = list(_read(self.path))
+        self._repository = _repository()
+        self.runs: list[PastRun] = []
+        self._of: defaultdict[tuple[str, str], list[PastRun]] = defaultdict(list)
+        self._take(run for run in _read(self.path) if run.repository == self._repository)
         self._saved = len(self.runs)
+
+    def _take(self, runs: Iterable[PastRun]) -> None:
+        for run in runs:
+            self.runs.append(run)
+            self._of[run.spec, run.test].append(run)
+
+    def _alike(self, spec: str, test: str, backend: str, clock: str) -> list[PastRun]:
+        return [run for run in self._of[spec, test] if (run.backend, run.clock) == (backend, clock)]
 
     def seconds(self, spec: str, test: str, backend: str, clock: str) -> float | None:
         """The median time of the latest runs, from the start of set-up to the end; None when the test never ran."""
-        key = (spec, test, backend, clock)
-        took = [r.setup_s + r.execution_s for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key]
-        return statistics.median(took[-_RECENT:]) if took else None
+        took = [run.setup_s + run.execution_s for run in self._alike(spec, test, backend, clock)[-_RECENT:]]
+        return statistics.median(took) if took else None
 
     def cores(self, spec: str, test: str, backend: str, clock: str) -> float | None:
         """The most cores that the latest runs used on average; None when that was never measured."""
-        key = (spec, test, backend, clock)
-        runs = [r for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key][-_RECENT:]
+        runs = self._alike(spec, test, backend, clock)[-_RECENT:]
         return max((r.cores for r in runs if r.cores is not None), default=None)
 
     def times(self, tests: Iterable[tuple[str, str]], backend: str) -> dict[str, list[tuple[float, float]]]:
@@ -88,25 +105,24 @@ class History:
 
     def checks(self, spec: str, test: str, backend: str, clock: str) -> list[dict[str, Any]]:
         """The latest runs of a test: when they ended, with what, and their checks' values."""
-        key = (spec, test, backend, clock)
-        runs = [r for r in self.runs if (r.spec, r.test, r.backend, r.clock) == key and r.checks]
+        runs = [run for run in self._alike(spec, test, backend, clock) if run.checks]
         return [{"when": r.when, "outcome": r.outcome, "checks": dict(r.checks)} for r in runs[-_SHOWN:]]
 
     def is_timed(self, spec: str, test: str) -> bool:
         """Whether the application acted by its own clock in the latest run of a test in lockstep."""
-        seen = [r.timed for r in self.runs if (r.spec, r.test, r.clock) == (spec, test, "lockstep")]
+        seen = [run.timed for run in self._of[spec, test] if run.clock == "lockstep"]
         return bool(seen and seen[-1])
 
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
         """Adds pairs of a test's name and its outcome; errors are left out, because they say nothing about its time."""
-        self.runs += [
+        self._take(
             PastRun(
                 int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s,
-                _cores_used(o.machine), _values(o.checks), bool(o.response and o.response.unasked),
+                _cores_used(o.machine), _values(o.checks), bool(o.response and o.response.unasked), self._repository,
             )
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
-        ]  # fmt: skip
+        )  # fmt: skip
 
     def save(self) -> None:
         """Appends to the file what was added since it was read."""

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.spec.machine import machine
 from dodo_dsl.state_folder import secured
 
@@ -139,7 +140,7 @@ _NO_RECORD = (ValueError, KeyError, TypeError, AttributeError, OverflowError, Re
 Taken = TypeVar("Taken")
 
 
-class LeaseTimeout(Exception):
+class LeaseTimeout(BackendError):
     """Waiting for a lease took too long; the text names the holder."""
 
 

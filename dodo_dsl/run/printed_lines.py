@@ -36,6 +36,12 @@ _NUMBER = re.compile(rb"[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?|nan|inf(
 _BOOLEANS = {b"1": True, b"true": True, b"0": False, b"false": False}
 _END_OF_TIME = 1_000_000 << 31
 """Microseconds; an envelope's seconds have 32 bits with a sign."""
+_FOR_TERMINALS = re.compile(
+    rb"\x1b(\[[0-?]*[ -/]*[@-~]"  # CSI, such as colours
+    rb"|[]PX^_][^\x07\x1b]*(\x07|\x1b\\)?"  # OSC and other strings, such as titles and links
+    rb"|[ -/]*[0-Z\\^-~])"
+)
+"""Control sequences of ECMA-48."""
 _GROUP = re.compile(r"\(\?P<[^>]*>|[][()?*+|^$\\]|\{[0-9,]*\}")
 
 
@@ -135,26 +141,45 @@ class ServiceLines:
     said: set[str] = field(default_factory=set)
 
     def take(self, line: bytes, note: Callable[[str], None]) -> list[Printed]:
-        """The messages of a line, as many as patterns match; what cannot be converted is said once."""
+        """The messages of a line, as many as patterns match; what cannot be converted is said once.
+
+        Where the terminal made a program colour it, or write over it, it is matched as without, then as it is.
+        """
+        parts, found = [line], list[Printed]()
+        if (b"\x1b" in line or b"\r" in line) and len(line) <= MAX_LINE:
+            parts = _FOR_TERMINALS.sub(b"", line).split(b"\r")
+            for part in parts:
+                found += self._printed(part, note)
+        found = found or self._printed(line, note)
+        if found:
+            self.matched += 1
+            self.last = parts[-1][:_WIDTH]
+            self.unmatched.clear()
+            return found
+        for part in parts:
+            if part.strip():
+                self.unmatched.append(part[:_WIDTH])
+        return found
+
+    def _printed(self, line: bytes, note: Callable[[str], None]) -> list[Printed]:
         found = []
         for pattern in self.patterns if len(line) <= MAX_LINE else ():
             try:
                 printed = pattern.printed(line)
             except NoValue as error:
-                key = f"{pattern.line.message} {str(error).partition(' ')[0]}"
-                if key not in self.said:
-                    self.said.add(key)
-                    note(f"a line of '{self.service}' is not a valid {pattern.line.message}: {error}: '{_shown(line)}'")
+                key, _, _ = str(error).partition(" ")
+                what = f"is not a valid {pattern.line.message}"
+                self.say_once(f"{what} {key}", f"{what}: {error}: '{_shown(line)}'", note)
                 continue
             if printed is not None:
                 found.append(printed)
-        if found:
-            self.matched += 1
-            self.last = line[:_WIDTH]
-            self.unmatched.clear()
-        elif line.strip():
-            self.unmatched.append(line[:_WIDTH])
         return found
+
+    def say_once(self, key: str, what: str, note: Callable[[str], None]) -> None:
+        """What is wrong with a line, unless the same is said already, by its ``key``."""
+        if key not in self.said:
+            self.said.add(key)
+            note(f"a line of '{self.service}' {what}")
 
     def silence(self, unfinished: bytes = b"") -> str:
         """What it printed instead of a match since the last one, in words."""
@@ -208,17 +233,12 @@ class PrintedLines:
         for printed in self.services[service].take(line.rstrip(b"\r"), self._note):
             frame = frame_of(printed.message, self._messages, printed.sample_time, printed.sender)
             if len(frame) > MAX_FRAME:
-                self._note_once(service)
+                what = f"makes a message of more than {MAX_FRAME} bytes, which is not sent"
+                self.services[service].say_once(what, what, self._note)
                 continue
             if time.monotonic() - self._told_s > _AGAIN_S:
                 self._tell()
             self._send(frame)
-
-    def _note_once(self, service: str) -> None:
-        said, key = self.services[service].said, f"more than {MAX_FRAME} bytes"
-        if key not in said:
-            said.add(key)
-            self._note(f"a line of '{service}' makes a message of {key}, which is not sent")
 
     def _tell(self) -> None:
         self._told_s = time.monotonic()

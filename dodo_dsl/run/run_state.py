@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.check.senders import told_in_words
-from dodo_dsl.outcome import MachineLoad, Outcome, Response, Result, ServiceUse, against_baseline
+from dodo_dsl.outcome import ON_EMULATED, MachineLoad, Outcome, Response, Result, ServiceUse, against_baseline
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
@@ -53,7 +53,11 @@ from dodo_dsl.spec.model import VIRTUAL
 MOST_NOTES = 100
 MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
 """A note where a service was killed: which program it was, and by whose limit, the kernel's count does not say."""
-_KILLED = (-signal.SIGKILL, 128 + signal.SIGKILL)
+_KILLED, _ASKED = ((-number, 128 + number) for number in (signal.SIGKILL, signal.SIGTERM))
+
+
+def _how(event: Exited) -> str:
+    return "ran out of memory" if event.out_of_memory else how_it_ended(event.code)
 
 
 class Ended(Exception):
@@ -154,9 +158,9 @@ class RunState:
                 self.end("failed", reason, self._first_application())
             case Stopped(kind, reason):
                 self._take_stop(kind, reason)
-            case Exited(service, code, out_of_memory):
+            case Exited(service, code):
                 self.exits[service] = code
-                self._take_exit(service, code, out_of_memory)
+                self._take_exit(event)
             case _:
                 self._remember(event)
 
@@ -190,9 +194,19 @@ class RunState:
         service = self._first_application() if self.is_unanswered else CLOCK
         self.end("failed" if self.is_unanswered else "error", reason, service)
 
-    def _take_exit(self, service: str, code: int, out_of_memory: bool) -> None:
+    def note_end(self, event: Exited, is_asked: bool) -> None:
+        """Notes an end of the application's that decides nothing, unless it is a good one or by SIGTERM."""
+        if self.layer_of.get(event.service) != "application" or event.code in (0, *_ASKED):
+            return
+        how = "did not end upon SIGTERM and was killed" if is_asked and event.code in _KILLED else _how(event)
+        when = "as the test ended" if is_asked else "when all was judged"
+        at = self._when() or (f"after {self.time.seconds:.1f} s of test time" if self.time else "")
+        self._remember(Noted(f"application service '{event.service}' {how} {when}, {at}".rstrip(", ")))
+
+    def _take_exit(self, event: Exited) -> None:
+        service, code, out_of_memory = event.service, event.code, event.out_of_memory
         layer, when = self.layer_of.get(service, "application"), self._when()
-        ended = f"{'ran out of memory' if out_of_memory else how_it_ended(code)} {when}".rstrip()
+        ended = f"{_how(event)} {when}".rstrip()
         if layer == "application":
             is_done = (code == 0 and self.input_ended) or start_order.may_end(
                 self.plan.application.services, service, code
@@ -203,6 +217,8 @@ class RunState:
                 reason = f"application service '{service}' {ended}, before the test was decided"
                 waits = start_order.waits(self.plan.application.services, service) if self.began is None else ""
                 self._end_by_exit("failed", f"{reason}; {waits}" if waits else reason, service)
+            if not is_done:
+                self.note_end(event, is_asked=False)
         elif code != 0:
             self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}", service)
         elif service not in self.ready and self.began is None:
@@ -264,7 +280,7 @@ class RunState:
     def _when(self) -> str:
         if self.began is None:
             return "during set-up"
-        return "" if self.plan.lockstep else f"after {self.clock() - self.began:.1f} s"
+        return "" if self.plan.lockstep else f"after {(self.finished or self.clock()) - self.began:.1f} s"
 
     def _timed(self, finding: Finding) -> Finding:
         """With the time that the clock of a lockstep test had reached, where the end of a service decided."""
@@ -309,6 +325,7 @@ class RunState:
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
             notes=(
+                *([ON_EMULATED] if plan.rig and not plan.is_real else []),
                 *self.notes,
                 *self._printed_notes(finding),
                 *self._shortage_notes(),

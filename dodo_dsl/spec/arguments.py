@@ -51,6 +51,13 @@ class ResolvedService:
         """The values as strings; parameters without a fitting value are missing."""
         return {name: a.value.text for name, a in self.arguments.items() if a.value is not None}
 
+    @property
+    def ends_input(self) -> bool:
+        """Whether it ends the input of its test, as a recording does that is not repeated, and the end of a path."""
+        texts = self.texts
+        has_end = any(texts.get(name) for name in ("path", "points", "length")) and texts.get("hold") == "false"
+        return self.use.layer != "evaluation" and (has_end or texts.get("autorewind") == "false")
+
     def filling(self, placeholder: str) -> str | None:
         """What stands for a placeholder of the manifest's ports; None if its parameter has no fitting value.
 
@@ -111,7 +118,8 @@ def resolved(
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
         entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
-        same = known is not None and known.parameter is parameter and known.entry is entry and not parameter.driving
+        is_of_test = parameter.driving or parameter.within_timeout
+        same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
         if not holds(parameter.when, texts):
             arguments[name] = known if known and same and known.value is None else Argument(parameter, entry)
             continue

@@ -164,7 +164,7 @@ class Deployment:
 
     def rig(self, name: str) -> Rig | None:
         """A rig of the deployment, or an emulated one."""
-        return rig.emulated(name) if name in rig.EMULATED_RIGS else self.rigs.get(name)
+        return self.rigs.get(name) or (rig.emulated(name) if name in rig.EMULATED_RIGS else None)
 
 
 def build_command(prefix: str, tag: str, *names: str) -> str:
@@ -303,22 +303,22 @@ def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnosti
 
 def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
     rigs: dict[str, Rig] = {}
-    taken: dict[int, str] = {}
+    taken: dict[int | None, str] = {}
     for name, written in entry.value.entries.items() if entry and isinstance(entry.value, Mapping) else ():
         if not isinstance(written.value, Mapping):
             continue
         raw = plain(written.value)
-        found = Rig(name, raw["kind"], raw["cid"], written.value)
-        if name in rig.EMULATED_RIGS:
+        cid = None if raw.get("emulated") else raw["cid"]
+        found = rigs[name] = Rig(name, raw["kind"], cid, written.value)
+        if cid is not None and name in rig.EMULATED_RIGS:
             message = f"the name '{name}' is reserved for the built-in rig"
             problems.append(Diagnostic(written.key, "rig-name", message, "choose another name"))
-        elif raw["cid"] in taken or raw["cid"] in RESERVED_CIDS:
-            owner = f"rig '{taken[raw['cid']]}'" if raw["cid"] in taken else "real cars"
-            message = f"CID {raw['cid']} is taken by {owner}, expected one that only this rig has"
+        elif cid is not None and (cid in taken or cid in RESERVED_CIDS):
+            owner = f"rig '{taken[cid]}'" if cid in taken else "real cars"
+            message = f"CID {cid} is taken by {owner}, expected one that only this rig has"
             problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
         problems.extend(_octal(written.value.get("cid")))
-        taken.setdefault(raw["cid"], name)
-        rigs[name] = found
+        taken.setdefault(cid, name)
         problems.extend(_tags(found))
         problems.extend(_unused(found))
         problems.extend(size_problems(written.value))

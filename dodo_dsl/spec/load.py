@@ -1,7 +1,7 @@
 """A file's tests: read, merged over what it extends, set by the command line, and made into instances.
 
 Settings of the command line override the specs before anything is checked or built. ``rig: {any: dynamic}``, a test
-that any rig of a kind, or any of some, may run, is an instance for each of them.
+that any rig of a kind, or any of some, may run, is an instance for each of them, as is ``rig: dynamic`` for several.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.model import LAYERS, VIRTUAL, Pool, Spec, spec_of
 from dodo_dsl.spec.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.registry import Location
-from dodo_dsl.spec.rig import Rig
+from dodo_dsl.spec.rig import KIND_TAGS, Rig
 from dodo_dsl.spec.validation import validate
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
@@ -90,7 +90,7 @@ def varied(spec: Spec, values: vary.Values, choice: Choice) -> Spec:
     """The instance with these values of its ranges, the nominal ones for others, and another choice as its name."""
     assert spec.template is not None, "only for specs with ranges"
     found, _, _ = _at(replace(spec, choice=choice), spec.template, spec.ranges, values)
-    return replace(found, rig=spec.rig) if spec.pool else found
+    return replace(found, rig=spec.rig, pool=spec.pool)
 
 
 def _at(
@@ -140,7 +140,7 @@ class Settings:
     """Inputs of a compilation; None keeps the value of the specs.
 
     ``wall_timeout_s`` limits the wall time of a test in lockstep, in seconds. ``repeat`` is how often each test runs.
-    ``keeps_virtual`` leaves those in lockstep that have the clock virtual.
+    ``keeps_virtual`` leaves those in lockstep that have the clock virtual. ``emulate`` takes emulated rigs for all.
     """
 
     clock: str | None = None
@@ -149,6 +149,7 @@ class Settings:
     wall_timeout_s: float | None = None
     repeat: int = 1
     keeps_virtual: bool = False
+    emulate: bool = False
 
 
 def applied(spec: Spec, settings: Settings) -> Spec:
@@ -168,16 +169,22 @@ DIMENSION = "rig"
 
 
 def members(pool: Pool, rigs: Known[str, Rig]) -> list[Rig]:
-    """The rigs of a pool that the deployment has, in the order in which they are written there or in the test."""
+    """The rigs of a pool that the deployment has, in its order or the test's; of a kind, real ones or one emulated."""
     if pool.kind:
-        return [rig for rig in rigs.values() if rig.kind == pool.kind.text]
+        found = [rig for rig in rigs.values() if rig.kind == pool.kind.text]
+        return [rig for rig in found if not rig.is_emulated] or found[:1]
     return [rigs[name] for name in dict.fromkeys(word.text for word in pool.names) if name in rigs]
 
 
 def on_each(spec: Spec, rigs: Known[str, Rig]) -> list[Spec]:
     """A spec with a pool on each of its rigs, any other as it is; rigs of another kind than the first are mistakes."""
-    found = members(spec.pool, rigs) if spec.pool else []
-    return [_on(spec, rig) for rig in found if rig.kind == found[0].kind] or [spec]
+    pool = spec.pool
+    if spec.rig in KIND_TAGS and spec.rig not in rigs:
+        pool = Pool(Scalar(spec.span(DIMENSION), spec.rig, spec.rig))
+        rigs = {name: rig for name, rig in rigs.items() if rig.is_whole}
+    found = members(pool, rigs) if pool else []
+    pool = pool if spec.pool or len(found) > 1 else None
+    return [_on(spec, rig, pool) for rig in found if rig.kind == found[0].kind] or [spec]
 
 
 def of_test(spec: Spec) -> Spec:
@@ -189,8 +196,8 @@ def of_test(spec: Spec) -> Spec:
     return replace(spec, choice=replace(spec.choice, values=(*values[:place], *values[place + 1 :])))
 
 
-def _on(spec: Spec, rig: Rig) -> Spec:
+def _on(spec: Spec, rig: Rig, pool: Pool | None) -> Spec:
     name = Scalar(spec.span(DIMENSION), rig.name, rig.name)
-    corners = tuple(_on(corner, rig) for corner in spec.corners)
-    choice = Choice((*spec.choice.values, (DIMENSION, name)))
-    return replace(spec, rig=rig.name, choice=choice, corners=corners)
+    corners = tuple(_on(corner, rig, pool) for corner in spec.corners)
+    choice = Choice((*spec.choice.values, (DIMENSION, name))) if pool else spec.choice
+    return replace(spec, rig=rig.name, pool=pool, choice=choice, corners=corners)

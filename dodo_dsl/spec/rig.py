@@ -1,4 +1,4 @@
-"""Rigs: the hardware that a deployment has, and the emulated one that every machine has."""
+"""Rigs: the hardware that a deployment has, and emulated ones."""
 
 import contextlib
 import functools
@@ -11,7 +11,7 @@ from dodo_dsl.spec import quantity
 EMULATED = "emulated"
 EMULATED_CIRCLE = "emulated-circle"
 EMULATED_RIGS = (EMULATED, EMULATED_CIRCLE)
-"""The rigs that every machine has."""
+"""The rigs that every machine has, and the names of no others."""
 EMULATED_FILE = "the emulated rig"
 CIRCLE = "circle"
 """The kind of a rig whose yaw turns without end. Such a rig alone has its kind under this key, too, for a flag."""
@@ -38,12 +38,8 @@ SIMULATION_TAG = "sil"
 RESERVED_TAGS = frozenset({SIMULATION_TAG, *KIND_TAGS.values()})
 PORT = "serial"
 """The key of a rig's port. A service whose manifest takes a parameter from it moves the rig."""
-
-_EMULATED = """
-kind: {kind}
-serial: emulated
-camera: {{source: emulated, width: 640, height: 480}}
-"""
+_SIZE = ("camera.width", "camera.height")
+"""What an emulated rig has as ``dodo.yml`` says; all else is its firmware's and its virtual camera's."""
 
 
 @dataclass(frozen=True)
@@ -57,17 +53,28 @@ class Rig:
 
     @property
     def is_emulated(self) -> bool:
-        return self.name in EMULATED_RIGS
+        return self.cid is None
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether it stands for one of its kind, of which the deployment has none."""
+        return self.name in KIND_TAGS and self.node.span.file == EMULATED_FILE
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether ``dodo.yml`` says where its camera is, and the port of one that moves."""
+        return all(self.entry(key) for key in (CAMERA_SOURCE, PORT)[: 1 if self.kind == "static" else 2])
 
     @property
     def tag(self) -> str:
-        """The tag of its GitLab runner; the emulated rig runs wherever simulations do."""
-        return SIMULATION_TAG if self.is_emulated else KIND_TAGS[self.kind]
+        """The tag of its GitLab runner; a rig that ``dodo.yml`` emulates runs wherever simulations do."""
+        declared = self.is_emulated and self.node.span.file != EMULATED_FILE
+        return SIMULATION_TAG if declared else KIND_TAGS[self.kind]
 
     @property
     def more_tags(self) -> tuple[str, ...]:
         """Further tags of its runner, which distinguish it from other rigs of its kind."""
-        node = self.node.get("tags")
+        node = None if self.is_emulated else self.node.get("tags")
         texts = [item.text for item in node.items if isinstance(item, Scalar)] if isinstance(node, Sequence) else []
         return tuple(dict.fromkeys(text for text in texts if text != self.tag))
 
@@ -80,7 +87,7 @@ class Rig:
     def privileged(self) -> bool:
         """Whether services of an application may be privileged on this rig."""
         node = self.node.get("privileged")
-        return isinstance(node, Scalar) and node.value is True
+        return isinstance(node, Scalar) and node.value is True and not self.is_emulated
 
     @property
     def arch(self) -> str:
@@ -104,20 +111,14 @@ class Rig:
             return self.node.entries.get("kind") if self.kind == CIRCLE else None
         if key == MEMORY:
             return self._memory
-        node: Node = self.node
-        entry = None
-        for part in key.split("."):
-            entry = node.entries.get(part) if isinstance(node, Mapping) else None
-            if entry is None:
-                return None
-            node = entry.value
-        return entry
+        own = _at(self.node, key) if key in _SIZE or not self.is_emulated else None
+        return own or (_at(_built_in(self.kind), key) if self.is_emulated else None)
 
     @functools.cached_property
     def _memory(self) -> Entry | None:
         """All limits in one entry; one that is not a quantity is left out, because its own flag has the problem."""
         entry = self.node.entries.get("limits")
-        if entry is None or not isinstance(entry.value, Mapping):
+        if entry is None or not isinstance(entry.value, Mapping) or self.is_emulated:
             return None
         words = []
         for name, unit in LIMIT_UNITS.items():
@@ -134,10 +135,26 @@ def is_simulated(port: str) -> bool:
     return port == EMULATED or Path(port).resolve().parent == Path("/dev/pts")
 
 
-@functools.cache
+def _at(node: Node, key: str) -> Entry | None:
+    entry = None
+    for part in key.split("."):
+        entry = node.entries.get(part) if isinstance(node, Mapping) else None
+        if entry is None:
+            return None
+        node = entry.value
+    return entry
+
+
 def emulated(name: str = EMULATED) -> Rig:
-    """A rig whose firmware runs in a simulator, of EMULATED_RIGS."""
-    kind = CIRCLE if name == EMULATED_CIRCLE else "dynamic"
-    node, _ = parse(_EMULATED.format(kind=kind), EMULATED_FILE)
+    """A rig whose firmware runs in a simulator: one of EMULATED_RIGS, or one of a kind, which is missing."""
+    kind = name if name in KIND_TAGS else CIRCLE if name == EMULATED_CIRCLE else "dynamic"
+    return Rig(name, kind, None, _built_in(kind))
+
+
+@functools.cache
+def _built_in(kind: str) -> Mapping:
+    port = "" if kind == "static" else "serial: emulated\n"
+    text = f"kind: {kind}\n{port}camera: {{source: emulated, width: 640, height: 480}}\n"
+    node, _ = parse(text, EMULATED_FILE)
     assert isinstance(node, Mapping)
-    return Rig(name, kind, None, node)
+    return node

@@ -16,7 +16,7 @@ from dodo_dsl.spec.slips import boolean_meant, repaired
 Kind = Literal["text", "path", "memory"]
 
 _MEMORY = re.compile(r"/?[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
-_MESSAGE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", re.ASCII)
+_MESSAGE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
 _OUTPUT = re.compile(r"(/tmp/)?[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _MAX_TEXT = 4096
 

@@ -1,8 +1,9 @@
 """The base of all evaluators: when a test is over, and the one verdict that follows."""
 
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from google.protobuf.message import Message
 
@@ -30,6 +31,26 @@ class JudgedTime(NamedTuple):
     """Whether the input ended, rather than the time of the test."""
 
 
+class Hidden(list[int]):
+    """Times in us at which nothing was shown that could be answered: where they begin and end, in turn, ascending."""
+
+    def hide(self, begin: int, end: int) -> None:
+        """From a frame that could not be shown to the next one; both come after those before."""
+        if self and begin <= self[-1]:
+            self[-1] = max(end, self[-1])
+        else:
+            self += begin, end
+
+    def hides(self, time: int) -> bool:
+        """Whether nothing was shown then."""
+        return bisect_right(self, time) % 2 == 1
+
+    def shown(self, time: int) -> int:
+        """The time on a clock that stands still while nothing is shown."""
+        pairs = zip(self[::2], self[1::2], strict=True)
+        return time - sum(min(end, time) - begin for begin, end in pairs if begin < time)
+
+
 class Evaluator(Service, ABC):
     """Judges in test time (microseconds) and gives its verdict at the latest when time or input are over.
 
@@ -45,6 +66,8 @@ class Evaluator(Service, ABC):
         self.now: int | None = None
         """The time of the last update."""
         self.judged = Judged()
+        self.hidden, self.hidden_samples = Hidden(), Hidden()
+        """When a player of the test could not show frames, in the test's time and in that of their samples."""
         self._max_time, self._max_delay = max_time, max_delay
         self._zero: int | None = None
         self._ended: int | None = None
@@ -79,6 +102,10 @@ class Evaluator(Service, ABC):
             self._ended = self.now = now
             self.elapsed(now)
             self._check_time(now)
+
+    def not_shown(self, message: Any, due: int) -> None:
+        self.hidden.hide(due, message.dueUntil)
+        self.hidden_samples.hide(message.sampled, message.sampledUntil)
 
     def elapsed(self, time: int) -> float:
         """Seconds since time zero, which is now if it was not known before; negative before it."""

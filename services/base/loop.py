@@ -4,6 +4,7 @@ It counts how late a service is against its schedule in real time, and which sen
 another stamp than its own is easily taken for silence.
 """
 
+import functools
 import json
 import logging
 import time
@@ -15,11 +16,12 @@ from fractions import Fraction
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
-from dodo_dsl.opendlv.message_set import MessageError
+from dodo_dsl.opendlv.message_set import MessageError, decode
+from dodo_dsl.opendlv.protobuf_classes import Layout
 from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
-from services.base.members import Members, World
+from services.base.members import END_OF_INPUT, NOT_SHOWN, Members, World
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 SHORTEST = 10_000
@@ -97,10 +99,11 @@ def with_strangers(reason: str, strangers: Iterable[str]) -> str:
     return "; ".join([reason, *strangers])
 
 
-TEST_BEGIN, END_OF_INPUT = "dodo.TestBegin", "dodo.EndOfInput"
+TEST_BEGIN = "dodo.TestBegin"
 REPORT_PERIOD = 1_000_000
 
 _log = logging.getLogger(__name__)
+_warn_once = functools.cache(_log.warning)
 
 
 @dataclass
@@ -110,9 +113,9 @@ class Loop:
     ``name`` is the source in its EndOfInput. Lines on stdout report, once a second at most, how many messages were
     lost so far (``{"dodo": "lost", "messages": N}``) and in real time how many updates ended late since the test began
     (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``) and for how long what is emulated stood still
-    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and messages that came
-    under other sender stamps only (``{"dodo": "note", "text": "..."}``), unless a verdict does. Raises what the model
-    raises, and SessionError.
+    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and the
+    service's notes, with messages that came under other sender stamps only, unless a verdict does
+    (``{"dodo": "note", "text": "..."}``). Raises what the model raises, and SessionError.
     """
 
     name: str
@@ -122,9 +125,10 @@ class Loop:
     sender_stamp: int
     members: Members | None = None
     """In real time: the services of the test, whose messages others must not send."""
-    _handlers: dict[int, list[tuple[int | None, Handler]]] = field(default_factory=dict)
+    _handlers: dict[int, list[tuple[int | None, Handler, Layout]]] = field(default_factory=dict)
     _stamps: HeardStamps = field(init=False)
-    _has_begun: bool = False
+    _began: int | None = None
+    """When the test began, in us."""
     _reported: int = 0
     _paused: float = 0.0
     _report_after: int = 0
@@ -134,7 +138,11 @@ class Loop:
     def __post_init__(self) -> None:
         ids = self.session.messages.id
         for (name, stamp), handler in self.service.inputs.items():
-            self._handlers.setdefault(ids(name), []).append((stamp, handler))
+            entry = (stamp, handler, self.session.messages.layout(name))
+            self._handlers.setdefault(ids(name), []).append(entry)
+        if type(self.service).not_shown is not Service.not_shown:
+            entry = (None, self.service.not_shown, self.session.messages.layout(NOT_SHOWN))
+            self._handlers[ids(NOT_SHOWN)] = [entry]
         self._begin, self._end = ids(TEST_BEGIN), ids(END_OF_INPUT)
         self._stamps = HeardStamps({(ids(name), stamp): name for name, stamp in self.service.inputs})
         self._lateness = Lateness(self.service.period, self.service.late_after)
@@ -152,7 +160,7 @@ class Loop:
         if self.service.finished and self.service.verdict is None:
             print(json.dumps({"dodo": "end-of-input"}), flush=True)
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
-        self.clock.close(stopped if self._has_begun else lambda: True)
+        self.clock.close(stopped if self._began is not None else lambda: True)
         self._tell_strangers()
         self._report(self.clock.now())
         if self.session.lost:
@@ -212,20 +220,23 @@ class Loop:
         if envelope.data_type in self._handlers:
             self._stamps.take(envelope)
         if envelope.data_type == self._begin:
-            self._has_begun = True
+            self._began = envelope.sample_time
             if self.members is not None:
                 self.members.begin()
             self.service.begin(envelope.sample_time)
             self._lateness.begin()
         elif envelope.data_type == self._end:
             self.service.end_of_input(self.clock.now())
-        for stamp, handler in self._handlers.get(envelope.data_type, ()):
+        for stamp, handler, layout in self._handlers.get(envelope.data_type, ()):
             if stamp is None or stamp == envelope.sender_stamp:
                 try:
-                    message = self.session.messages.decode(envelope.data_type, envelope.payload)
+                    message = decode(layout, envelope.payload)
                 except MessageError as error:
-                    _log.warning("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, error)
+                    _warn_once("message %d of sender %d: %s", envelope.data_type, envelope.sender_stamp, str(error))
                     return
+                if self.members is not None:
+                    began, arrived = self._began, self.service.arrived
+                    self.members.check_numbers(envelope, arrived - began if began and arrived else None)
                 handler(message, envelope.sample_time)
 
     def _tell_strangers(self) -> None:
@@ -233,8 +244,8 @@ class Loop:
         strangers, verdict = self._stamps.strangers(), self.service.verdict
         if strangers and verdict is not None and verdict.outcome == "failed":
             self.service.verdict = replace(verdict, reason=with_strangers(verdict.reason, strangers), silent=False)
-            return
-        for text in strangers:
+            strangers = []
+        for text in (*strangers, *self.service.notes):
             print(json.dumps({"dodo": "note", "text": text}), flush=True)
 
     def _report(self, now: int) -> None:

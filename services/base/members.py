@@ -7,23 +7,29 @@ message is made by the compiler, of the wiring.
 
 import ctypes
 import json
+import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Self
+
+from google.protobuf.message import Message
 
 from dodo_dsl.opendlv.address import LINES, Address, is_of_the_world
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE, is_proven, with_proof
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.session import Session
+from services.base.clock import MICROSECONDS
 
 VARIABLE = "DODO_SENDERS"
 """Environment variable with words such as ``opendlv.sim.Frame/0=pose``; no service behind ``=``: nobody may send it.
 
 ``my-pose?`` is a service that may not say from where it sends. Without a sender stamp all of them are meant.
 """
+END_OF_INPUT, NOT_SHOWN = "dodo.EndOfInput", "dodo.NotShown"
 RUNNER_ONLY = ("dodo.TestBegin", "dodo.Alive")
 """Messages of the runner, which prove themselves."""
 _MOST_NAMED = 3
@@ -102,11 +108,32 @@ class SenderTable:
             return False
         return said.service == service and (said.host, said.port) == source
 
+    def check_numbers(self, envelope: Envelope, takers: Sequence[str], elapsed: int | None) -> None:
+        """Report a number of the application's that is not finite, for services, ``elapsed`` us after the start."""
+        with suppress(MessageError):  # they say so
+            message = self.messages.decode(envelope.data_type, envelope.payload)
+            name = f"{message.DESCRIPTOR.full_name}/{envelope.sender_stamp}"
+            if name not in self._reported and (number := _infinite_number(message)):
+                self._reported.add(name)
+                when = "before the test began" if elapsed is None else f"after {elapsed / MICROSECONDS:.2f} s"
+                to = " and ".join(f"'{taker}'" for taker in takers)
+                self.report(f"the application sent {name} to {to} {when}: {number}, not a finite number")
+
     def report(self, reason: str) -> None:
         """Report to the runner why the test fails."""
         if reason not in self._reported:
             self._reported.add(reason)
             print(json.dumps({"dodo": "foreign", "reason": reason}), flush=True)
+
+
+def _infinite_number(message: Message, inside: str = "") -> str:
+    """The first number of a message that is not finite, as ``groundSteering is nan``; empty if all are."""
+    for about, value in message.ListFields():
+        if isinstance(value, float) and not math.isfinite(value):
+            return f"{inside}{about.name} is {value}"
+        if isinstance(value, Message) and (found := _infinite_number(value, f"{inside}{about.name}.")):
+            return found
+    return ""
 
 
 def _entries(text: str, messages: MessageSet) -> Iterator[tuple[tuple[int, int | None], Producers]]:
@@ -119,6 +146,8 @@ def _entries(text: str, messages: MessageSet) -> Iterator[tuple[tuple[int, int |
         silent = frozenset(each.removesuffix("?") for each in written if each.endswith("?"))
         services = tuple(each.removesuffix("?") for each in written)
         yield (messages.id(name), int(stamp) if stamp else None), Producers(message, services, silent)
+        if name == END_OF_INPUT:  # the same services show what may be answered
+            yield (messages.id(NOT_SHOWN), None), Producers(NOT_SHOWN, services, silent)
 
 
 WORLD_VARIABLE = "DODO_WORLD"
@@ -245,6 +274,12 @@ class Members:
             return self._session.source in self._known or self._is_excused(producers)
         self._table.report(producers.reason)  # printed, and of a service of the test
         return False
+
+    def check_numbers(self, envelope: Envelope, elapsed: int | None) -> None:
+        """Report the message that the session received last if the application sent it, and a number is not finite."""
+        producers = self._table.producers(envelope)
+        if self._session.source not in self._known if producers is None else LINES in producers.services:
+            self._table.check_numbers(envelope, [self._name], elapsed)
 
     def send(self, envelope: Envelope) -> bytes:
         """Send a message of the world to the test's services alone, and return its frame.

@@ -21,6 +21,7 @@ from typing import Any
 
 from google.protobuf.message import Message
 
+from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.session import Session, SessionError
 from dodo_dsl.opendlv.shared_memory import MemoryTakenError
@@ -180,7 +181,7 @@ def _serve(
     try:
         ready.unlink(missing_ok=True)  # left by one that was killed
         with ExitStack() as resources:
-            session = resources.enter_context(_session(flags["cid"]))
+            session = resources.enter_context(_session(flags["cid"], _messages(manifest, folder)))
             world = World.load(session.messages)
             resources.enter_context(published(session, flags["log-id"]))
             key = take_key()
@@ -221,9 +222,13 @@ def _print_record(service: Service) -> None:
             print(line, flush=True)
 
 
-def _messages() -> MessageSet:
-    """The standard messages and those of the test's own ODVD files."""
-    return MessageSet.load(*(Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p))
+def _messages(manifest: Mapping[str, Any], folder: Path) -> MessageSet:
+    """The standard messages and those of the test's own ODVD files, which replace none that DoDo's services name."""
+    own = (Path(p) for p in os.environ.get("DODO_ODVD", "").split(os.pathsep) if p)
+    choices = [each.get("choices") for each in manifest.get("parameters", {}).values()]
+    named = LOG_MESSAGE + str([manifest.get("messages"), choices] * (folder.resolve().parent == _BASE.parent))
+    kept = {name for name in MessageSet.standard().names() if is_of_the_world(name) or name in named}
+    return MessageSet.load(*own, kept=kept)
 
 
 def _recording() -> Path | None:
@@ -231,12 +236,12 @@ def _recording() -> Path | None:
     return Path(os.environ["DODO_RECORDING"]) if os.environ.get("DODO_CLOCK") == "recording" else None
 
 
-def _session(cid: int) -> Session:
+def _session(cid: int, messages: MessageSet) -> Session:
     if _recording() is None:
-        return Session(cid, _messages())
+        return Session(cid, messages)
     from services.base.recorded_clock import SilentSession
 
-    return SilentSession(cid, _messages())
+    return SilentSession(cid, messages)
 
 
 def _clock(session: Session, role: str, key: bytes) -> Clock:

@@ -3,7 +3,7 @@
 import json
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -48,6 +48,15 @@ class Check:
             "ok": bool(self.ok),
             **({"exclusive": True} if self.exclusive else {}),
         }
+
+
+SINGLE = 2.0**-24
+"""What float fields are exact to, as a share of their value: 0.3 comes as 0.30000001192092896."""
+
+
+def at_limit(value: float, limit: float | None, exact: float) -> float:
+    """A value that is exact to ``exact``; the limit itself where it may be that."""
+    return value if limit is None or abs(value - limit) > exact else limit
 
 
 _MOST_REASON = 2000
@@ -139,6 +148,8 @@ class Service:
     """When the message that is handled, or was last, arrived, in microseconds of test time."""
     paused: float = 0.0
     """Seconds for which what the service emulates has stood still so far, as the machine was too busy for it."""
+    notes: Sequence[str] = ()
+    """Sentences for the result of the test, which decide nothing."""
     drive: Callable[[Callable[[], bool]], None] | None = None
     """Runs instead of the loop, for the clock service. Takes a function that says whether to stop."""
 
@@ -151,6 +162,9 @@ class Service:
 
     def end_of_input(self, now: int) -> None:
         """A source has ended: evaluators decide."""
+
+    def not_shown(self, message: Any, due: int) -> None:
+        """A player could not show the frame of a ``dodo.NotShown``."""
 
     def record(self) -> None:
         """The service ends, with a verdict or without: complete what is in ``judged``."""

@@ -88,6 +88,10 @@ class Stepper:
         application = {"the first answer": self.application.waited_first, "the application": self.application.waited}
         return {**self._spent, **application}
 
+    def takers(self, data_type: int) -> list[str]:
+        """The services that handle messages with this id, in their order."""
+        return [name for name in self.roles.all if data_type in self._consumed.get(name, ())]
+
     def connect(self) -> None:
         """Find all services and what they consume, before time begins; raises ServiceSilent."""
         results = self._go(self.roles.all, EPOCH - 1)

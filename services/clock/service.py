@@ -64,7 +64,8 @@ class ClockService(Service):
         self._heard = frozenset([*answering, *self._senders.ids, session.messages.id(SENDER)])
         self._guarded = self._senders.ids | {session.messages.id(name) for name in CONSUMED}
         self._early: list[tuple[Envelope, Address]] = []
-        self._exchange = exchange = Exchange(session, channel, answers.take, self._senders)
+        self._answers = answers
+        self._exchange = exchange = Exchange(session, channel, self._take, self._senders)
         self._application: SteppedApplication | VirtualApplication
         if isinstance(answers, SentMessages):
             assert own_time is not None, "the program gives it"
@@ -114,6 +115,13 @@ class ClockService(Service):
         """The process ids of the application's services; none where the runner gives none."""
         message: Any = self._session.messages.decode(begin.data_type, begin.payload)
         return [whole(word) for word in message.application.split(",") if is_whole(word) and len(word) < 10]
+
+    def _take(self, envelope: Envelope) -> None:
+        """Take a message of the application."""
+        takers = self._stepper.takers(envelope.data_type)
+        if takers and any(each.matches(envelope) for each in self._answers.filters):
+            self._senders.check_numbers(envelope, takers, self._stepper.now - EPOCH)
+        self._answers.take(envelope)
 
     def _over(self) -> bool:
         now = time.monotonic()

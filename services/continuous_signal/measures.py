@@ -5,6 +5,7 @@ believed: holes must not be filled afterwards, nor the future be answered. The s
 target, and how long it stays the same.
 """
 
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -13,15 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.base import Check
-from services.base.evaluator import EARLY
+from services.base.evaluator import EARLY, Hidden
+from services.base.service import at_limit
 from services.continuous_signal.target import MICROSECONDS, Target, Times, Values
+
+DAY = 86_400 * MICROSECONDS
 
 
 @dataclass(frozen=True)
 class Coverage:
     """The judged time, which share of it samples hold, and its longest gap without one; all times in s.
 
-    Without samples the gap is the whole time.
+    Without samples the gap is the whole time. In ``hidden`` s of the gap nothing was shown, which do not count.
     """
 
     begin: float
@@ -29,11 +33,12 @@ class Coverage:
     share: float
     gap_begin: float
     gap_end: float
+    hidden: float = 0.0
 
     @property
     def gap(self) -> float:
         """The length of the longest gap, in s."""
-        return self.gap_end - self.gap_begin
+        return self.gap_end - self.gap_begin - self.hidden
 
 
 def holds(times: Times, end: int, longest: int) -> Values:
@@ -42,14 +47,24 @@ def holds(times: Times, end: int, longest: int) -> Values:
     return found
 
 
-def cover(times: Times, begin: int, end: int, longest: int) -> Coverage:
-    """What samples cover of the time from `begin` to `end`; `times` ascend and are inside it, all in us."""
+def cover(times: Times, begin: int, end: int, longest: int, hidden: Hidden | None = None) -> Coverage:
+    """What samples cover of the time from `begin` to `end`; `times` ascend and are inside it, all in us.
+
+    Time that is ``hidden`` does not pass.
+    """
     edges = np.concatenate([[begin], times, [end]])
-    gaps = np.diff(edges)
+    shown = edges
+    if hidden:
+        lengths = np.diff(hidden, prepend=hidden[0])
+        lengths[::2] = 0
+        shown = edges - np.rint(np.interp(edges, hidden, np.cumsum(lengths))).astype(np.int64)
+    gaps = np.diff(shown)
     at = int(np.argmax(gaps))
-    share = float(holds(times, end, longest).sum()) / (end - begin)
+    share = float(holds(shown[1:-1], shown[-1], longest).sum()) / (shown[-1] - shown[0])
+    lost = edges[at + 1] - edges[at] - gaps[at]
     return Coverage(*(float(each) for each in (
         begin / MICROSECONDS, end / MICROSECONDS, share, edges[at] / MICROSECONDS, edges[at + 1] / MICROSECONDS,
+        lost / MICROSECONDS,
     )))  # fmt: skip
 
 
@@ -57,6 +72,8 @@ LONGEST_LAG, LAG_STEP = MICROSECONDS, MICROSECONDS // 100
 """The lags that are tried, in microseconds."""
 EXPLAINS = 0.75
 """A lag counts when the mean distance to the target that much earlier is at most this share of that without a lag."""
+MOST_LAGS = 20_000
+"""Samples of which a lag is looked for that has no limit."""
 HALF = 0.5
 FEWEST = 10
 """Samples of which anything can be said."""
@@ -128,7 +145,7 @@ class SignalLimits:
     arrival is late. A `relative` band is a share of the target's size, and no less than `floor`; the target has a sign
     beyond that. Until the first sample nothing has to be held if that comes within `start_up` of the target's time.
     All times in microseconds, but for `lag` in seconds, by which the signal may follow its target late. It may keep
-    one value for `repeats` samples.
+    one value for `repeats` samples. Values are ``exact`` to a share of themselves, and keep limits that are so near.
     """
 
     mean: float | None = None
@@ -150,6 +167,11 @@ class SignalLimits:
     floor: float = 0.0
     frame_share: float | None = None
     sign_share: float | None = None
+    exact: float = 0.0
+
+    def exact_to(self, *values: Values) -> float:
+        """To what the distance between values is exact."""
+        return self.exact * sum(float(np.abs(each[np.isfinite(each)]).max(initial=0.0)) for each in values)
 
     def band_at(self, expected: Values) -> Values:
         """The distance from each of these targets up to which a sample is inside the band; without a band any is."""
@@ -241,11 +263,14 @@ def measure(
     limits: SignalLimits,
     judged: tuple[int, int] | None = None,
     frames: Times | None = None,
+    hidden: Hidden | None = None,
+    is_copied: bool = True,
 ) -> SignalMeasures:
     """The measures of samples in any order, their times in microseconds on the target's own scale.
 
     ``judged`` is the part of the target's time that they have to cover; by default all of it. ``frames`` are the times
-    of the pictures that have to be answered, ascending; by default each sample answers one.
+    of the pictures that have to be answered, ascending; by default each sample answers one. Samples have their times if
+    these ``is_copied``, else they are counted. Nothing has to be held while frames are ``hidden``.
     """
     inside = times >= limits.start
     if limits.until is not None:
@@ -260,35 +285,38 @@ def measure(
     begin, end = judged or judged_time(target, limits)
     if samples and times[known][0] <= limits.start_up:
         begin = max(begin, int(times[known][0]))
-    coverage = _coverage(times[known], begin, end, limits.hold)
+    coverage = _coverage(times[known], begin, end, limits.hold, hidden)
     if not samples:
         return SignalMeasures(len(times), 0, outside, broken, coverage=coverage)
     times, values, expected = times[known], values[known], expected[known]
-    missed = np.empty(0) if frames is None else _unanswered(target, frames[(frames >= begin) & (frames <= end)], times)
+    asked = times[:0] if frames is None else frames[(frames >= begin) & (frames <= end)]
+    missed = _unanswered(target, asked, times) if is_copied else _left(target, asked[asked < end - EARLY], samples)
     distances: Values = np.abs(values - expected)
     at = int(np.argmax(distances))
     weights = holds(times, max(end, int(times[-1])), limits.hold)
     weights = weights if weights.any() else np.ones(samples)
-    inside = distances <= limits.band_at(expected)
+    exact = limits.exact_to(values, expected)
+    inside = distances <= limits.band_at(expected) + exact
     mean = _average(distances, weights)
+    std = round(float(np.sqrt(np.average((distances - mean) ** 2, weights=weights))), _DIGITS)
     return SignalMeasures(
         received=len(known),
         samples=samples,
         outside=outside,
         broken=broken,
-        mean=float(distances.mean()),
-        std=float(distances.std()),
-        distance=float(distances[at]),
+        mean=at_limit(float(distances.mean()), limits.mean, exact),
+        std=at_limit(float(distances.std()), limits.std, exact),
+        distance=at_limit(float(distances[at]), limits.distance, exact),
         share=None if limits.band is None else _average(inside, weights),
         worst=WorstSample(float(times[at]) / MICROSECONDS, float(values[at]), float(expected[at])),
-        mean_over_time=mean,
-        std_over_time=round(float(np.sqrt(np.average((distances - mean) ** 2, weights=weights))), _DIGITS),
+        mean_over_time=at_limit(mean, limits.mean, exact),
+        std_over_time=at_limit(std, limits.std, exact),
         coverage=coverage,
-        lag=None if limits.lag is None else lag(target, times, values),
-        repeats=None if limits.repeats is None else longest_run(times, values),
+        lag=lag(target, times, values) if limits.lag is not None or samples <= MOST_LAGS else None,
+        repeats=longest_run(times, values),
         likeness=likeness(target, times, values),
         frame_share=None if limits.band is None else _share(inside, len(missed)),
-        sign_share=_sign_share(values, expected, missed, limits.floor),
+        sign_share=_sign_share(values, expected, missed, limits.floor + exact),
         unanswered=len(missed),
     )
 
@@ -297,6 +325,14 @@ def _unanswered(target: Target, frames: Times, times: Times) -> Values:
     """The targets of the frames that have no sample from their own time to that of the next."""
     edges = np.append(frames, np.iinfo(np.int64).max)
     expected = target.at(frames[np.diff(np.searchsorted(times, edges)) == 0])
+    known: Values = expected[~np.isnan(expected)]
+    return known
+
+
+def _left(target: Target, frames: Times, samples: int) -> Values:
+    """The targets of as many frames as are more than the samples, evenly among them."""
+    more = np.linspace(0, len(frames) - 1, max(0, len(frames) - samples)).astype(np.int64)
+    expected = target.at(frames[more])
     known: Values = expected[~np.isnan(expected)]
     return known
 
@@ -323,8 +359,9 @@ def _average(values: NDArray[Any], weights: Values) -> float:
     return round(float(np.average(values, weights=weights)), _DIGITS)
 
 
-def _coverage(times: Times, begin: int, end: int, hold: int) -> Coverage | None:
-    return cover(times[(times >= begin) & (times <= end)], begin, end, hold) if begin < end else None
+def _coverage(times: Times, begin: int, end: int, hold: int, hidden: Hidden | None) -> Coverage | None:
+    is_seen = begin < end if not hidden else hidden.shown(begin) < hidden.shown(end)
+    return cover(times[(times >= begin) & (times <= end)], begin, end, hold, hidden) if is_seen else None
 
 
 def _check(
@@ -350,11 +387,15 @@ class Arrival(NamedTuple):
 
 
 class LateFacts(NamedTuple):
-    """How many samples were late, and the first of them: its time in s, and when it arrived where that says more."""
+    """How many samples were late, and the first of them: its time in s, and when it arrived where that says more.
+
+    ``date`` is that of its time if that is another clock's.
+    """
 
     samples: int = 0
     time: float = 0.0
     arrival: float | None = None
+    date: str = ""
 
 
 class LateSamples:
@@ -369,6 +410,8 @@ class LateSamples:
     def __init__(self, delay: int | None, is_test_time: bool) -> None:
         self._delay, self._is_test_time = delay, is_test_time
         self._count = 0
+        self.delays: array[int] = array("q")
+        """From the time of each sample to its arrival, in us of the test."""
         self._first: Arrival | None = None
         self.newest: Arrival | None = None
         """The newest sample that was believed."""
@@ -381,6 +424,8 @@ class LateSamples:
             self._count += 1
             self._first = self._first or Arrival(time, arrival)
             return True
+        if self._is_test_time:
+            self.delays.append(arrival - time)
         if self.newest is None or time >= self.newest.time:
             self.newest = Arrival(time, arrival)
         return False
@@ -390,7 +435,11 @@ class LateSamples:
         if self._first is None:
             return LateFacts()
         time, arrival = ((each - zero) / MICROSECONDS for each in self._first)
-        return LateFacts(self._count, time, arrival if self._is_test_time else None)
+        if not self._is_test_time:
+            return LateFacts(self._count, time)
+        is_near = abs(self._first.time - self._first.arrival) <= DAY
+        date = "" if is_near else str(np.datetime64(self._first.time, "us").astype("datetime64[D]"))
+        return LateFacts(self._count, time, arrival, date)
 
     def _is_late(self, time: int, arrival: int) -> bool:
         if self._delay is None:

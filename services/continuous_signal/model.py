@@ -1,14 +1,17 @@
 """The evaluator of an open loop: a signal of the application against its target, with the verdict in one sentence."""
 
 from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
+from services.base.evaluator import EARLY, Hidden
 from services.base.judged import FAILED, MOST_SAMPLES, WARNED
 from services.continuous_signal.measures import (
+    DAY,
     Coverage,
     LateFacts,
     LateSamples,
@@ -113,6 +116,9 @@ def _hole(check: Check, coverage: Coverage | None) -> str:
 def _late(late: LateFacts, begin: str = "; left out: ") -> str:
     """Samples that were not believed, with the first."""
     count = f"{late.samples} sample{'' if late.samples == 1 else 's'}"
+    if late.date:
+        with_ = f"{count} with times of {late.date}, which are not the test's"
+        return f"{begin}{with_}; if they are a recording's, write 'sample-times: test' at the service that plays it"
     where = "after newer ones" if late.arrival is None else f"which came at {late.arrival:.2f} s"
     return f"{begin}{count} whose time is not that of the arrival, the first of {late.time:.2f} s, {where}"
 
@@ -144,9 +150,6 @@ def _number(value: float | None) -> str:
 
 
 MOST_IN_MEMORY = 10_000_000
-
-
-_DAY = 86_400 * MICROSECONDS
 
 
 @dataclass
@@ -184,13 +187,16 @@ class SignalEvaluator(Evaluator):
         max_time: float,
         from_begin: bool,
         frames: Times | None = None,
+        is_copied: bool = True,
     ) -> None:
         """``signal`` is its name in sentences, ``max_time`` in s; ``from_begin``: samples count from the start.
 
-        ``frames`` are the times of the pictures that samples answer, on the target's own scale.
+        ``frames`` are the times of the pictures that samples answer, on the target's own scale, which they have if
+        these ``is_copied``.
         """
         super().__init__(max_time)
-        self._signal, self._target, self._limits, self._frames = signal, target, limits, frames
+        self._signal, self._target, self._limits = signal, target, limits
+        self._frames, self._is_copied = frames, is_copied
         self._from_begin = from_begin or target is None
         self._samples, self._targets = Samples(), Samples()
         self._late = LateSamples(limits.delay, self._from_begin)
@@ -222,11 +228,28 @@ class SignalEvaluator(Evaluator):
         start = begin if self._from_begin else target.start
         times, values = self._samples.since(start)
         judged = self._judged(target, span.is_complete)
-        measures = measure(target, times, values, self._limits, judged, self._frames)
+        hidden = Hidden(each - start for each in (self.hidden if self._from_begin else self.hidden_samples))
+        frames = self._frames
+        if frames is not None:
+            frames = frames[[not hidden.hides(frame) for frame in frames.tolist()]]
+        if hidden and hidden.shown(judged[0]) == hidden.shown(judged[1]):
+            raise UnjudgeableError(f"no frame was shown {span.within}, so there was nothing to answer")
+        measures = measure(target, times, values, self._limits, judged, frames, hidden, self._is_copied)
         if self._limits.sign_share is not None and measures.samples and measures.sign_share is None:
             raise UnjudgeableError(f"the target is nowhere farther than {self._limits.floor:g} from 0: it has no sign")
         said = verdict(self._signal, target, measures, self._limits, span.within, self._late.facts(start))
+        self.notes = [*self._notes(measures)]
         return replace(said, evidence=measures.evidence())
+
+    def _notes(self, measures: SignalMeasures) -> Iterator[str]:
+        """What a verdict by other limits does not show: a signal that sees nothing, or is late."""
+        run, lag, delays = measures.repeats, measures.lag, self._late.delays
+        if run and 1 < run.samples == measures.samples:
+            yield f"all {run.samples} samples of {self._signal} have the same value, {_number(run.value)}"
+        if lag and self._limits.lag is None:
+            yield f"{self._signal} follows its target {lag:.2f} s late, and no max-lag is set"
+        if delays and (delay := float(np.median(delays))) > EARLY:
+            yield f"samples of {self._signal} came {delay / MICROSECONDS:.2f} s after their time (median)"
 
     def record(self) -> None:
         """All samples with the target, which a live one may send afterwards; of very many those that are farthest."""
@@ -234,12 +257,12 @@ class SignalEvaluator(Evaluator):
         start = self.zero if self._from_begin else target.start
         times, values = self._samples.since(start)
         expected, limits = target.at(times), self._limits
-        away = np.abs(values - expected)
-        marks = np.select([away > (np.inf if limits.distance is None else limits.distance),
-                           away > limits.band_at(expected)], [FAILED, WARNED])  # fmt: skip
+        away, exact = np.abs(values - expected), limits.exact_to(values, expected)
+        marks = np.select([away > (np.inf if limits.distance is None else limits.distance) + exact,
+                           away > limits.band_at(expected) + exact], [FAILED, WARNED])  # fmt: skip
         marks[~np.isfinite(values)] = FAILED
         marks[(times < limits.start) | (times > (np.inf if limits.until is None else limits.until))] = 0
-        if abs(start - self.zero) > _DAY:  # of another day: from the start of the test on
+        if abs(start - self.zero) > DAY:  # of another day: from the start of the test on
             start = self.zero
         for chosen in farthest_of(np.argsort(times, kind="stable"), np.nan_to_num(away, nan=-1.0)):
             self.plot.add(start + int(times[chosen]), float(values[chosen]), mark=int(marks[chosen]))

@@ -1,10 +1,14 @@
 """The evaluator of a signal on the bus."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context, Flags, Share
+from services.base.service import SINGLE
 from services.continuous_signal.measures import SignalLimits
 from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.target import (
@@ -13,6 +17,8 @@ from services.continuous_signal.target import (
     Target,
     Times,
     check,
+    due_times,
+    is_single,
     picture_times,
     read_recording,
     read_table,
@@ -37,8 +43,9 @@ class ContinuousSignal(SignalEvaluator):
         if target is not None and from_begin and target.span[0] >= flags["max-time"]:
             first = f"{flags['target']}: the target begins {target.span[0]:,.1f} s after the start"
             raise ValueError(f"{first}, when --max-time={flags['max-time']:g} is over: nothing could be judged")
-        frames = None if target is None or from_begin else _frames(flags, target)
-        super().__init__(name, target, _limits(flags), flags["max-time"], from_begin, frames)
+        limits = replace(_limits(flags), exact=SINGLE if is_single(signal, context.messages) else 0.0)
+        frames = None if target is None else _frames(flags, target)
+        super().__init__(name, target, limits, flags["max-time"], from_begin, frames, is_copied=not from_begin)
         self._source, self._target_source = signal, other
         self.plot.name = f"{signal.field} of {signal.message.rpartition('.')[2]}/{signal.sender}"
         self.inputs = {(signal.message, signal.sender): self._take}
@@ -78,11 +85,20 @@ def _target(flags: Flags, signal: Signal, messages: MessageSet) -> Target | None
 
 
 def _frames(flags: Flags, target: Target) -> Times | None:
-    """The pictures of a recorded target, if it has some; in us on the target's own scale."""
-    path, is_asked = Path(flags["target"]), flags["min-frame-share"] is not None or flags["min-sign-share"] is not None
-    if path.suffix != RECORDING or not is_asked:
+    """The pictures that samples answer, as far as they are known, in us on the target's own scale.
+
+    They are those of the recorded target, or that are played, or of the camera. With ``align: begin`` these have the
+    test's time.
+    """
+    if flags["min-frame-share"] is None and flags["min-sign-share"] is None:
         return None
-    return picture_times(path, flags["video-sender"] or 0, target.start)
+    sender, is_recorded = flags["video-sender"] or 0, Path(flags["target"]).suffix == RECORDING
+    if flags["align"] != "begin":
+        path = flags["target"] if is_recorded else flags["rec"]
+        return picture_times(Path(path), sender, target.start) if path else None
+    if flags["rec"]:
+        return due_times(Path(flags["rec"]), sender, flags["start"] or 0.0, flags["end"], flags["timemod"] or 1.0)
+    return np.arange(0, flags["max-time"] * MICROSECONDS, MICROSECONDS / flags["freq"]) if flags["freq"] else None
 
 
 def _limits(flags: Flags) -> SignalLimits:

@@ -102,6 +102,12 @@ def check(signal: Signal, messages: MessageSet) -> Signal:
     return signal
 
 
+def is_single(signal: Signal, messages: MessageSet) -> bool:
+    """Whether the field of a checked signal is a float, not a double."""
+    field = messages.type(signal.message).DESCRIPTOR.fields_by_name[signal.field]
+    return bool(field.cpp_type == FieldDescriptor.CPPTYPE_FLOAT)
+
+
 def read_recording(path: Path, signal: Signal, messages: MessageSet) -> Target:
     """The target in a `.rec` file, its times from the first of all its messages. Raises TargetError.
 
@@ -134,6 +140,13 @@ def picture_times(path: Path, sender: int, start: int) -> Times | None:
             recording.index["time"][recording.rows([recording_times.IMAGE], sender_stamps=[sender])]
         )
     return times - start if len(times) else None
+
+
+def due_times(path: Path, sender: int, start: float, end: float | None, timemod: float) -> Times:
+    """When a player shows the pictures of a camera in a recording, in us from its start, with gaps of 1 s at most."""
+    with Recording(path) as recording:
+        rows, _, due = recording_times.played(recording, start, end, MICROSECONDS, timemod)
+        return due[np.isin(rows, recording.rows([recording_times.IMAGE], sender_stamps=[sender]))]
 
 
 def _values(path: Path, envelopes: list[Envelope], signal: Signal, messages: MessageSet) -> Values:

@@ -41,12 +41,7 @@ class DynamicModel(Service):
         )
         car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
         drive = _drive(flags, condition)
-        self.vehicle = Vehicle(flags["freq"], car, flags["steps"], condition, drive)
-        if drive is None:
-            stable = self.vehicle.car.stable_above(flags["freq"] * flags["steps"])
-            self._log.debug(
-                "the steps are stable above %.3f m/s; sideways the car moves above %g", stable, car.slip_speed
-            )
+        self.vehicle = Vehicle(car, condition, drive)
         self.inputs = {**self._requests(flags), ("opendlv.sim.Command", None): self._command}
         self._state = context.messages.type("opendlv.sim.KinematicState")
         self._frame_id = flags["frame-id"]
@@ -77,9 +72,8 @@ class DynamicModel(Service):
     def _handler(self, name: str, field: str, actuator: str) -> Handler:
         def take(message: Any, _sample_time: int) -> None:
             value = getattr(message, field)
-            if not self.vehicle.request(actuator, value) and self.vehicle.rejected == 1:
-                short = name.rpartition(".")[2]
-                self._log.warning("ignored a %s of %s, and will ignore all that are not finite", short, value)
+            if not self.vehicle.request(actuator, value):
+                self._log.warning("ignored a %s of %s", name.rpartition(".")[2], value)
 
         return take
 

@@ -105,7 +105,7 @@ class Gantry(Service):
         self.link = link
         self.ended = False
         self._patience = min(0.4 * self._turn / MICROSECONDS, 0.05)
-        self._state, self._rejected = Velocity(), 0
+        self._state = Velocity()
         self._last_state: float | None = None
         self._alive: float | None = None
         self._alive_time = 0
@@ -203,9 +203,7 @@ class Gantry(Service):
         if all(map(math.isfinite, (velocity.x, velocity.y, velocity.yaw))):
             self._state, self._last_state = velocity, self._wall()
             return
-        self._rejected += 1
-        if self._rejected == 1:
-            self._log.warning("ignored a KinematicState of %s, and will ignore all that are not finite", velocity)
+        self._log.warning("ignored a KinematicState of %s", velocity)
 
     def _take_sign_of_life(self, message: Any, _sample_time: int) -> None:
         """One that somebody repeats says nothing of the runner."""

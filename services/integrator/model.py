@@ -6,26 +6,12 @@ Rotations are unit quaternions (x, y, z, w); the motion of a body of constant ve
 import math
 from dataclasses import dataclass
 
-from dodo_dsl.opendlv.attitude import heading_of
+from dodo_dsl.opendlv.attitude import Quaternion, heading_of
 
 Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 
 SERIES = 0.05  # rad; below it the series is more exact than the quotient
 UPRIGHT = 1 - 1e-12  # sine of a pitch at which roll and yaw cannot be distinguished
-
-
-def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Attitude from angles in rad: yaw about z, then pitch about the new y, then roll about the new x."""
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
 
 
 def angles(q: Quaternion) -> Vector:

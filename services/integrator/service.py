@@ -2,17 +2,17 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from dodo_dsl.opendlv import odvd
+from dodo_dsl.opendlv.attitude import quaternion
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from services.base import Context, Flags, Output, Service, period_of
-from services.integrator.model import BodyPose, Integrator, Twist, angles, quaternion
+from services.integrator.model import BodyPose, Integrator, Twist, angles
 
 FRAME, RESET = "opendlv.sim.Frame", "reset"
-OLD_FRAME = Path(__file__).with_name("frame-0.9.odvd")
+OLD_FRAME = odvd.STANDARD_0_9
 
 
 class Integration(Service):
@@ -23,7 +23,6 @@ class Integration(Service):
         self._log = context.log
         self.period = period_of(flags["freq"])
         self.body = Integrator(start(flags))
-        self.rejected = 0
         self._frame = context.messages.type(FRAME)
         self._old = MessageSet(odvd.load(OLD_FRAME)) if flags["euler"] else None
         self._stamps = [stamp for stamp in (flags["frame-id"], flags["copy-id"]) if stamp is not None]
@@ -51,9 +50,7 @@ class Integration(Service):
         if all(map(math.isfinite, (*twist.velocity, *twist.rates))):
             self.body.feed(twist, sample_time)
             return
-        self.rejected += 1
-        if self.rejected == 1:
-            self._log.warning("ignored a KinematicState of %s, and will ignore all that are not finite", twist)
+        self._log.warning("ignored a KinematicState of %s", twist)
 
 
 def _old_payload(messages: MessageSet, pose: BodyPose) -> bytes:

@@ -5,6 +5,7 @@ The verdict is one sentence.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 from services.base import Check, Evaluator, JudgedBoxes, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
@@ -137,6 +138,8 @@ def _count(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
+_found, _true = attrgetter("found"), attrgetter("true")
+
 _OTHER_CLOCK = 10.0
 """Sample times farther than this, in s, from when their frame came are of another clock."""
 _DAY = 86_400.0
@@ -175,12 +178,12 @@ class DetectionEvaluator(Evaluator):
         if self._is_of_the_future(key):
             self._score.early += isinstance(value, Box)
             return
-        self._take(key, number, value, lambda frame: frame.found)
+        self._take(key, number, value, _found)
 
     def reveal(self, key: FrameKey, number: int, value: Value) -> None:
         """The truth about object ``number`` in a frame."""
         self._has_truth = True
-        self._take(key, number, value, lambda frame: frame.true)
+        self._take(key, number, value, _true)
 
     def announce(self, key: FrameKey, by_application: bool) -> None:
         """There is such a frame; if the application says so, it has answered it."""
@@ -195,7 +198,7 @@ class DetectionEvaluator(Evaluator):
             self._settle(lambda frame: True)
 
     def advance(self, now: int) -> None:
-        patience = self._rules.max_delay * MICROSECONDS
+        patience = max(self._rules.max_delay * MICROSECONDS, 1)
         self._settle(lambda frame: now - frame.since >= patience)
 
     def decide(self, span: JudgedTime) -> Verdict:
@@ -208,14 +211,15 @@ class DetectionEvaluator(Evaluator):
         if self._truth is None and not self._has_truth:
             raise UnjudgeableError(f"no true box came {span.within}")
         for key in sorted(self._pictures if self._truth and self._truth.frames != "one" else ()):
-            if self._truth and (span.is_complete or key < self._last):
+            is_shown = not (self._truth and self._truth.frames == "sample-time" and self.hidden_samples.hides(key))
+            if self._truth and is_shown and (span.is_complete or key < self._last):
                 counts = compare((), self._truth.pictures[key], self._rules.iou, self._rules.labels)
                 self._count(counts, JudgedFrame(key, f"of picture {key}", None), {"picture": key})
         if self._truth is None or span.is_complete:
             self._require_truth(span.within)
         end = self.elapsed(self.now if self._ended is None else self._ended) if self.now is not None else 0.0
         self._score.unanswered = self._silence.unanswered()
-        self._score.gap = self._silence.gap(self._rules.start, min(end, self._max_time))
+        self._score.gap = self._silence.gap(self._rules.start, min(end, self._max_time), self._hidden)
         return replace(verdict(self._score, self._limits, span.within), evidence=self._score.evidence())
 
     def _require_truth(self, within: str) -> None:
@@ -229,6 +233,11 @@ class DetectionEvaluator(Evaluator):
             raise UnjudgeableError(f"no true box of class '{missing[0]}' came {within}")
         if not there:
             raise UnjudgeableError(f"none of {self._score.frames} frames has a true box {within}")
+
+    def _hidden(self, begin: float, end: float) -> float:
+        """For how long nothing was shown, all in s of the test."""
+        first, last = (self.zero + round(time * MICROSECONDS) for time in (begin, end))
+        return (last - first - self.hidden.shown(last) + self.hidden.shown(first)) / MICROSECONDS
 
     def _is_of_the_future(self, key: FrameKey) -> bool:
         """A frame that comes later must not be used up."""
@@ -251,7 +260,7 @@ class DetectionEvaluator(Evaluator):
             detections.add(number, value)
             if detections is frame.found:
                 self._answer(frame)
-        elif key.time in self._judged and isinstance(value, Box):
+        elif key.time in self._judged and isinstance(value, Box) and side is _found:
             self._score.late += 1
 
     def _frame(self, key: FrameKey) -> DetectedFrame | None:
@@ -262,7 +271,9 @@ class DetectionEvaluator(Evaluator):
         if self.now is None or self.elapsed(self.now) < self._rules.start:
             self._pass_over(key)
             return None
-        return self._frames.setdefault(key.time, DetectedFrame(key, self.now))
+        ahead = key.time - self.now  # in lockstep a frame of the step that begins comes before its time
+        since = key.time if 0 < ahead <= _OTHER_CLOCK * MICROSECONDS else self.now
+        return self._frames.setdefault(key.time, DetectedFrame(key, since))
 
     def _pass_over(self, key: FrameKey) -> None:
         self._passed_over.add(key.time)

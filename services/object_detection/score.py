@@ -6,7 +6,7 @@ for how long it said nothing.
 
 import json
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from types import MappingProxyType
@@ -212,10 +212,15 @@ class Unanswered(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """A time without an answer, in s of the test."""
+    """A time without an answer, in s of the test; for ``hidden`` s of it nothing was shown, which do not count."""
 
     begin: float
     end: float
+    hidden: float = 0.0
+
+    @property
+    def length(self) -> float:
+        return self.end - self.begin - self.hidden
 
 
 @dataclass
@@ -237,14 +242,13 @@ class Silence:
         runs = [tuple(group) for is_silent, group in groups if is_silent]
         return Unanswered(len(frames), sum(map(len, runs)), max(runs, key=len, default=()))
 
-    def gap(self, begin: float, end: float) -> Gap:
+    def gap(self, begin: float, end: float, hidden: Callable[[float, float], float] = lambda _a, _b: 0.0) -> Gap:
         """The longest time without an answer, of that from ``begin`` to ``end`` in s."""
         times: Sequence[float] = sorted(time for time in self.answers if begin <= time <= end)
         if times and times[0] <= self.start_up:
             begin = times[0]
-        return max(
-            (Gap(a, b) for a, b in pairwise([begin, *times, max(begin, end)])), key=lambda gap: gap.end - gap.begin
-        )
+        parts = pairwise([begin, *times, max(begin, end)])
+        return max((Gap(a, b, hidden(a, b)) for a, b in parts), key=lambda gap: gap.length)
 
 
 MEASURES = ("precision", "recall", "f1")
@@ -365,7 +369,7 @@ class Score:
             *(Check(name, value) for name, value in counts.items()),
             _check("answered", self.answered, limits.frames, ("min-frames",)),
             _at_most("unanswered", self.unanswered.share, limits.unanswered),
-            _at_most("gap", self.gap.end - self.gap.begin if self.gap else None, limits.gap, "s"),
+            _at_most("gap", self.gap.length if self.gap else None, limits.gap, "s"),
             *(Check(name, value) for name, value in left_out.items()),
             *self._classes(limits),
         )

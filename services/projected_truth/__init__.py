@@ -1,5 +1,1 @@
 """Says where the models of a map are in the pictures of a real camera."""
-
-from services.scene import LIBRARIES
-
-__all__ = ["LIBRARIES"]

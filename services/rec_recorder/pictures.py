@@ -40,9 +40,9 @@ class Taken(NamedTuple):
 class RecordedCamera:
     """One memory's pictures, encoded; `sender_stamp` distinguishes the memories of a recording."""
 
-    def __init__(self, source: PictureSource, quality: Quality, messages: MessageSet, sender_stamp: int) -> None:
+    def __init__(self, source: PictureSource, quality: Quality, sender_stamp: int) -> None:
         self._source, self._quality = source, quality
-        self._messages, self._sender_stamp = messages, sender_stamp
+        self._messages, self._sender_stamp = MessageSet.standard(), sender_stamp
         self._count = 0
         self._layout = ("", 0, 0)
         self._encoder: VideoEncoder | None = None

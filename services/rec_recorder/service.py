@@ -125,9 +125,7 @@ def _cameras(context: Context, sources: list[PictureSource], recording: Recordin
     flags = context.flags
     is_alone = bool(flags["pictures"])
     quality = Quality(flags["key-interval"], flags["quality"], flags["lossless"], fast=is_alone)
-    each = [
-        RecordedCamera(source, quality, context.messages, flags["id"] + number) for number, source in enumerate(sources)
-    ]
+    each = [RecordedCamera(source, quality, flags["id"] + number) for number, source in enumerate(sources)]
     cameras = (
         _pictures_alone(context, each, recording)
         if is_alone

@@ -1,5 +1,6 @@
 """The memories to record, and pictures taken from them without being one of their readers."""
 
+import functools
 import logging
 import re
 from collections.abc import Callable
@@ -19,6 +20,7 @@ COMMON_SIZES = (
 HALF_BYTES = {"argb": 8, "bgr": 6, "i420": 3, "rgb": 6}  # twice the bytes per pixel
 _WRITTEN = re.compile(r"(?P<name>[^:]+)(:(?P<width>[1-9][0-9]{0,4})x(?P<height>[1-9][0-9]{0,4}))?")
 _log = logging.getLogger(__name__)
+_say_once = functools.cache(_log.info)
 
 
 class SourceError(ValueError):
@@ -36,20 +38,17 @@ class MemorySpec:
     def layout(self, size: int) -> tuple[str, int, int]:
         """Format, width and height of the pictures in a memory of `size` bytes; raises SourceError."""
         kinds = sorted(HALF_BYTES, key=lambda kind: not re.search(f"(?<!a){kind}", self.name))  # one in the name first
-        if self.width:
-            for kind in kinds:
-                if self.width * self.height * HALF_BYTES[kind] // 2 == size:
-                    return kind, self.width, self.height
-            text = f"not those of a picture of {self.width} x {self.height} pixels"
-            raise SourceError(f"memory '{self.name}' has {size} bytes, {text}")
         for kind in kinds:
-            for width, height in COMMON_SIZES:
+            for width, height in ((self.width, self.height),) if self.width else COMMON_SIZES:
                 if width * height * HALF_BYTES[kind] // 2 == size:
-                    _log.info("assuming that memory '%s' has %d x %d pixels of %s", self.name, width, height, kind)
+                    if not self.width:
+                        _say_once("assuming that memory '%s' has %d x %d pixels of %s", self.name, width, height, kind)
                     return kind, width, height
-        raise SourceError(
-            f"memory '{self.name}' has {size} bytes, not those of a common size: write {self.name}:WIDTHxHEIGHT"
+        common, given = (
+            f"common size: write {self.name}:WIDTHxHEIGHT",
+            f"picture of {self.width} x {self.height} pixels",
         )
+        raise SourceError(f"memory '{self.name}' has {size} bytes, not those of a {given if self.width else common}")
 
 
 def parse(text: str) -> MemorySpec:

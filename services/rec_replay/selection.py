@@ -11,7 +11,7 @@ import numpy as np
 
 from dodo_dsl.opendlv import recording_times
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
-from dodo_dsl.opendlv.message_set import OWN_IDS, MessageError, MessageSet, UnknownMessage
+from dodo_dsl.opendlv.message_set import MessageError, MessageSet, UnknownMessage
 from dodo_dsl.opendlv.recording import Recording
 
 IMAGE = 1055
@@ -55,22 +55,11 @@ class Part:
 
 
 def select(recording: Recording, selection: Selection, known: MessageSet, max_gap: int, timemod: float = 1.0) -> Part:
-    """The part that is played, in the order of its times; raises SelectionError.
-
-    A message without a sample time has its place by when it was received, or else sent. Gaps are those between
-    neighbours of the whole stretch, whatever of it is chosen, none larger than `max_gap` (microseconds); then all of it
-    goes `timemod` times faster.
-    """
-    stretch = _stretch(recording, selection)
-    stretch = stretch[~np.isin(recording.index["data_type"][stretch], list(OWN_IDS))]
-    if fault := recording_times.fault(recording, stretch):
+    """The part that is played, as ``recording_times.played`` has it; raises SelectionError."""
+    stretch, _, due = recording_times.played(recording, selection.start, selection.end, max_gap, timemod)
+    if fault := recording_times.fault(recording, np.sort(stretch)):
         raise SelectionError(f"{recording.path} cannot be played: {fault}")
-    times = recording_times.within(recording, stretch)
-    order = np.argsort(times, kind="stable")
-    stretch, times = stretch[order], times[order]
     index = recording.index[stretch]
-    gaps = np.diff(times, prepend=times[:1])
-    due = np.rint(np.cumsum(np.minimum(gaps, max_gap)) / timemod).astype(np.int64)
     images = index["data_type"] == IMAGE
     sent = ~(images & (not selection.send_video)) & ~_named(index, selection.without, known)
     if selection.messages:
@@ -80,16 +69,6 @@ def select(recording: Recording, selection: Selection, known: MessageSet, max_ga
     if not len(chosen):
         raise SelectionError(f"{recording.path} has no message in the selected part")
     return Part(stretch[chosen], due[chosen], sent[chosen], shown[chosen])
-
-
-def _stretch(recording: Recording, selection: Selection) -> Numbers:
-    times = recording.index["time"]
-    valid = times[times > 0]
-    begin = int(valid.min()) if len(valid) else 0
-    # the whole recording includes messages without a time, a part does not
-    start = begin + round(selection.start * MICROSECONDS) if selection.start else None
-    end = None if selection.end is None else begin + round(selection.end * MICROSECONDS)
-    return recording.rows(start=start, end=end)
 
 
 def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:

@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import message_versions, pixels
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Context, Service
 from services.base.service import Output, period_of
 from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Player, Selection, SelectionError, select
@@ -20,7 +23,7 @@ from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
 LOOKS_HZ = 1000.0
 LARGEST_PAYLOAD = 65_400
 STATUS_PERIOD = MICROSECONDS
-COMMAND, STATUS = "cluon.data.PlayerCommand", "cluon.data.PlayerStatus"
+COMMAND, STATUS, NOT_SHOWN = "cluon.data.PlayerCommand", "cluon.data.PlayerStatus", "dodo.NotShown"
 _PLAYING = 2
 
 _log = logging.getLogger(__name__)
@@ -39,15 +42,16 @@ class Replay(Service):
         player: Player,
         stream: EntryStream,
         memories: PictureMemories | None,
-        status: type[Any],
+        messages: MessageSet,
         shifts: bool,
         settle: int,
         expect: Callable[[int], None],
     ) -> None:
         self.inputs = {(COMMAND, None): self._command}
         self._player, self._stream, self._memories = player, stream, memories
-        self._status, self._shifts, self._settle = status, shifts, settle
-        self._too_large = 0
+        self._status, self._not_shown = messages.type(STATUS), messages.type(NOT_SHOWN)
+        self._shifts, self._settle = shifts, settle
+        self._too_large = self._lost = 0
         self._reported = -STATUS_PERIOD
         self._end: int | None = None
         self._pictures = np.flatnonzero(stream.shown)
@@ -61,10 +65,8 @@ class Replay(Service):
         player.advance(now)
         if player.jumped:
             self._jump()
-        while (due := player.take()) is not None:
-            envelope = self._play(due[1])
-            if envelope is not None:
-                yield envelope
+        while (entry := player.take()) is not None:
+            yield from self._play(*entry)
         if not player.ended:
             self._stream.prepare()
             self._end = None
@@ -79,22 +81,23 @@ class Replay(Service):
 
     def _next_picture(self, now: int) -> int:
         """The time of the update that shows the next picture, 0 when there is none or that is unknown."""
-        number = int(np.searchsorted(self._pictures, self._player.position))
-        is_over = number == len(self._pictures)
-        if not self._player.playing or not len(self._pictures) or (is_over and not self._player.rewinds):
+        if not self._player.playing or (due := self._next_due()) is None:
             return 0
-        due = self._player.when(int(self._pictures[0 if is_over else number]), in_next_round=is_over)
         looks = math.ceil((due - now) / self.period)
         return now + round(looks * self.period)
+
+    def _next_due(self) -> int | None:
+        """When the next picture is due, None when there is none."""
+        number = int(np.searchsorted(self._pictures, self._player.position))
+        is_over = number == len(self._pictures)
+        if not len(self._pictures) or (is_over and not self._player.rewinds):
+            return None
+        return self._player.when(int(self._pictures[0 if is_over else number]), in_next_round=is_over)
 
     def close(self) -> None:
         """Log what could not be played."""
         if self._too_large:
             _log.warning("%d messages were not sent: they are too large for the bus", self._too_large)
-        if lost := self._stream.decoder.undecoded:
-            early = self._stream.decoder.early
-            why = f": {early} came before the first key frame" if early else ""
-            _log.warning("%d pictures could not be decoded and were not shown%s", lost, why)
         if self._memories is not None:
             _log.info("%d pictures were shown", self._memories.shown)
 
@@ -105,20 +108,34 @@ class Replay(Service):
         self._stream.seek(self._player.position)
         self._player.jumped = False
 
-    def _play(self, due: int) -> Envelope | None:
-        """Show an entry's picture; returns the message to send."""
+    def _play(self, entry: int, due: int) -> Iterator[Output | Envelope]:
+        """Show an entry's picture; the messages to send."""
         envelope, is_sent, picture = self._stream.take()
         envelope = envelope._replace(received=0)  # it has not been received yet
         if self._shifts:
             envelope = envelope._replace(sent=due, sample_time=due)
-        if picture is not None and self._memories is not None:
-            self._memories.show(picture, envelope.sample_time)
-        if not is_sent:
-            return None
-        if len(envelope.payload) > LARGEST_PAYLOAD:
+        if self._memories is not None and self._stream.shown[entry]:
+            is_shown = picture is not None and self._memories.show(picture, envelope.sample_time)
+            if not is_shown:
+                yield Output(self._missed(entry, due, self._memories.misfits), 0, due)
+        if is_sent and len(envelope.payload) > LARGEST_PAYLOAD:
             self._too_large += 1
-            return None
-        return envelope
+        elif is_sent:
+            yield envelope
+
+    def _missed(self, entry: int, due: int, misfits: int) -> Message:
+        """The message that a picture was not shown, and until when: evaluators expect no answer to it."""
+        number, times, next_due = int(np.searchsorted(self._pictures, entry)), self._stream.times, self._next_due()
+        until = due + DAY if next_due is None else next_due
+        sampled = due if self._shifts else int(times[entry])
+        later = self._pictures[number + 1 :][:1]
+        length = until - due if self._shifts or not len(later) else int(times[later[0]]) - sampled
+        self._lost, early = self._lost + 1, self._stream.decoder.early
+        reasons = {"before the first key frame": early, "of another size than the first": misfits}
+        why = (f", {count} of them {reason}" for reason, count in reasons.items() if count)
+        self.notes = [f"{self._lost} frames could not be shown{''.join(why)}"]
+        missed: Message = self._not_shown(number=number, sampled=sampled, sampledUntil=sampled + length, dueUntil=until)
+        return missed
 
 
 def build(context: Context) -> Service:
@@ -134,9 +151,10 @@ def build(context: Context) -> Service:
     if not flags["await-begin"]:
         player.play()
     settle = round(flags["settle"] * MICROSECONDS)
-    status = context.messages.type(STATUS)
     memories = _memories(context, recording, part)
-    service = Replay(player, stream, memories, status, flags["sample-times"] == "test", settle, context.clock.expect)
+    service = Replay(
+        player, stream, memories, context.messages, flags["sample-times"] == "test", settle, context.clock.expect
+    )
     service.late_after = _half_period(part)
     context.resources.callback(service.close)
     return service

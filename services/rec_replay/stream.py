@@ -37,6 +37,7 @@ class Decoder:
 
     def __init__(self) -> None:
         self.undecoded = self.early = 0
+        self.fault: VideoError | None = None
         self._messages = MessageSet.standard()
         self._format = ""
         self._codec: VideoDecoder | None = None
@@ -46,17 +47,24 @@ class Decoder:
         self._codec = None
 
     def frame(self, envelope: Envelope) -> DecodedFrame | None:
-        """The picture of a message; raises VideoError for a format that is not known, and a size that is too large."""
-        image = self._image(envelope)
+        """The picture of a message; None, and the ``fault``, for an unknown format or too large a size."""
         frame = None
-        if image is not None:
-            refuse_large(image.width, image.height)
-            if self._codec is None or image.format != self._format:
-                self._codec, self._format = VideoDecoder(image.format), image.format
-            before = self._codec.early
-            frame = self._codec.decode(image.data)
-            self.early += self._codec.early - before
+        try:
+            frame = self._decoded(self._image(envelope))
+        except VideoError as error:
+            self.fault = self.fault or error
         self.undecoded += frame is None
+        return frame
+
+    def _decoded(self, image: Any) -> DecodedFrame | None:
+        if image is None:
+            return None
+        refuse_large(image.width, image.height)
+        if self._codec is None or image.format != self._format:
+            self._codec, self._format = VideoDecoder(image.format), image.format
+        before = self._codec.early
+        frame = self._codec.decode(image.data)
+        self.early += self._codec.early - before
         return frame
 
     def is_key_frame(self, envelope: Envelope) -> bool:
@@ -85,6 +93,8 @@ def first_frame(recording: Recording, rows: Numbers) -> DecodedFrame:
         frame = decoder.frame(envelope)
         if frame is not None:
             return frame
+    if decoder.fault is not None:
+        raise decoder.fault
     why = ": there is no key frame among them" if decoder.early == len(rows) else ""
     raise VideoError(f"none of the {len(rows)} pictures in {recording.path} can be decoded{why}")
 
@@ -110,13 +120,13 @@ class PictureMemories:
         self.shown = self.misfits = 0
         self._memories = memories
 
-    def show(self, picture: RecordedPicture, sample_time: int) -> None:
-        """Publish a picture; raises SharedMemoryError when a reader keeps the lock."""
+    def show(self, picture: RecordedPicture, sample_time: int) -> bool:
+        """Publish a picture, if it has the size; raises SharedMemoryError when a reader keeps the lock."""
         if picture.argb.nbytes != self._memories[0][0].size:
             if not self.misfits:
                 _log.warning("skipped the picture of %d us, which has another size than the first", sample_time)
             self.misfits += 1
-            return
+            return False
         pictures = with_copies(picture.argb, picture.i420, (kind for _, kind in self._memories))
         for memory, kind in self._memories:
             if kind in pictures:
@@ -125,6 +135,7 @@ class PictureMemories:
                     memory.stamp(sample_time)
                     memory.notify_all()
         self.shown += 1
+        return True
 
 
 READ_AHEAD = 256
@@ -146,6 +157,8 @@ class EntryStream:
         self._recording, self._part = recording, part
         self.shown = part.shown
         """Which entries are pictures for the memory."""
+        self.times: Numbers = recording.index["time"][part.rows]
+        """The sample times of entries, in us."""
         self._images = np.flatnonzero(part.shown)
         self._entries = self._from(0)
         self._ahead: RecordedEntry | None = None
@@ -182,9 +195,5 @@ class EntryStream:
                 yield RecordedEntry(envelope, sent, self._decoded(envelope) if shown else None)
 
     def _decoded(self, envelope: Envelope) -> RecordedPicture | None:
-        try:
-            frame = self.decoder.frame(envelope)
-        except VideoError:
-            self.decoder.undecoded += 1
-            return None
+        frame = self.decoder.frame(envelope)
         return pixels(frame) if frame is not None else None

@@ -3,16 +3,17 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import recording_times
-from dodo_dsl.opendlv.message_set import OWN_IDS
 from dodo_dsl.opendlv.recording import Recording
 from services.base import Check, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
 from services.base.evaluator import EARLY
+from services.base.service import at_limit
 
 Times = NDArray[np.int64]
 """Microseconds."""
@@ -66,27 +67,20 @@ class PlayedPart:
 def of_recording(path: Path, part: PlayedPart) -> Frames:
     """The frames as the player shows them; raises ValueError if there are none."""
     with Recording(path) as recording:
-        index = recording.index
-        times = index["time"]
-        begin = int(times[times > 0].min(initial=np.iinfo(np.int64).max))
-        start = begin + round(part.start * MICROSECONDS) if part.start else None
-        end = None if part.end is None else begin + round(part.end * MICROSECONDS)
-        rows = recording.rows(start=start, end=end)
-        rows = rows[~np.isin(index["data_type"][rows], list(OWN_IDS))]
-        played = recording_times.within(recording, rows)
-        order = np.argsort(played, kind="stable")
-        rows, played = rows[order], played[order]
-        shown = (index["data_type"][rows] == recording_times.IMAGE) & (index["sender_stamp"][rows] == part.sender)
+        max_gap = round(part.max_gap * MICROSECONDS)
+        rows, times, due = recording_times.played(recording, part.start, part.end, max_gap, part.timemod)
+        shown = np.isin(rows, recording.rows([recording_times.IMAGE], sender_stamps=[part.sender]))
     if not shown.any():
         raise ValueError(f"{path}: has no pictures of sender {part.sender} in the part that is played")
-    gaps = np.minimum(np.diff(played, prepend=played[:1]), round(part.max_gap * MICROSECONDS))
-    due = np.rint(np.cumsum(gaps) / part.timemod).astype(np.int64)[shown]
-    return Frames(due, None if part.is_test_time else played[shown])
+    return Frames(due[shown], None if part.is_test_time else times[shown])
 
 
 @dataclass(frozen=True)
 class ResponseLimits:
-    """Limits of the answers; ``delay`` and ``start_up`` in us. Values of the field are from ``low`` to ``high``."""
+    """Limits of the answers; ``delay`` and ``start_up`` in us. Values of the field are from ``low`` to ``high``.
+
+    They are ``exact`` to a share of themselves.
+    """
 
     share: float
     frames: int
@@ -94,6 +88,7 @@ class ResponseLimits:
     start_up: int
     low: float | None = None
     high: float | None = None
+    exact: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +105,7 @@ class ResponseEvaluator(Evaluator):
     def __init__(self, name: str, field: str, frames: Frames, limits: ResponseLimits, max_time: float) -> None:
         super().__init__(max_time, limits.delay / MICROSECONDS)
         self._name, self._field, self._frames, self._limits = name, field, frames, limits
+        self._shown = np.ones(len(frames.due), np.bool_)
         if field:
             self.plot = self.judged.series(f"{field} of {name}", low=limits.low, high=limits.high)
         else:
@@ -129,6 +125,9 @@ class ResponseEvaluator(Evaluator):
     def forget(self, now: int) -> None:
         self._clear()
 
+    def not_shown(self, message: Any, due: int) -> None:
+        self._shown[message.number : message.number + 1] = False
+
     def take(self, values: Mapping[str, float], sample_time: int) -> None:
         """An answer with the numbers that are judged, by their fields."""
         arrival = self.arrival
@@ -136,6 +135,8 @@ class ResponseEvaluator(Evaluator):
             return
         self._received += 1
         number = self._frames.of(sample_time, arrival, self.zero)
+        while number >= 0 and not self._shown[number]:
+            number -= 1
         due = self.zero + int(self._frames.due[number]) if number >= 0 else arrival
         delay = arrival - due
         self._judge(values, due)
@@ -148,20 +149,30 @@ class ResponseEvaluator(Evaluator):
             self._delay = max(self._delay or 0.0, delay / MICROSECONDS)
 
     def _judge(self, values: Mapping[str, float], time: int) -> None:
-        for field, value in values.items():
+        for field, sent in values.items():
+            value = sent
             if not np.isfinite(value):
                 self._broken += 1
                 self._first_broken = self._first_broken or BrokenValue(field, self.elapsed(time))
             elif field == self._field:
+                limits, exact = self._limits, self._limits.exact * abs(value)
+                value = at_limit(at_limit(value, limits.low, exact), limits.high, exact)
                 self._lowest = value if self._lowest is None else min(self._lowest, value)
                 self._highest = value if self._highest is None else max(self._highest, value)
             if field == self._field:
                 self.plot.add(time, value)
 
     def decide(self, span: JudgedTime) -> Verdict:
-        judged = self._judged()
-        if not len(judged):
+        due, limits = self._frames.due, self._limits
+        over = due + limits.delay <= (self.now or self.zero) - self.zero
+        asked = np.flatnonzero((over | self._answered) & self._shown)
+        if not len(asked):
             raise UnjudgeableError(f"no frame came {span.within}, so there was nothing to answer")
+        if len(asked) < limits.frames:
+            raise UnjudgeableError(
+                f"only {len(asked)} frames came {span.within}, and {limits.frames} have to be answered"
+            )
+        judged = self._from_first(asked)
         answered = int(self._answered[judged].sum())
         checks = tuple(self.checks(answered, len(judged)))
         evidence = {"time": self._first_broken.time} if self._first_broken else {}
@@ -171,18 +182,16 @@ class ResponseEvaluator(Evaluator):
         if faults:
             return Verdict("failed", "; ".join(faults) + self._aside(), checks, evidence=evidence)
         values = f", {self._field} from {self._lowest:z.4g} to {self._highest:z.4g}" if self._field else ""
+        if self._field and self._lowest == self._highest and self._received > 1:
+            self.notes = [f"all {self._received} answers have the same {self._field}, {self._lowest:z.4g}"]
         said = f"answered {answered} of {len(judged)} frames with {self._name}{values}"
         return Verdict("passed", said + self._aside(), checks)
 
-    def _judged(self) -> Times:
-        """The numbers of the frames that had their time to be answered, or are, from the first answer on."""
-        due, limits = self._frames.due, self._limits
-        over = due + limits.delay <= (self.now or self.zero) - self.zero
-        numbers = np.flatnonzero(over | self._answered)
+    def _from_first(self, asked: Times) -> Times:
+        """The numbers of frames from the first answered one on."""
         answered = np.flatnonzero(self._answered)
-        if len(answered) and due[answered[0]] <= limits.start_up:
-            numbers = numbers[numbers >= answered[0]]
-        return numbers
+        is_soon = len(answered) and self._frames.due[answered[0]] <= self._limits.start_up
+        return asked[asked >= answered[0]] if is_soon else asked
 
     def checks(self, answered: int, judged: int) -> Iterator[Check]:
         """Each measure with its limit, of so many frames answered in time among those judged."""

@@ -1,5 +1,6 @@
 """The evaluator of answers on the bus."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ from google.protobuf.descriptor import FieldDescriptor
 
 from services.base import Context, Flags
 from services.base.clock import MICROSECONDS
+from services.base.service import SINGLE
 from services.responds.model import Frames, PlayedPart, ResponseEvaluator, ResponseLimits, at_rate, of_recording
 
 _NO_NUMBERS = (FieldDescriptor.CPPTYPE_STRING, FieldDescriptor.CPPTYPE_MESSAGE)
@@ -20,7 +22,8 @@ class Responds(ResponseEvaluator):
         flags = context.flags
         self._fields = _numbers(context)
         name = f"{flags['message']}/{flags['sender']}"
-        super().__init__(name, flags["field"] or "", _frames(flags), _limits(flags), flags["max-time"])
+        limits = replace(_limits(flags), exact=SINGLE if _is_single(context) else 0.0)
+        super().__init__(name, flags["field"] or "", _frames(flags), limits, flags["max-time"])
         self.inputs = {(flags["message"], flags["sender"]): self._take}
 
     def _take(self, message: Any, sample_time: int) -> None:
@@ -40,6 +43,12 @@ def _numbers(context: Context) -> list[str]:
     if field and field not in numbers:
         raise ValueError(f"{message} has no number '{field}', expected one of {', '.join(numbers) or 'none'}")
     return [field] if field else numbers
+
+
+def _is_single(context: Context) -> bool:
+    """Whether the field with bounds is a float, not a double."""
+    fields, field = context.messages.type(context.flags["message"]).DESCRIPTOR.fields_by_name, context.flags["field"]
+    return bool(field) and fields[field].cpp_type == FieldDescriptor.CPPTYPE_FLOAT
 
 
 def _frames(flags: Flags) -> Frames:

@@ -30,7 +30,7 @@ class Copies:
 
     shape: Shape
     colour: Array
-    """Blue, green, red from 0 to 255."""
+    """Blue, green, red from 0 to 255: (3,), or (F, 3) of the faces."""
     positions: Array
     turns: Array
     name: str = ""
@@ -222,11 +222,12 @@ class Bodies:
     def _faces(self, body: int) -> Iterator[Face]:
         """The faces of a body in the world, shaded."""
         copies, (vertices, numbers) = self._models[self._model[body]], self.outline(body)
-        for corners in numbers.tolist():
+        colours = np.broadcast_to(copies.colour, (len(numbers), 3))
+        for corners, colour in zip(numbers.tolist(), colours, strict=True):
             points = vertices[list(dict.fromkeys(corners))]
             normal = np.cross(points[1] - points[0], points[2] - points[0])
             normal /= np.linalg.norm(normal)
-            lit = np.rint(np.minimum(copies.colour * self._light.shades(normal @ self._light.direction), 255.0))
+            lit = np.rint(np.minimum(colour * self._light.shades(normal @ self._light.direction), 255.0))
             yield Face(points, normal, float(normal @ points[0]), (*lit.tolist(), 255.0), body)
 
     def outline(self, body: int) -> tuple[Array, Numbers]:

@@ -1,35 +1,38 @@
-"""OBJ files as triangles: loaded by trimesh, welded, and solids of revolution with fewer sides."""
+"""OBJ files as triangles: welded, solids of revolution with fewer sides, and in the colours of their materials."""
 
-import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from dodo_dsl.opendlv.assets import mesh_text
-from dodo_dsl.opendlv.assets.json_file import MapError, read_bytes
+from dodo_dsl.opendlv.assets.json_file import MapError
 from services.scene.camera import Array
+from services.scene.raster import Image
+from services.scene.textures import Texture, load_picture
 
 Indices = npt.NDArray[np.intp]
 
 ROUND_SIDES = 16
+_PIXELS = 256
+"""So wide and high textures are at most that give faces their colours."""
 
 
 def weld(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
-    """Corners closer than a millionth of the mesh's size made one; triangles that lose a corner go."""
+    """Corners closer than a millionth of the mesh's size made one; triangles may lose corners."""
     size = float(np.ptp(vertices, axis=0).max())
     grid = np.rint(vertices / max(size * 1e-6, 1e-12))
     _, first, inverse = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-    corners = inverse.reshape(-1)[triangles]
-    return vertices[first], corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    return vertices[first], inverse.reshape(-1)[triangles]
 
 
-def with_area(vertices: Array, triangles: Indices) -> Indices:
-    """The triangles that are more than a line."""
+def have_area(vertices: Array, triangles: Indices) -> npt.NDArray[np.bool_]:
+    """Which triangles are more than a line."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    return np.asarray(triangles[doubled > 1e-6 * longest], np.intp)
+    return np.asarray(doubled > 1e-6 * longest, np.bool_)
 
 
 def _is_ring(angles: Array) -> bool:
@@ -61,49 +64,66 @@ def with_fewer_sides(vertices: Array, triangles: Indices) -> tuple[Array, Indice
     return weld(np.column_stack([directions * profile[:, :1] + middle[:2], profile[:, 1]]), triangles)
 
 
-def is_closed(triangles: Indices) -> bool:
+def _mesh(vertices: Array, triangles: Indices) -> Any:
+    from services.scene.mesh_library import trimesh
+
+    return trimesh.Trimesh(vertices, triangles, process=False)
+
+
+def is_closed(vertices: Array, triangles: Indices) -> bool:
     """Whether each edge is used once in each direction: the outside of such a mesh is known."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    count = int(triangles.max()) + 1
-    forth, back = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
-    return len(np.unique(forth)) == len(forth) and bool(np.array_equal(np.sort(forth), np.sort(back)))
-
-
-def volume(vertices: Array, triangles: Indices) -> float:
-    """What a closed mesh encloses, in cubic units; negative when its triangles face inwards."""
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+    mesh = _mesh(vertices, triangles)
+    return bool(mesh.is_watertight and mesh.is_winding_consistent)
 
 
 def oriented(vertices: Array, triangles: Indices) -> Indices:
     """Triangles that all face outwards (counter-clockwise); those of an open mesh face both ways."""
-    if not is_closed(triangles):
+    if not is_closed(vertices, triangles):
         return np.concatenate([triangles, triangles[:, ::-1]])
-    return triangles if volume(vertices, triangles) > 0 else triangles[:, ::-1]
+    return triangles if _mesh(vertices, triangles).volume > 0 else triangles[:, ::-1]
 
 
-def _parse(path: Path, data: bytes) -> tuple[Array, Indices]:
-    mesh_text.check(path, data)
-    from services.scene.mesh_library import trimesh
-
-    try:
-        mesh = trimesh.load_mesh(io.BytesIO(data), file_type="obj", process=False, skip_materials=True)
-        vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.intp)
-    except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
-        raise MapError(path, f"not a readable OBJ file: {error}") from error
-    return vertices, faces
+def _loaded(path: Path, mesh: mesh_text.Mesh) -> tuple[Array, Indices, Indices]:
+    """Vertices, triangles and the number of each one's face; MapError when there is nothing to draw."""
+    triangles, faces = (np.array(each, np.intp) for each in mesh.triangles())
+    vertices, triangles = with_fewer_sides(*weld(np.array(mesh.vertices), triangles))
+    has_corners = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    triangles, faces = oriented(vertices, triangles[has_corners]), faces[has_corners]
+    has_area = have_area(vertices, triangles)
+    if not has_area.any():
+        raise MapError(path, "no face of the OBJ file has an area")
+    return vertices, triangles[has_area], np.resize(faces, len(triangles))[has_area]
 
 
 def load_obj(path: Path) -> tuple[Array, Indices]:
     """Vertices (V, 3) in m and triangles (T, 3) of an OBJ file; MapError when there is nothing to draw."""
-    vertices, triangles = _parse(path, read_bytes(path))
-    if len(triangles) == 0:
-        raise MapError(path, "the OBJ file has no faces")
-    if len(triangles) > mesh_text.MAX_TRIANGLES:
-        raise MapError(path, f"{len(triangles)} triangles, expected at most {mesh_text.MAX_TRIANGLES}")
-    if not np.isfinite(vertices).all() or np.abs(vertices).max() > 1e5:
-        raise MapError(path, "the OBJ file has vertices that are not finite numbers below 100 km")
-    vertices, triangles = with_fewer_sides(*weld(vertices, triangles))
-    if len(with_area(vertices, triangles)) == 0:
-        raise MapError(path, "no face of the OBJ file has an area")
-    return vertices, with_area(vertices, oriented(vertices, triangles))
+    vertices, triangles, _ = _loaded(path, mesh_text.read(path))
+    return vertices, triangles
+
+
+def load_painted(path: Path, folder: Path) -> tuple[Array, Indices, Array]:
+    """As ``load_obj``, with the colour (T, 3) of each triangle; its materials are in the map's folder."""
+    mesh = mesh_text.read(path)
+    vertices, triangles, faces = _loaded(path, mesh)
+    paints = mesh_text.paints(path, mesh, folder)
+    tiles = {paint: Texture(load_picture(paint), 0).tiles for paint in set(paints) if isinstance(paint, Path)}
+    pictures = {file: next(each for each in tiles[file] if max(each.shape) <= _PIXELS)[:, :, :3] for file in tiles}
+    colours = [
+        _shown(pictures[paint], mesh, face) if isinstance(paint, Path) else np.array(paint[::-1]) * 255.0
+        for paint, face in zip(paints, mesh.faces, strict=True)
+    ]
+    return vertices, triangles, np.array(colours)[faces]
+
+
+def _shown(picture: Image, mesh: mesh_text.Mesh, face: mesh_text.Face) -> Array:
+    """The mean colour of what a face shows of its texture; of all of it without texture coordinates that fit."""
+    try:
+        spots = np.array([mesh.spots[each] for each in face.spots], np.float64).reshape(len(face.corners), 2)
+        spots -= np.floor(spots.min(axis=0))
+        (left, low), (right, high) = spots.min(axis=0), np.minimum(spots.max(axis=0), 1.0)
+        rows, columns = picture.shape[:2]
+        top, first = min(int((1 - high) * rows), rows - 1), min(int(left * columns), columns - 1)
+        picture = picture[top : max(int((1 - low) * rows), top + 1), first : max(int(right * columns), first + 1)]
+    except (ValueError, IndexError):
+        pass
+    return np.asarray(picture.mean(axis=(0, 1)), np.float64)

@@ -26,7 +26,7 @@ from dodo_dsl.opendlv.assets.map_file import (
 )
 from services.scene.bodies import Copies
 from services.scene.camera import Array
-from services.scene.meshes import load_obj
+from services.scene.meshes import load_obj, load_painted
 from services.scene.raster import Colour
 from services.scene.shading import Light
 from services.scene.shape import Shape, make_shape
@@ -187,7 +187,7 @@ class _Budget:
 
 
 def _models(
-    entry: ModelEntry, own: int | None, triangles: _Budget, shapes: dict[Path, tuple[Shape, int]]
+    entry: ModelEntry, own: int | None, triangles: _Budget, shapes: dict[tuple[Path, bool], tuple[Shape, int]]
 ) -> Iterator[Copies]:
     """The copies that stand and those that move, without that of the vehicle itself, whose frames come under ``own``.
 
@@ -196,9 +196,11 @@ def _models(
     stamps = tuple(stamp for stamp in entry.frames if stamp != own)
     if not entry.instances and not stamps:
         return
-    paint = entry.paint
-    colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
-    shape, count = shapes[entry.file] = shapes.get(entry.file) or _shape(entry.file)
+    paint, key = entry.paint, (entry.file, entry.paint is None)
+    shape, count = shapes[key] = shapes.get(key) or _shape(entry, triangles.path.parent)
+    colour = np.zeros(3) if shape.colours is None else shape.colours
+    if paint is not None:
+        colour = np.array(Texture(load_picture(paint), 0).mean) if isinstance(paint, Path) else _bgr(paint)
     triangles.take(count)
     if entry.instances:
         positions = np.array([instance.position for instance in entry.instances])
@@ -208,9 +210,9 @@ def _models(
         yield Copies(shape, colour, np.zeros((len(stamps), 3)), np.zeros(len(stamps)), entry.name, stamps)
 
 
-def _shape(file: Path) -> tuple[Shape, int]:
+def _shape(entry: ModelEntry, folder: Path) -> tuple[Shape, int]:
     """The shape in an OBJ file, and how many triangles it is made of."""
-    mesh = load_obj(file)
+    mesh = load_painted(entry.file, folder) if entry.paint is None else load_obj(entry.file)
     return make_shape(*mesh), len(mesh[1])
 
 
@@ -256,7 +258,7 @@ def load_scene(path: Path, options: SceneOptions | None = None) -> Scene:
     """The map in a folder, or of a ``map.json``, with its models and textures; raises MapError."""
     entries, options = read_map(path), options or SceneOptions()
     triangles = _Budget(entries.path, MAX_TRIANGLES, "triangles of models")
-    shapes: dict[Path, tuple[Shape, int]] = {}
+    shapes: dict[tuple[Path, bool], tuple[Shape, int]] = {}
     everything = [copies for e in entries.models for copies in _models(e, options.own, triangles, shapes)]
     models = tuple(copies for copies in everything if not copies.stamps)
     moving = tuple(copies for copies in everything if copies.stamps)

@@ -117,9 +117,9 @@ def _shades(group: Group) -> Array:
     return group.light.shades(group.towards @ group.shape.normals.T)
 
 
-def _paint(group: Group, shades: Array) -> list[Any]:
+def _paint(colour: Array, shades: Array) -> list[Any]:
     """B, G, R, A of shades of any shape, as nested lists."""
-    lit = np.rint(np.minimum(group.colour * shades[..., None], 255.0))
+    lit = np.rint(np.minimum(colour * shades[..., None], 255.0))
     opaque = np.full((*shades.shape, 1), 255.0)
     return list(np.concatenate([lit, opaque], axis=-1).tolist())
 
@@ -135,7 +135,11 @@ def _orders(group: Group) -> list[list[int]]:
 def silhouettes(group: Group) -> list[list[Piece]]:
     """Each copy as the convex hulls of its outlines, in the mean colour of what shows."""
     seen = np.maximum(_facing(group), 0.0) * group.shape.areas + 1e-12
-    colours = _paint(group, (seen * _shades(group)).sum(axis=1) / seen.sum(axis=1))
+    if group.colour.ndim == 1:
+        colours = _paint(group.colour, (seen * _shades(group)).sum(axis=1) / seen.sum(axis=1))
+    else:
+        share = seen * _shades(group) / seen.sum(axis=1, keepdims=True)
+        colours = _paint(share @ group.colour, np.ones(len(share)))
     corners = fixed(group.view.camera.project(_in_camera(group, _thinned(group))))
     hulls = [[cv2.convexHull(each[part]) for part in group.shape.outlines] for each in corners]
     return [[(hull, colour) for hull in parts] for parts, colour in zip(hulls, colours, strict=True)]
@@ -145,14 +149,14 @@ def whole(group: Group) -> list[list[Piece]]:
     """Each copy, all of it before the near plane, as its faces."""
     points = _in_camera(group, _thinned(group))
     corners = np.take(fixed(group.view.camera.project(points)), group.shape.faces, axis=1)
-    colours = _paint(group, _shades(group))
+    colours = _paint(group.colour, _shades(group))
     return [[(corners[i, f], colours[i][f]) for f in order] for i, order in enumerate(_orders(group))]
 
 
 def cut(group: Group) -> list[list[Piece]]:
     """Each copy as what of its faces lies inside the frustum."""
     points, view = _in_camera(group, group.shape.vertices[None]), group.view
-    colours = _paint(group, _shades(group))
+    colours = _paint(group.colour, _shades(group))
     result: list[list[Piece]] = []
     for i, order in enumerate(_orders(group)):
         parts = [(f, view.visible_part(points[i, group.shape.faces[f]])) for f in order]

@@ -64,14 +64,19 @@ def _edges(loop: Loop) -> list[tuple[int, int]]:
     return list(zip(loop, loop[1:] + loop[:1], strict=True))
 
 
-def join(vertices: Array, triangles: Indices) -> tuple[list[Loop], Array]:
-    """Convex polygons of at most eight corners, counter-clockwise, and their unit normals (F, 3)."""
+def join(vertices: Array, triangles: Indices, colours: Array | None = None) -> tuple[list[Loop], Array, Indices]:
+    """Convex polygons of at most eight corners, counter-clockwise, their unit normals (F, 3), a triangle (F,) of each.
+
+    Those of different ``colours`` (T, 3) are not joined.
+    """
     normals = triangle_normals(vertices, triangles)
     loops: dict[int, Loop] = {i: list(map(int, triangle)) for i, triangle in enumerate(triangles)}
     owner = {edge: i for i, loop in loops.items() for edge in _edges(loop)}
     for edge in list(owner):
         one, other = owner.get(edge), owner.get((edge[1], edge[0]))
         if one is None or other is None or one == other or normals[one] @ normals[other] < 1 - _SAME_PLANE:
+            continue
+        if colours is not None and (colours[one] != colours[other]).any():
             continue
         loop = _joined(vertices, loops[one], loops[other], edge, normals[one])
         if loop is None:
@@ -81,7 +86,7 @@ def join(vertices: Array, triangles: Indices) -> tuple[list[Loop], Array]:
         loops[one] = loop
         owner.update(dict.fromkeys(_edges(loop), one))
     kept = sorted(loops)
-    return [loops[i] for i in kept], normals[kept]
+    return [loops[i] for i in kept], normals[kept], np.array(kept, np.intp)
 
 
 def convex_parts(vertices: Array, triangles: Indices) -> list[Indices]:
@@ -124,7 +129,7 @@ class Shape:
     ``faces`` (F, 8) vertex numbers, counter-clockwise from outside, the last one repeated;
     ``normals`` and ``centres`` (F, 3), ``areas`` (F,); ``outlines``: sets of vertices whose
     convex hulls make the silhouette; ``middle`` and ``radius`` of a sphere around all;
-    ``thickness``: faces move inwards by no more.
+    ``thickness``: faces move inwards by no more; ``colours`` (F, 3) of the faces, where these have their own.
     """
 
     vertices: Array
@@ -137,6 +142,7 @@ class Shape:
     middle: Array
     radius: float
     thickness: float
+    colours: Array | None = None
 
 
 def _padded(loops: list[Loop]) -> Indices:
@@ -183,11 +189,14 @@ def _outlines(vertices: Array, triangles: Indices) -> tuple[Indices, ...]:
     return tuple(_outermost(vertices, part) for part in parts)
 
 
-def make_shape(vertices: Array, triangles: Indices) -> Shape:
-    """A shape from triangles that face outwards; vertices that no triangle uses are left out."""
+def make_shape(vertices: Array, triangles: Indices, colours: Array | None = None) -> Shape:
+    """A shape from triangles that face outwards; vertices that no triangle uses are left out.
+
+    ``colours`` (T, 3) are those of the triangles, where they have their own.
+    """
     used, corners = np.unique(triangles, return_inverse=True)
     vertices, triangles = vertices[used], corners.reshape(-1, 3)
-    loops, normals = join(vertices, triangles)
+    loops, normals, kept = join(vertices, triangles, colours)
     measured = [_centre_and_area(vertices[loop]) for loop in loops]
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle = (low + high) / 2
@@ -202,4 +211,5 @@ def make_shape(vertices: Array, triangles: Indices) -> Shape:
         middle=middle,
         radius=float(np.linalg.norm(vertices - middle, axis=1).max()),
         thickness=float((high - low).min()) / 4,
+        colours=None if colours is None else colours[kept],
     )

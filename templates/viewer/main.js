@@ -8,6 +8,8 @@
   if (dodo.data.test.duration > 0) dodo.transport.show(part("transport"));
   dodo.camera.show(part("scene"));
   dodo.map.show(part("scene"));
+  const isBare = !part("scene").firstChild && dodo.data.channels.every((each) => each.message.startsWith("dodo."));
+  document.body.classList.toggle("unrecorded", isBare);
   dodo.signals.show(part("signals"));
   dodo.log.show(part("log"));
   dodo.checks.show(part("checks"));

@@ -251,11 +251,7 @@ dodo.map = (function () {
   }
 
   function show(parent) {
-    if (!way.poses.length) {
-      const why = dodo.dom.make("p", { class: "nothing" }, "No position was on the bus, so there is no way to draw.");
-      if (!dodo.camera.isNeeded()) parent.append(dodo.dom.make("div", { class: "view" }, why));
-      return;
-    }
+    if (!way.poses.length) return;
     const whole = dodo.dom.make("div", { class: "view" });
     parent.append(whole);
     const canvases = [add(whole, "The way from above", fit)];

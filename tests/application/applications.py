@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dodo_dsl.application.application_problems import application_problems
-from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, env_files, plain
+from dodo_dsl.application.model import ApplicationSource, ComposeService, declared, env_files, file_variables, plain
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Mapping
 from tests.source.nodes import mapping
@@ -20,7 +20,9 @@ def application(text: str, folder: Path = Path("/x"), dropped: dict[str, str] | 
     for name, entry in entries.entries.items():
         assert isinstance(entry.value, Mapping)
         files = tuple(env_files(entry.value))
-        services[name] = ComposeService(name, entry.value, entry.key, declared(entry.value), files)
+        services[name] = ComposeService(
+            name, entry.value, entry.key, declared(entry.value), files, file_variables(files, folder)
+        )
     containers = {str(c): n for n, s in services.items() if (c := plain(s.node).get("container_name"))}
     rest = {key: entry.value for key, entry in document.entries.items() if key != "services"}
     return ApplicationSource(folder / "docker-compose.yml", services, rest, dropped or {}, containers)

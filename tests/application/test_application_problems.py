@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.application import stack
 from tests.application.applications import FIRST, problems
 
 
@@ -95,3 +96,65 @@ def test_two_services_with_one_variable() -> None:
 def test_a_cid_that_can_be_set(service: str, takes_cid: bool) -> None:
     found = problems(f"services: {{a: {{image: x, {service}}}}}\n")
     assert [(p.rule, p.severity) for p in found] == ([] if takes_cid else [("application-cid", "warning")])
+
+
+CIDS = (
+    ("command: --cid=112", "own"),
+    ("command: prog --cid 112", "own"),
+    ("command: [--cid, '112']", "own"),
+    (r"""entrypoint: [sh, -c, 'exec prog --cid=\"112\" | tee log']""", "own"),
+    ("command: '--cid=${CID:-112}'", "own"),
+    ("command: [sh, -c, 'prog --cid=$${NUMBER:-111}'], environment: [NUMBER=112]", "own"),
+    ("environment: {CID: 112}", "own"),
+    ("environment: [OD4SESSION_CID=112]", "own"),
+    ("environment: {FLAGS: --cid=112 --freq=10}", "own"),
+    ("env_file: b.env", "own"),
+    ("command: [--cid=9999999999999999999999], environment: {CID: '112'}", "own"),
+    ("env_file: [{path: b.env, format: raw}]", "own"),
+    ("x-dodo-process: [./prog, --cid=112]", "own"),
+    ("x-dodo: {cid: 112}", "own"),
+    ("command: --cid=111 --cid-to=112", "bridge"),
+    ("command: --cid=112, environment: {CID: 111}", "bridge"),
+    ("command: --cid=0111", ""),
+    ("command: '--cid=${CID}'", ""),
+    ("command: '--cid=${CID:-111}', environment: {OTHER_CIDS: 112}", ""),
+    ("command: --freq=112", ""),
+    ("image: opendlv-vehicle-view, command: --cid=112", "stack"),
+    ('command: sh -c "cluon-OD4toStdout --cid=112 > log"', "stack"),
+)
+"""Services beside one on CID 111: on a bus of their own, on both, or neither."""
+
+
+@pytest.mark.parametrize(("service", "kind"), CIDS)
+def test_a_test_has_one_bus(tmp_path: Path, service: str, kind: str) -> None:
+    (tmp_path / "b.env").write_text("# the other car's\nOD4SESSION_CID=112\n")
+    image = "" if "image" in service else "image: y, "
+    found = problems(f"services: {{a: {{image: x, command: --cid=111}}, b: {{{image}{service}}}}}\n", tmp_path)
+    told = [(p.severity, p.message.partition(" in ")[0]) for p in found if p.rule in ("application-cid", stack.RULE)]
+    expected = {
+        "own": [("error", "'b' is on CID 112, and 'a' is on CID 111")],
+        "bridge": [("warning", "'b' is on CID 111 and 112, which are one bus")],
+        "": [],
+    }
+    assert told == expected[kind] if kind in expected else [p.rule for p in found] == [stack.RULE]
+
+
+def test_what_is_on_both_buses_joins_them() -> None:
+    on = {"a": "--cid=111", "relay": "--cid-from=112 --cid-to=111", "b": "--cid=112", "c": "--cid=113"}
+    found = messages(", ".join(f"{name}: {{image: x, command: {words}}}" for name, words in on.items()))
+    assert [message.partition(",")[0] for message in found] == ["'relay' is on CID 111 and 112", "'c' is on CID 113"]
+
+
+@pytest.mark.parametrize(
+    ("volumes", "lacks"),
+    [
+        ("/tmp:/tmp, /dev/shm:/dev/shm, /dev/video0:/dev/video0, /sys:/sys:ro, /tmp/.X11-unix:/tmp/.X11-unix", ""),
+        ("/tmp:/tmp, './config:/opt/config:ro', data:/data", "/opt/config"),
+        ("{type: bind, source: ./models, target: /models}", "/models"),
+    ],
+)
+def test_volumes_that_a_process_lacks(volumes: str, lacks: str) -> None:
+    service = f"a: {{image: x, command: --cid=1, volumes: [{volumes}], x-dodo-process: [python, -m, x]}}"
+    found = [message for message in messages(service) if "containers only" in message]
+    assert found == [f"the process of 'a' has no '{lacks}', as volumes are mounted in containers only"] * bool(lacks)
+    assert not [m for m in messages(service.replace(", x-dodo-process: [python, -m, x]", "")) if "containers only" in m]

@@ -6,7 +6,6 @@ import pytest
 
 from dodo_dsl.application.model import ApplicationSource, plain
 from dodo_dsl.compiler import load
-from dodo_dsl.lsp.editor_schema import keys_at
 from dodo_dsl.spec.schema_errors import written_schema
 
 COMPOSE = """\
@@ -81,12 +80,6 @@ def test_a_service_has_the_keys_of_x_dodo() -> None:
     declared = written_schema("deployment")["properties"]["application"]["properties"]["services"]
     keys = written_schema("application")["$defs"]["service"]["properties"]["x-dodo"]["properties"]
     assert set(declared["additionalProperties"]["properties"]) == {*keys, "process"}
-
-
-def test_editors_know_the_keys_of_a_service() -> None:
-    found = keys_at("deployment", ("application", "services", "driver", "out"))
-    assert found is not None
-    assert (found["type"], found["description"]) == ("array", "Messages that the service produces.")
 
 
 def test_a_service_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

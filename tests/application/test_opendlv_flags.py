@@ -91,3 +91,19 @@ def test_where_a_cid_can_be_set(words: list[str], variables: dict[str, object], 
 def test_where_a_memory_is_named() -> None:
     assert opendlv_flags.takes_memory(["prog", "--name.i420=video0.i420"])
     assert not opendlv_flags.takes_memory(["prog", "--name=", "--names=x"])
+
+
+@pytest.mark.parametrize(
+    ("process", "command", "left"),
+    [
+        ("build/steering", "/opt/steering --cid=111 steering", "--cid=111 steering"),
+        ("python steering.py", "python3.11 /app/steering.py --cid=111", "--cid=111"),
+        ("python3 -u -m app.steer", "python -m app.steer --fast", "--fast"),
+        ("python steer.py", "./steer.py --cid=111", "--cid=111"),
+        ("./drive --cid=111", "--cid=111 drive", "--cid=111 drive"),
+        ("./drive", "run --cid=111", "run --cid=111"),
+        ("./drive", "", ""),
+    ],
+)
+def test_a_command_s_own_program_is_no_argument(process: str, command: str, left: str) -> None:
+    assert opendlv_flags.arguments(process.split(), command.split()) == tuple(left.split())

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dodo_dsl.application.model import cid_variables, env_files, image_variable
+from dodo_dsl.application.model import env_files, file_variables, image_variable
 from tests.source.nodes import mapping
 
 
@@ -17,8 +17,8 @@ def test_files() -> None:
     assert list(env_files(mapping("image: x"))) == []
 
 
-def test_cid_variables_of_files(tmp_path: Path) -> None:
+def test_variables_of_files(tmp_path: Path) -> None:
     (tmp_path / "a.env").write_text("OD4SESSION_CID=111\nOTHER=1\n")
     (tmp_path / "b.env").write_text("CID=112\n")
     files = env_files(mapping("env_file: [a.env, b.env, none.env, ~/c.env, '$D.env', /e.env]"))
-    assert cid_variables(files, tmp_path) == ("CID", "OD4SESSION_CID")
+    assert file_variables(files, tmp_path) == {"OD4SESSION_CID": "111", "OTHER": "1", "CID": "112"}

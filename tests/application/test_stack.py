@@ -26,6 +26,13 @@ _CASES = {
     "image: chalmersrevere/opendlv-logic-distance-voltage-multi": "range-finder",
     "image: chalmersrevere/opendlv-device-camera-v4l-multi": "rig's camera",
     "image: chalmersrevere/opendlv-device-lidar-hdl32e-multi": "sensors",
+    "image: h264decoder:v0.0.5": "virtual-camera, rec-replay",
+    "image: car/x264-encoder-armhf": "record:",
+    "build: 'https://git.car.org/opendlv-video-h264-decoder/archive/v0.0.5.tar.gz'": "virtual-camera, rec-replay",
+    "build: './opendlv-video-h264-decoder-0.0.5/'": "virtual-camera, rec-replay",
+    "image: c, command: 'sh -c \"cluon-OD4toStdout --cid=111 > /rec/a.rec\"'": "dodo rec",
+    "image: c, entrypoint: [/bin/sh, -ec], command: ['cd /r && exec cluon-OD4toStdout --cid=111 | tee x']": "dodo rec",
+    "image: c, command: [bash, -c, 'while true; do timeout 60 cluon-OD4toStdout > $$(date +%s).rec; done']": "dodo rec",
 }
 
 
@@ -40,6 +47,9 @@ def test_a_service_of_the_stack_is_named_with_what_takes_its_place(written: str,
     [
         "image: chalmersrevere/opendlv-logic-cfsd18-perception-multi",
         "image: team/opendlv-template, command: --cid=111 --name=img",
+        "image: c, command: [sh, -c, './drive & cluon-OD4toStdout --cid=111 > a.rec']",
+        "build: ./opendlv-video-h264-decoder/ours",
+        "image: team/opendlv-template, command: --recorder cluon-OD4toStdout",
         "build: .",
         "image: team/sim-camera, command: 'sh -c \"cluon-OD4toStdout --cid=111 | ./judge\"'",
         "image: chalmersrevere/opendlv-logic-distance-voltage, x-dodo: {out: [opendlv.proxy.DistanceReading]}",

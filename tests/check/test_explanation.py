@@ -133,7 +133,9 @@ def test_neither(folder: Path) -> None:
     examples.write("", folder)
     code, out, err = explained("wrong-units")
     assert (code, out) == (2, "")
-    assert err.startswith("dodo explain: unknown test 'wrong-units'; known: base, example; or the rule: did you")
+    assert err.startswith(
+        "dodo explain: unknown test or rule 'wrong-units'; known: base, example; or the rule: did you"
+    )
     assert "'wrong-unit'" in err
 
 

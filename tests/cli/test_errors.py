@@ -113,7 +113,7 @@ def test_commands_that_end_in_errors_name_themselves(tmp_path: Path, monkeypatch
         (["rec", "info", "none.rec"], 2, "dodo rec: none.rec: No such file or directory\n"),
         (["report", "none"], 2, "dodo report: there is no none/results.json\n"),
         (["compile", "none/"], 2, f"dodo compile: there is no test at '{tmp_path / 'none'}'; specs end in .dodo.yml\n"),
-        (["explain", "no-such"], 2, "dodo explain: unknown test 'no-such'"),
+        (["explain", "no-such"], 2, "dodo explain: unknown test or rule 'no-such'"),
         (["list", "--services", "beakon"], 2, "dodo list: unknown service 'beakon'; did you mean 'beacon'?\n"),
     ):
         stderr = StringIO()

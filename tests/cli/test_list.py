@@ -68,6 +68,9 @@ def test_a_service_s_command_works_outside_the_checkout(tmp_path: Path, monkeypa
         [sys.executable, *words, "--help"], capture_output=True, text=True, env=environment, check=True
     )
     assert "python -m services.integrator" in done.stdout
+    line = dodo("list", "--services", "range-finder")[1].splitlines()[-1]
+    (place,) = [word.partition("=")[2] for word in shlex.split(line) if word.startswith("--map-path=")]
+    assert (Path(place) / "map.json").is_file()
 
 
 @pytest.mark.thorough

@@ -44,7 +44,9 @@ def test_a_list_loads_nothing_of_plans() -> None:
 @pytest.mark.parametrize("words", [[], ["lst"], ["run", "--jobs"], ["rec", "info"]])
 def test_wrong_words_are_usage_errors(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(words, None, None) == 2  # type: ignore[arg-type]
-    assert "usage: dodo" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "usage: dodo" in said
+    assert ("error: " in said) == bool(words)
 
 
 def test_every_argument_is_explained() -> None:

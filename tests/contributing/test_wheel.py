@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("wheel")]
 ROOT = Path(__file__).parents[2]
 PARTS = ("dodo_dsl", "locks", "schemas", "services", "templates", "tests_registry")
 FILES = ("pyproject.toml", "README.md", "LICENSE")
-RUNNING = ("av", "cv2", "docker", "matplotlib", "scipy", "trimesh")
+RUNNING = ("av", "cv2", "docker", "matplotlib", "scipy")
 """Libraries that draw, decode and run, which compiling has no use for."""
 WITHOUT = f"""\
 import sys

@@ -35,7 +35,7 @@ class Eye:
             with self._memory.lock():
                 picture = np.frombuffer(self._memory.buffer, np.uint8).reshape(HEIGHT, WIDTH, 4)[280:340].astype(int)
             blue, green, red = picture[..., 0], picture[..., 1], picture[..., 2]
-            left, right = (self._middle(green - blue > 80, -0.5), self._middle(blue - red > 80, 0.5))
+            left, right = (self._middle(green - blue > 80, -0.5), self._middle(blue - red > 20, 0.5))
             with self._changed:
                 self.seen = left + right
                 self._changed.notify_all()

@@ -1,9 +1,11 @@
 """Compiled output: equal to the goldens, and the same for any folder and hash seed."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -16,8 +18,12 @@ from dodo_dsl.plan.model import Suite
 from tests.emit.readers import ROOT, tree
 
 GOLDEN = Path(__file__).parent / "golden"
+WHOLE = ("sil-closed-straight", "hil-dynamic")
+"""The tests whose files are compared as they are: a simulation in lockstep and a rig. Of the others, what differs."""
+SUMMARY = "summary.yml"
 SEARCH = "search.gitlab-ci.yml"
 """A child pipeline that also searches its test."""
+_DECIDED = ("level", "kind", "clock", "isolation", "timeout_s", "cid", "subnet", "tag", "rig", "lockstep", "truth")
 
 
 @pytest.mark.thorough
@@ -28,9 +34,10 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not made.problems
     first = {plan.spec: plan.slug for plan in reversed(made.compiled.suite.plans)}  # one instance of a matrix
     plans = [plan for plan in made.compiled.suite.plans if first[plan.spec] == plan.slug]
-    files = {file.path: file.text for plan in plans for file in render_plan(plan, made.compiled.defaults)} | {
-        CHILD: made.pipeline.text
-    }
+    written = {plan.slug: render_plan(plan, made.compiled.defaults) for plan in plans}
+    files = {file.path: file.text for slug in WHOLE for file in written.pop(slug)} | {CHILD: made.pipeline.text}
+    summaries = {slug: _summary({Path(file.path).name: file.text for file in test}) for slug, test in written.items()}
+    files[SUMMARY] = yaml.safe_dump(summaries, sort_keys=False, width=150)
     searched = made.compiled.suite.plans[-1]
     search = SearchJobs(searched.name, searched.slug, 4, ("docker-compose.yml",))
     files[SEARCH] = render_pipeline(Suite((searched,)), "generated", [search]).text
@@ -41,6 +48,23 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
             (GOLDEN / path).write_text(text)
     golden = {p.relative_to(GOLDEN).as_posix(): p.read_text() for p in GOLDEN.rglob("*") if p.is_file()}
     assert files == golden
+
+
+def _summary(files: Mapping[str, str]) -> dict[str, object]:
+    """What a compiled test has of its own: what the plan decided, and image and command of each service."""
+    plan = json.loads(files["test.json"])
+    summary: dict[str, object] = {
+        "decided": " ".join(f"{key}={json.dumps(plan[key])}" for key in _DECIDED if plan[key] not in ("", None, []))
+    }
+    for name, text in files.items():
+        if name.endswith(".compose.yml"):
+            services = yaml.safe_load(text)["services"]
+            words = {key: [service.get("image", ""), service.get("command", "")] for key, service in services.items()}
+            summary[name.partition(".")[0]] = {
+                key: f"{image} {command if isinstance(command, str) else ' '.join(command)}"
+                for key, (image, command) in words.items()
+            }
+    return summary
 
 
 @pytest.mark.slow

@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 
 from dodo_dsl.opendlv.assets.track import Track, VehicleBox, VehiclePose, load_obstacles, pick
+from dodo_dsl.opendlv.attitude import quaternion
 from services.base import Verdict
 from services.collision.model import TrackEvaluator
 from services.dynamic_model.model import Vehicle
 from services.integrator.model import BodyPose as Attitude
-from services.integrator.model import Integrator, Twist, quaternion
+from services.integrator.model import Integrator, Twist
 from services.scene.camera import CameraPose
 from services.scene.render import Renderer
 from services.scene.scene import load_scene
@@ -64,7 +65,7 @@ class Loop:
             Track(walls, pick(obstacles, ["finish"], "goal", MAPS), 40.0), VehicleBox(0.36, 0.16)
         )
         heading = math.radians(90 + self.yaw)
-        car, body = Vehicle(100), Integrator(Attitude((self.right, 0.0, 0.0), quaternion(0, 0, heading)))
+        car, body = Vehicle(), Integrator(Attitude((self.right, 0.0, 0.0), quaternion(0, 0, heading)))
         driver, answers = steering.Driver(self.reverse), []
         now = 0
         evaluator.begin(now)

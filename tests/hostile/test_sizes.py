@@ -115,10 +115,7 @@ def test_sizes_in_headers_are_those_of_the_pictures() -> None:
     ],
     ids=["faces", "vertices", "bytes"],
 )
-def test_meshes_are_counted_before_they_are_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, words: str
-) -> None:
-    monkeypatch.setitem(sys.modules, "trimesh", None)
+def test_meshes_are_counted_before_they_are_read(tmp_path: Path, content: bytes, words: str) -> None:
     (tmp_path / "a.obj").write_bytes(content)
     with pytest.raises(MapError, match=words):
         load_obj(tmp_path / "a.obj")

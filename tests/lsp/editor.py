@@ -47,20 +47,11 @@ class Editor:
         self.process.stdin.flush()
 
     def request(self, method: str, params: Any) -> Any:
-        answer = self._answer(method, params)
-        assert "error" not in answer, answer
-        return answer["result"]
-
-    def refusal(self, method: str, params: Any) -> str:
-        """The message with which the server refuses a request."""
-        message: str = self._answer(method, params)["error"]["message"]
-        return message
-
-    def _answer(self, method: str, params: Any) -> Message:
         number = next(self._ids)
         self.send(id=number, method=method, params=params)
         (answer,) = self.until(lambda m: m.get("id") == number and "method" not in m)
-        return answer
+        assert "error" not in answer, answer
+        return answer["result"]
 
     def until(self, *wanted: Callable[[Message], bool]) -> list[Message]:
         """The first message that each of the conditions holds for, of those that arrive from now on."""
@@ -109,11 +100,6 @@ class Editor:
         (message,) = self.until(fits)
         found: list[Message] = message["params"]["diagnostics"]
         return found
-
-    def at(self, method: str, path: Path, line: int, character: int) -> Any:
-        """A request about a position, which counts from 0."""
-        position = {"line": line, "character": character}
-        return self.request(method, {"textDocument": {"uri": path.as_uri()}, "position": position})
 
     def leave(self) -> int:
         self.request("shutdown", None)

@@ -82,54 +82,6 @@ for _, word in ipairs({ "freqq", "integrater" }) do
 end
 problems(0)
 
-step("vim.lsp.buf.hover() on freq")
-place("freq")
-vim.lsp.buf.hover()
-local shown
-await("hover", function()
-  for _, window in ipairs(vim.api.nvim_list_wins()) do
-    if vim.api.nvim_win_get_config(window).relative ~= "" then
-      shown = window
-    end
-  end
-  return shown
-end)
-for _, line in ipairs(vim.api.nvim_buf_get_lines(vim.api.nvim_win_get_buf(shown), 0, -1, false)) do
-  note("  " .. line)
-end
-vim.api.nvim_win_close(shown, true)
-
-step("completion behind fr, in a new line below yaw")
-place("yaw")
-vim.api.nvim_buf_set_lines(0, current(), current(), false, { "      fr" })
-vim.api.nvim_win_set_cursor(0, { current() + 1, 7 })
-local asked = vim.lsp.util.make_position_params()
-asked.position.character = 8
-local answers = vim.lsp.buf_request_sync(0, "textDocument/completion", asked, patience_ms)
-for _, answer in pairs(answers or {}) do
-  for _, item in ipairs(vim.lsp.util.extract_completion_items(answer.result)) do
-    if vim.startswith(item.label, "fr") then
-      note("  " .. item.label .. (item.detail and ": " .. item.detail or ""))
-    end
-  end
-end
-vim.api.nvim_buf_set_lines(0, current() - 1, current(), false, { "      freq: 50 Hz" })
-problems(0)
-
-step("vim.lsp.buf.definition() on ../maps/straight")
-local before = vim.api.nvim_get_current_buf()
-place("../maps/straight")
-vim.lsp.buf.definition()
-await("definition", function() return vim.api.nvim_get_current_buf() ~= before end)
-note(("  %s, line %d"):format(vim.fn.fnamemodify(vim.api.nvim_buf_get_name(0), ":."), current()))
-vim.api.nvim_set_current_buf(before)
-
-step("vim.lsp.buf.rename('eye') on camera")
-place("camera:")
-after_change(function() vim.lsp.buf.rename("eye") end)
-note(("  line %d is now: %s"):format(current(), vim.trim(line_of(current()))))
-problems(0)
-
 step(":write")
 vim.cmd("silent write")
 note("  saved")

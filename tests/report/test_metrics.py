@@ -1,6 +1,9 @@
 """Metrics have the margins of checks with limits, and one of the test."""
 
+import math
 from dataclasses import replace
+
+import pytest
 
 from dodo_dsl.outcome import ServiceUse, with_margin
 from dodo_dsl.report.for_gitlab import metrics_text
@@ -40,3 +43,15 @@ def test_text_of_others_commands_no_terminal() -> None:
     text = metrics_text([replace(OUTCOME, slug="t\x1b", checks=(check,), resources=(use,))])
     assert "\x1b" not in text
     assert samples(text, "dodo_check_value") == ['check="a�[31m�b",test="t�",unit="m�"} 1.0']
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1, "1.0"), (1e6, "1e+06"), (-1234567.5, "-1234567.5"), (1234567.5, "1.2345675e+06"), (1e-7, "1e-07"),
+     (1e300, "1e+300"), (math.inf, "+Inf"), (-math.inf, "-Inf"), (math.nan, "NaN")],
+)  # fmt: skip
+def test_numbers_and_names_are_those_of_openmetrics(value: float, text: str) -> None:
+    check = {"name": 'a"\\b', "value": value, "limit": {}, "unit": "", "ok": True}
+    found = metrics_text([replace(OUTCOME, checks=(check,))])
+    assert samples(found, "dodo_check_value") == [rf'check="a\"\\b",test="test",unit=""}} {text}']
+    assert found.endswith("\n# EOF\n")

@@ -1,5 +1,6 @@
 """``results.json`` is read only when it is one."""
 
+import contextlib
 import json
 import math
 import re
@@ -9,8 +10,12 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import jsonschema
+import msgspec
 import pytest
+from junitparser import TestSuite
 
+from dodo_dsl import package_data
 from dodo_dsl.outcome import MachineLoad, NotRun, Response, ServiceUse, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.comparison import compare
@@ -131,8 +136,8 @@ def test_tests_that_never_began_have_no_outcome_and_are_skipped(tmp_path: Path) 
 
 
 def test_a_test_that_ran_in_one_report_was_not_left_out_of_the_joined_one() -> None:
-    ran = results.Results([replace(OUTCOME, slug=NOT_RUN.slug)], results.NO_CIRCUMSTANCES)
-    left = results.Results([], results.Circumstances(not_run=(NOT_RUN, replace(NOT_RUN, slug="c"))))
+    ran = GivenReport(Path(), [replace(OUTCOME, slug=NOT_RUN.slug)], results.NO_CIRCUMSTANCES)
+    left = GivenReport(Path(), [], results.Circumstances(not_run=(NOT_RUN, replace(NOT_RUN, slug="c"))))
     assert [test.slug for test in results.joined([ran, left, left]).not_run] == ["c"]
 
 
@@ -155,8 +160,17 @@ def test_results_and_page_say_of_which_run_they_are(tmp_path: Path) -> None:
 
 
 def test_joined_results_are_of_all_runs_each_once() -> None:
-    one, other = (results.Results([], results.Circumstances((run,))) for run in (RUN, replace(RUN, host="b")))
+    one, other = (GivenReport(Path(), [], results.Circumstances((run,))) for run in (RUN, replace(RUN, host="b")))
     assert [run.host for run in results.joined([one, other, one]).runs] == ["a-<host>", "b"]
+
+
+def test_cases_are_counted_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the time of thousands of tests goes into that."""
+    counted: list[int] = []
+    count = TestSuite.update_statistics
+    monkeypatch.setattr(TestSuite, "update_statistics", lambda suite: counted.append(len(suite)) or count(suite))
+    write_summaries(tmp_path, [replace(OUTCOME, slug=f"test-{n}") for n in range(9)])
+    assert set(counted) == {9} and len(counted) <= 2
 
 
 WHOLE = replace(
@@ -200,3 +214,47 @@ def test_an_almost_known_key_of_results_is_told(tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text(results.to_json([WHOLE]).replace('"notes"', '"nots"'))
     with pytest.raises(results.ResultsError, match=r"\$\.tests\[0\]: unknown key 'nots'; did you mean 'notes'\?"):
         results.read_results(tmp_path / "results.json")
+
+
+@pytest.mark.parametrize(
+    ("tests", "said"),
+    [
+        ([0, 1, 2], "($.tests[0]: 0 is not of type 'object'; $.tests[1]: 1 is not of type 'object'; "
+         "$.tests[2]: 2 is not of type 'object')"),
+        ([{"slug": 1, "more": 1}, *[0] * 400_000],
+         "($.tests[0]: unknown key 'more'; $.tests[0]: 'name' is a required property; "
+         "$.tests[0]: 'level' is a required property; and at least 997 more)"),
+        ({str(n): n for n in range(100_000)}, "is not of type 'array'"),
+    ],
+)  # fmt: skip
+def test_the_first_problems_are_told_and_how_many_more(tmp_path: Path, tests: object, said: str) -> None:
+    (tmp_path / "results.json").write_text(json.dumps({"dodo": "results", "version": 1, "tests": tests}))
+    with pytest.raises(results.ResultsError) as caught:
+        results.read_results(tmp_path / "results.json")
+    assert said in str(caught.value) or str(caught.value).startswith(
+        f"{tmp_path}/results.json: not results of DoDo ($.t"
+    )
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.thorough
+def test_what_is_taken_without_the_schema_is_what_it_accepts(tmp_path: Path) -> None:
+    """Each value of a whole file by each of other kinds, and without each key."""
+    schema = json.loads((package_data.schemas() / "results.schema.json").read_text())
+    shape, validator = results._checked(schema, schema["$defs"]), jsonschema.Draft202012Validator(schema)
+    document = json.loads(results.to_json([WHOLE], results.Circumstances((RUN,), (NOT_RUN,))))
+    taken = 0
+    for _, inner in list(objects(document)):
+        for key, value in list(inner.items()):
+            for other in (None, True, -1, 0.5, 1001, "A", "x" * 300, [], {}, ["x"], [1], {"x": [1]}):
+                inner[key] = other
+                with contextlib.suppress(msgspec.ValidationError):
+                    msgspec.convert(document, shape)
+                    taken += 1
+                    assert validator.is_valid(document), (key, other)
+            del inner[key]
+            with contextlib.suppress(msgspec.ValidationError):
+                msgspec.convert(document, shape)
+                assert validator.is_valid(document), key
+            inner[key] = value
+    assert taken > 100

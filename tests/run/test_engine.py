@@ -1,6 +1,7 @@
 """One test from set-up to outcome, on a backend that reports given events."""
 
 import asyncio
+import signal
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -495,9 +496,34 @@ def test_the_last_lines_are_those_of_the_service_that_decided() -> None:
     assert found.last_lines == ("cone lost",)
 
 
+@pytest.mark.parametrize(
+    ("code", "how"),
+    [
+        (-signal.SIGSEGV, "was killed by SIGSEGV"),
+        (128 + signal.SIGABRT, "was killed by SIGABRT"),
+        (3, "ended with exit code 3"),
+        (-signal.SIGKILL, "did not end upon SIGTERM and was killed"),
+        *((code, "") for code in (0, -signal.SIGTERM, 128 + signal.SIGTERM)),
+    ],
+)
+def test_how_the_application_ends_is_noted_and_no_verdict(code: int, how: str) -> None:
+    for lockstep, after in ((0.0, "5.0 s"), (60.0, "4.0 s of test time")):
+        begin = [(0.5, Time(4.0, last=True)), *drives()["begin"]]
+        found = outcome(
+            ScriptedBackend(
+                plan(lockstep=lockstep), {**drives(), "begin": begin, "close": [(0.0, Exited("app", code))]}
+            )
+        )
+        told = (f"application service 'app' {how} as the test ended, after {after}",) if how else ()
+        assert (found.outcome, found.notes) == ("passed", told)
+    early = {**drives(), "begin": [(4.0, PASSED), (4.5, Exited("app", code)), (5.0, Exited("track", 0))]}
+    told = (f"application service 'app' {how} when all was judged, after 4.5 s",) if how else ()
+    assert code == -signal.SIGKILL or outcome(ScriptedBackend(plan(), early)).notes == told
+
+
 def test_losses_and_notes_count_until_teardown_has_ended_and_nothing_else_does() -> None:
     late: Events = [
-        (0.0, event) for event in (Overrun("camera", 30), Noted("a file is missing"), FAILED, Exited("app", 1))
+        (0.0, event) for event in (Overrun("camera", 30), Noted("a file is missing"), FAILED, Exited("camera", 1))
     ]
     stages = {**drives(), "close": late}
     stages["begin"] = [(0.5, Overrun("camera", 7)), (0.6, Overrun("track", 1)), *stages["begin"]]

@@ -16,7 +16,7 @@ from tests.run.scripted import plan
 
 LINE = {
     "when": 1, "spec": "s", "test": "t", "level": "sil", "backend": "process", "clock": "realtime",
-    "outcome": "passed", "setup_s": 1.0, "execution_s": 2.0,
+    "outcome": "passed", "setup_s": 1.0, "execution_s": 2.0, "repository": history._repository(),
 }  # fmt: skip
 
 
@@ -65,6 +65,18 @@ def test_the_most_cores_that_the_latest_runs_used(tmp_path: Path) -> None:
     found.save()
     assert History(path).cores("a/a.dodo.yml", "a", "process", "realtime") == 0.6
     assert found.cores("a/a.dodo.yml", "a", "process", "lockstep") is None
+
+
+def test_a_test_of_another_repository_is_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number, name in enumerate(("one", "other", "one/below")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name.partition("/")[0] / ".git").mkdir(exist_ok=True)
+        monkeypatch.chdir(tmp_path / name)
+        found = History(tmp_path / "history.jsonl")
+        assert found.seconds("a/a.dodo.yml", "a", "process", "realtime") == (3.0 if number == 2 else None)
+        assert len(found.times([("a/a.dodo.yml", "a")], "process")) == (number == 2)
+        found.add([took(1.0, 2.0)])
+        found.save()
 
 
 def test_times_are_apart_by_clock() -> None:

@@ -35,3 +35,10 @@ def refusal(module: str, *flags: str) -> str:
 def hand(service: Any, name: str, time: int = 0, sender_stamp: int | None = None, **fields: Any) -> None:
     """Give a service a message, as its loop does."""
     service.inputs[name, sender_stamp](MESSAGES.type(name)(**fields), time)
+
+
+def hide(service: Any, due: int, until: int, number: int = 0, sampled: int = 0, sampled_until: int = 0) -> None:
+    """Tell an evaluator of a frame that was due, in us of the test, and not shown, and until when nothing is."""
+    sampled, sampled_until = sampled or due, sampled_until or until
+    fields = {"number": number, "sampled": sampled, "sampledUntil": sampled_until, "dueUntil": until}
+    service.not_shown(MESSAGES.type("dodo.NotShown")(**fields), due)

@@ -58,7 +58,7 @@ REFUSED = [
     (parameter("string", choices=("a", "b")), "c", "wrong-value", "parameter 'p' is 'c', expected one of a, b"),
     (parameter("boolean"), "yes", "wrong-type", "parameter 'p' is 'yes', expected true or false"),
     (parameter("memory"), "a/b", "wrong-value", MEMORY),
-    (parameter("message"), "C", "wrong-value", "parameter 'p' is 'C', expected a message's full name"),
+    (parameter("message"), "a.", "wrong-value", "parameter 'p' is 'a.', expected a message's full name"),
     (
         parameter("list", of="integer"),
         "[0, 1.5]",

@@ -107,6 +107,8 @@ CAR = [
     [(-0.06, -0.06, 0.11), (0.06, -0.06, 0.11), (0.06, 0.16, 0.11), (-0.06, 0.16, 0.11)],
 ]
 """The lower and the upper corners of a car in m; its front is at -y, as that of all models at frames."""
+YELLOW, BLUE = [0.8, 0.69, 0.13], [0.11, 0.16, 0.32]
+"""Colours of cones, as those of real ones in pictures of a Kiwi car; docs/reference/maps.md has what was measured."""
 BOARD = {
     "yellow": [(0.30, 0.172), (0.36, 0.07), (0.52, 0.13), (0.56, -0.05)],
     "blue": [(0.30, -0.08), (0.42, 0.072), (0.44, -0.18), (0.58, 0.04)],
@@ -156,8 +158,8 @@ def wall(name: str, places: list[Point]) -> dict[str, object]:
 
 def cones(yellow: list[Point], blue: list[Point]) -> list[dict[str, object]]:
     return [
-        model("cone_yellow", "cone.obj", [1.0, 0.85, 0.0], yellow),
-        model("cone_blue", "cone.obj", [0.0, 0.15, 0.9], blue),
+        model("cone_yellow", "cone.obj", YELLOW, yellow),
+        model("cone_blue", "cone.obj", BLUE, blue),
     ]
 
 

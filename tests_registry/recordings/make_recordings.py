@@ -136,7 +136,7 @@ class Driver:
 
 def drive(recorded: Recorded) -> None:
     """The car on the Kiwi track; the driver looks with each frame."""
-    vehicle, driver = Vehicle(VEHICLE_HZ), Driver("kiwi-track")
+    vehicle, driver = Vehicle(), Driver("kiwi-track")
     body = Integrator(BodyPose((0.0, 0.0, 0.0), quaternion(0.0, 0.0, math.pi / 2)))
     eye = camera(recorded, "kiwi-track", ORDINARY)
     for now, is_picture in ticks(DRIVE_S):

@@ -47,12 +47,11 @@ def written(nodes: Collection[Node]) -> Iterator[Diagnostic]:
                 yield _open(replace(part.span, length=0), kind)
 
 
-def in_files(files: Collection[Path]) -> Iterator[Diagnostic]:
-    """The same of files of ``env_file``."""
-    for file in files:
-        for name, value in variables_of(file).items():
-            if kind := secret_variables.secret_kind(value):
-                yield _open(_place(file, name), kind)
+def in_file(file: Path, raw: bool) -> Iterator[Diagnostic]:
+    """The same of a file of ``env_file``."""
+    for name, value in variables_of(file, raw=raw).items():
+        if kind := secret_variables.secret_kind(value or ""):
+            yield _open(_place(file, name), kind)
 
 
 def _open(span: Span, kind: str) -> Diagnostic:

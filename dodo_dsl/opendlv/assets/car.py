@@ -51,18 +51,6 @@ class Car:
     slip_speed: float = 0.1
     """m/s; the tyres carry sideways only above this speed"""
 
-    def stable_above(self, rate: float) -> float:
-        """The speed in m/s above which Euler's steps at ``rate`` (Hz) are stable.
-
-        Sideways motion decays at w/v, where w is the larger eigenvalue of the tyres' damping; steps of dt need
-        dt w/v < 2.
-        """
-        a = (self.cornering_front + self.cornering_rear) / self.mass
-        d = (self.front**2 * self.cornering_front + self.rear**2 * self.cornering_rear) / self.inertia
-        moment = self.front * self.cornering_front - self.rear * self.cornering_rear
-        root = math.sqrt((a - d) ** 2 / 4 + moment**2 / (self.mass * self.inertia))
-        return ((a + d) / 2 + root) / (2 * rate)
-
 
 MOST_BYTES = 1 << 20
 KIWI = Car()

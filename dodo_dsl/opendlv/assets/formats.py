@@ -59,14 +59,14 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
     yield from found
     if read is None:
         return
-    meshes = dict.fromkeys(model.file for model in read.models)
     paints = [*(model.paint for model in read.models), *(block.paint for block in read.blocks)]
-    for file in meshes:
+    for file, is_plain in dict.fromkeys((model.file, model.paint is None) for model in read.models):
         try:
             pointer = _pointer(file)
             yield from pointer
             if not pointer:
-                mesh_text.check(file, read_bytes(file))
+                mesh = mesh_text.read(file)
+                paints += mesh_text.paints(file, mesh, read.path.parent) if is_plain else ()
         except MapError as error:
             yield error
     for paint in dict.fromkeys((*paints, *(overlay.file for overlay in read.overlays))):

@@ -39,11 +39,14 @@ class Instance:
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """An OBJ file, its paint, and where copies of it stand; one more is at the frame of each sender stamp."""
+    """An OBJ file, its paint, and where copies of it stand; one more is at the frame of each sender stamp.
+
+    Without paint it has the materials of its file.
+    """
 
     name: str
     file: Path
-    paint: Paint
+    paint: Paint | None
     instances: tuple[Instance, ...]
     frames: tuple[int, ...] = ()
 
@@ -129,7 +132,9 @@ def _model(node: Node) -> ModelEntry | None:
     if not instances and not frames:
         return None
     file = node.required("file").resource()
-    return ModelEntry(node.required("name").text(), file, _paint(node), instances, frames)
+    has_materials = not (_has(node, "color") or _has(node, "textureFile")) and b"usemtl" in read_bytes(file)
+    paint = None if has_materials else _paint(node)
+    return ModelEntry(node.required("name").text(), file, paint, instances, frames)
 
 
 def _positive(node: Node, names: str) -> tuple[float, ...]:

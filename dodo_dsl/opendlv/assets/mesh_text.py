@@ -1,10 +1,12 @@
-"""What the text alone of an OBJ file shows: before a library loads it, and without one."""
+"""OBJ files: their faces, and the materials of these, in one plain reader for the compiler and the services."""
 
 import functools
 import itertools
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from dodo_dsl.opendlv.assets.json_file import MapError, read_bytes
 
@@ -13,53 +15,87 @@ MAX_TRIANGLES = 50_000
 MAX_VERTICES = 4 * MAX_TRIANGLES
 FARTHEST = 1e5
 _FACE, _VERTEX = (re.compile(rb"^[ \t]*%b[ \t]" % letter, re.MULTILINE) for letter in (b"f", b"v"))
-_RELATIVE_FACE = re.compile(rb"^\s*f\s[^#\n]*-\d", re.MULTILINE)
-_CONTINUED = b"\\\n"
+_BOM, _CONTINUED = b"\xef\xbb\xbf", b"\\"
 _THREE = 3
 
 Vertex = tuple[float, ...]
-Problem = tuple[int, str, str]
-"""The line from 1, 0 for the whole file; what is wrong; and a hint."""
+Triangle = tuple[int, int, int]
 
 
 class _Wrong(Exception):
-    """Carries a Problem."""
+    """Carries the line from 1, 0 for the whole file, what is wrong, and a hint."""
 
 
-def check(path: Path, data: bytes) -> None:
-    """Raises MapError for a file that is not a mesh, or unfolds to more than a mesh may have."""
-    problem = problem_of(data)
-    if problem is not None:
-        line, what, hint = problem
-        raise MapError(path, what, line=line, hint=hint)
+class Face(NamedTuple):
+    """A polygon: its vertices and texture coordinates by their numbers from 0, and its material.
+
+    Corners without texture coordinates have none.
+    """
+
+    line: int
+    corners: list[int]
+    spots: list[int]
+    material: bytes
+
+
+@dataclass
+class Mesh:
+    """What an OBJ file holds: vertices in m, texture coordinates as written, faces, and files of materials by line."""
+
+    vertices: list[Vertex] = field(default_factory=list)
+    spots: list[list[bytes]] = field(default_factory=list)
+    faces: list[Face] = field(default_factory=list)
+    libraries: list[tuple[int, bytes]] = field(default_factory=list)
+
+    def triangles(self) -> tuple[list[Triangle], list[int]]:
+        """Each with the number of its face; where all faces are quads their first halves come before the others."""
+        found: list[tuple[Triangle, int]] = []
+        for number, face in enumerate(self.faces):
+            a, b, c, *more = face.corners
+            if len(more) == 1:
+                found += [((a, b, c), number), ((c, more[0], a), number)]
+            else:
+                found += [((a, second, third), number) for second, third in itertools.pairwise(face.corners[1:])]
+        if all(len(face.corners) == _THREE + 1 for face in self.faces):
+            found = [*found[::2], *found[1::2]]
+        return [triangle for triangle, _ in found], [number for _, number in found]
+
+
+def read(path: Path) -> Mesh:
+    """An OBJ file; raises MapError for one that is not a mesh, or has more than a mesh may have."""
+    try:
+        return _mesh(read_bytes(path))
+    except _Wrong as wrong:
+        line, what, hint = wrong.args
+        raise MapError(path, what, line=line, hint=hint) from None
 
 
 @functools.lru_cache(maxsize=4)
-def problem_of(data: bytes) -> Problem | None:
-    """The first problem of an OBJ file's text."""
+def _mesh(data: bytes) -> Mesh:
+    """Raises _Wrong."""
     if len(data) > MAX_BYTES:
-        return 0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}", ""
+        raise _Wrong(0, f"the OBJ file has {len(data)} bytes, expected at most {MAX_BYTES}", "")
     for pattern, what, most in ((_FACE, "triangles", MAX_TRIANGLES), (_VERTEX, "vertices", MAX_VERTICES)):
         count = sum(1 for _ in pattern.finditer(data))
         if count > most:
-            return 0, f"{count} {what}, expected at most {most}", "save a simpler mesh"
-    found = _RELATIVE_FACE.search(data)
-    if found:
-        line = data.count(b"\n", 0, data.index(b"f", found.start())) + 1
-        return line, "faces count vertices by negative numbers, expected positive ones", "save the mesh again"
-    if _CONTINUED in data:
-        return None
-    try:
-        _read(data)
-    except _Wrong as wrong:
-        line, what, hint = wrong.args
-        return line, what, hint
-    return None
+            raise _Wrong(0, f"{count} {what}, expected at most {most}", "save a simpler mesh")
+    mesh = _parsed(data)
+    triangles, _ = mesh.triangles()
+    if not triangles:
+        hint = "save the mesh as Wavefront OBJ with its faces, lines that begin with f"
+        raise _Wrong(0, "the OBJ file has no faces", hint)
+    if len(triangles) > MAX_TRIANGLES:
+        raise _Wrong(0, f"{len(triangles)} triangles, expected at most {MAX_TRIANGLES}", "save a simpler mesh")
+    if not any(_has_area([mesh.vertices[corner] for corner in each]) for each in triangles):
+        raise _Wrong(0, "no face of the OBJ file has an area", "save the mesh again: all its triangles are lines")
+    return mesh
 
 
 def outline(path: Path) -> list[tuple[float, float]]:
     """The convex outline of an OBJ file's faces from above, counter-clockwise in m; raises MapError."""
-    points = sorted({(x, y) for x, y, *_ in _corners(path)})
+    mesh = read(path)
+    used = {corner for face in mesh.faces for corner in face.corners}
+    points = sorted({(x, y) for x, y, *_ in (mesh.vertices[corner] for corner in used)})
     return [*_lower_half(points), *_lower_half(points[::-1])]
 
 
@@ -77,36 +113,38 @@ def _turn(a: Vertex, b: Vertex, c: Vertex) -> float:
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 
-def _corners(path: Path) -> list[Vertex]:
-    """The positions (x, y, z) of the vertices that an OBJ file's faces have, each once; raises MapError."""
-    data = read_bytes(path)
-    check(path, data)
-    try:
-        vertices, faces = _parsed(data.replace(_CONTINUED, b" "))
-        used = {corner for face in faces for corner in face}
-    except _Wrong as wrong:
-        line, what, hint = wrong.args
-        raise MapError(path, what, line=line, hint=hint) from None
-    return [vertices[corner] for corner in sorted(used)]
+def _lines(data: bytes) -> Iterator[tuple[int, list[bytes]]]:
+    """The words of each line that has some, with its number from 1; after a backslash a line goes on."""
+    start, words = 0, list[bytes]()
+    for number, line in enumerate(
+        data.removeprefix(_BOM).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n"), 1
+    ):
+        is_open = line.endswith(_CONTINUED)
+        start, words = start or number, words + line.removesuffix(_CONTINUED).split()
+        if words and not is_open:
+            yield start, words
+        start, words = (start, words) if is_open else (0, [])
+    if words:
+        yield start, words
 
 
-def _parsed(data: bytes) -> tuple[list[Vertex], Iterator[list[int]]]:
-    """The vertices, and the corners of each face."""
-    lines = [(number, line.split()) for number, line in enumerate(data.split(b"\n"), 1) if line.strip()]
-    vertices = [_vertex(number, words) for number, words in lines if words[0] == b"v"]
-    return vertices, (_face(number, words, len(vertices)) for number, words in lines if words[0] == b"f")
-
-
-def _read(data: bytes) -> None:
-    vertices, faces = _parsed(data)
-    count, has_area = 0, False
-    for face in faces:
-        count += 1
-        has_area = has_area or any(_has_area([vertices[corner] for corner in part]) for part in _fan(face))
-    if not count:
-        raise _Wrong(0, "the OBJ file has no faces", "save the mesh with its faces, lines that begin with f")
-    if not has_area:
-        raise _Wrong(0, "no face of the OBJ file has an area", "save the mesh again: all its triangles are lines")
+def _parsed(data: bytes) -> Mesh:
+    """Raises _Wrong."""
+    mesh, material, faces = Mesh(), b"", list[tuple[int, list[bytes], bytes, int, int]]()
+    for number, words in _lines(data):
+        if words[0] == b"v":
+            mesh.vertices.append(_vertex(number, words))
+        elif words[0] == b"vt":
+            mesh.spots.append(words[1:_THREE])
+        elif words[0] == b"f":
+            faces.append((number, words, material, len(mesh.vertices), len(mesh.spots)))
+        elif words[0] == b"usemtl":
+            material = b" ".join(words[1:])
+        elif words[0] == b"mtllib":
+            mesh.libraries.append((number, b" ".join(words[1:])))
+    for number, words, material, *before in faces:
+        mesh.faces.append(_face(number, words, material, mesh, before))
+    return mesh
 
 
 def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
@@ -127,29 +165,29 @@ def _vertex(number: int, words: Sequence[bytes]) -> Vertex:
     return place
 
 
-def _face(number: int, words: Sequence[bytes], count: int) -> list[int]:
-    """The indices of the corners, from 0."""
+def _face(number: int, words: Sequence[bytes], material: bytes, mesh: Mesh, before: Sequence[int]) -> Face:
+    """Vertices and texture coordinates count from 1, or backwards from those ``before`` the face, from -1."""
     ends = next((at for at, word in enumerate(words) if word.startswith(b"#")), len(words))
     try:
-        corners = [int(word.partition(b"/")[0]) for word in words[1:ends]]
+        parts = [word.split(b"/") for word in words[1:ends]]
+        corners = [int(part[0]) for part in parts]
+        spots = [int(part[1]) for part in parts if len(part) > 1 and part[1]]
     except ValueError:
         corners = []
     if len(corners) < _THREE:
         hint = "for example 'f 1 2 3', the numbers of its vertices from 1"
         raise _Wrong(number, f"'{_text(words)}' is not a face, expected f and three or more vertices", hint)
-    outside = next((corner for corner in corners if not 0 < corner <= count), None)
+    count = len(mesh.vertices)
+    numbers = zip((corners, spots), before, strict=True)
+    counted, spots = ([n + so_far + 1 if n < 0 else n for n in each] for each, so_far in numbers)
+    outside = next((n for n, each in zip(corners, counted, strict=True) if not 0 < each <= count), None)
     if outside is not None:
         raise _Wrong(number, f"the face has vertex {outside}, expected 1 to {count}", "save the whole mesh again")
-    return [corner - 1 for corner in corners]
+    return Face(number, [each - 1 for each in counted], [each - 1 for each in spots if each > 0], material)
 
 
 def _text(words: Sequence[bytes]) -> str:
     return b" ".join(words).decode("ascii", "replace")[:40]
-
-
-def _fan(corners: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    for second, third in itertools.pairwise(corners[1:]):
-        yield corners[0], second, third
 
 
 def _has_area(corners: Sequence[Vertex]) -> bool:
@@ -160,3 +198,59 @@ def _has_area(corners: Sequence[Vertex]) -> bool:
     pairs = ((a, b), (b, c), (c, a))
     longest = max(sum((p - q) ** 2 for p, q in zip(*pair, strict=True)) for pair in pairs)
     return bool(doubled > 1e-6 * longest)
+
+
+Paint = tuple[float, float, float] | Path
+"""A colour as r, g, b from 0 to 1, or the file of a texture."""
+_OPTION = re.compile(rb"-[a-z]+|on|off|[-+]?[0-9.]+|[rgbmlz]|sphere|cube_[a-z]+")
+"""What may stand before the file of a texture."""
+
+
+def paints(path: Path, mesh: Mesh, folder: Path) -> list[Paint]:
+    """What each face is painted with by its material, of files in the map's ``folder``; raises MapError."""
+    known: dict[bytes, Paint | None] = {}
+    for line, names in mesh.libraries:
+        for name in [names] if (path.parent / _name(names)).is_file() else names.split():
+            known.update(_materials(_inside(folder, path, line, name), folder))
+    hint = "the file that mtllib names lacks it" if mesh.libraries else "name the file of its materials with mtllib"
+    for face in mesh.faces:
+        if known.get(face.material) is None:
+            what = f"material '{_text([face.material])}' has no colour" if face.material else "the face has no material"
+            raise MapError(path, f"{what}, and the map gives the model none", line=face.line, hint=hint)
+    return [paint for face in mesh.faces if (paint := known[face.material]) is not None]
+
+
+def _name(name: bytes) -> str:
+    return name.decode(errors="replace").replace("\\", "/").replace("\0", "")[:250]
+
+
+def _inside(folder: Path, file: Path, line: int, name: bytes) -> Path:
+    """The file that another file names relative to itself."""
+    found = (file.parent / _name(name)).resolve()
+    if not found.is_relative_to(folder.resolve()):
+        hint = "copy it there: the map's folder goes with the test"
+        raise MapError(file, f"'{_name(name)}' is not a file inside the map's folder", line=line, hint=hint)
+    if not found.is_file():
+        raise MapError(file, f"there is no file '{_name(name)}'", line=line, hint="put it into the map's folder")
+    return found
+
+
+def _materials(file: Path, folder: Path) -> Iterator[tuple[bytes, Paint | None]]:
+    """The materials of an MTL file: a texture (map_Kd), the colour without one (Kd), or None; raises MapError."""
+    name, is_texture = b"", False
+    for line, words in _lines(read_bytes(file)):
+        key = words[0].lower()
+        if key == b"newmtl":
+            name, is_texture = b" ".join(words[1:]), False
+            yield name, None
+        elif key == b"map_kd":
+            is_texture = True
+            texture = itertools.dropwhile(_OPTION.fullmatch, words[1:])
+            yield name, _inside(folder, file, line, b" ".join(texture))
+        elif key == b"kd" and not is_texture:
+            try:
+                red, green, blue = (min(max(0.0, float(word)), 1.0) for word in words[1:4])
+            except ValueError:
+                what = f"'{_text(words)}' is not a colour, expected Kd and three numbers from 0 to 1"
+                raise MapError(file, what, line=line, hint="for example 'Kd 1 0.85 0'") from None
+            yield name, (red, green, blue)

@@ -2,6 +2,7 @@
 
 import functools
 import io
+import itertools
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -64,6 +65,16 @@ def picture_size(path: Path, message: int, sender: int) -> tuple[int, int]:
                 picture = first_message(body, _PAYLOAD_FIELD)
                 return first_number(picture, _WIDTH_FIELD), first_number(picture, _HEIGHT_FIELD)
     return 0, 0
+
+
+def count(path: Path, message: int, sender: int, most: int) -> int | None:
+    """How many messages of a sender there are, up to so many; None if that is not known, and raises OSError."""
+    with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
+        looked = LookedThrough(os.fstat(stream.fileno()).st_size)
+        bodies = _bodies(stream, looked)
+        found = (1 for body in bodies if _type(body) == message and first_number(body, _STAMP_FIELD) == sender)
+        number = sum(itertools.islice(found, most))
+    return number if number == most or looked.is_whole else None
 
 
 def _end(data: bytes) -> int:

@@ -68,6 +68,12 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
     return {keys[number]: found for number, found in boxes.items()}
 
 
+def size(path: Path) -> tuple[int, int]:
+    """Width and height in pixels of the only image of a file that was read."""
+    (image,) = _document(path)["images"]
+    return image["width"], image["height"]
+
+
 def corners(path: Path) -> Iterator[TruthFileError]:
     """The first box that ends far outside its image, as one does that is written as two corners; the file is read."""
     document = _document(path)

@@ -124,6 +124,7 @@ def _planned(service: ComposeService, cid: int, application: ApplicationSource) 
         if name in variables or name in service.cid_variables:
             variables[name] = str(cid)
     process, own = raw.get("x-dodo-process"), service.declared
+    command = opendlv_flags.arguments(list(map(str, process or ())), command)
     words = (*(process or ()), *command)
     return ApplicationService(
         name=service.name,
@@ -133,6 +134,7 @@ def _planned(service: ComposeService, cid: int, application: ApplicationSource) 
         takes_cid=opendlv_flags.takes_cid((*words, *(v for v in variables.values() if v)), variables),
         takes_memory=opendlv_flags.takes_memory(words),
         env_files=tuple(file.path for file in service.env_files),
+        raw_files=tuple(file.path for file in service.env_files if file.raw),
         inputs=_names(own.inputs) if own else (),
         outputs=_names(own.outputs) if own else (),
         after=(after := _after(raw, application)),

@@ -12,7 +12,7 @@ import numpy as np
 from dodo_dsl import log_times
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.report.viewer.encoded import shown
-from dodo_dsl.report.viewer.recorded import MICROSECONDS, RecordedTest
+from dodo_dsl.report.viewer.recorded import FAR, MICROSECONDS, RecordedTest
 
 MOST_LINES = 4000
 """Of all logs together; of more, those of the middle are left out."""
@@ -42,6 +42,10 @@ class LogLine(NamedTuple):
 def merged(folder: Path, test: RecordedTest) -> dict[str, Any]:
     """All lines below ``folder``, the logs of a test: ``services`` by name, and how many lines were ``left``out."""
     lines = [line for log in sorted(folder.glob("*.log")) for line in _lines(log, test)]
+    timed = [line.time for line in lines if line.time is not None]
+    if min(map(abs, timed), default=0.0) > FAR:  # no message has both clocks; a test begins once all are ready
+        begin = max((each.time for each in lines if each.level == READY and each.time), default=min(timed))
+        lines = [line._replace(time=line.time and line.time - begin) for line in lines]
     lines.sort(key=lambda line: float("inf") if line.time is None else line.time)
     left = max(len(lines) - MOST_LINES, 0)
     if left:
@@ -99,9 +103,9 @@ def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:
 
 
 def _test_times(walls: Sequence[int], test: RecordedTest) -> list[float]:
-    """Times of the machine in the test's: within a test as messages show it, else by the machine's clock."""
+    """Times of the machine in the test's: within a test as messages show it, else by its clock, or beyond ``FAR``."""
     if not len(test.walls):
-        return [(wall - test.begin) / MICROSECONDS if test.begin else 0.0 for wall in walls]
+        return [(wall - test.begin) / MICROSECONDS for wall in walls]
     arrived = np.array(walls, np.float64)
     inside = np.where(arrived > test.walls[-1], test.duration, np.interp(arrived, test.walls, test.moments))
     before = (arrived - test.walls[0]) / MICROSECONDS

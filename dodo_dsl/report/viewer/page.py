@@ -166,7 +166,6 @@ def document(folder: Path, outcome: Outcome, plan: Plan, compiled: Path) -> dict
         "version": VERSION,
         "test": _facts(outcome),
         "duration": test.duration,
-        "isRecorded": bool(test.channels),
         "moment": dataclasses.asdict(moment.decisive(outcome, test.duration)),
         "checks": list(checks(plan, outcome, SpecLines(), record.parameters)),
         "scene": scene(plan, compiled, record.way or Way()),
@@ -220,7 +219,7 @@ def _sources() -> Path:
 
 def _messages(plan: Plan, compiled: Path) -> MessageSet:
     try:
-        return MessageSet.load(*(compiled / FILES / path for path in plan.messages))
+        return MessageSet.load(*(compiled / FILES / path for path in plan.messages), kept=MessageSet.standard().names())
     except OdvdError:
         return MessageSet.standard()
 

@@ -19,7 +19,7 @@ MICROSECONDS = 1_000_000
 MOST_SAMPLES = 20_000
 """Samples of one channel that are read; of more, every second, third and so on."""
 MOST_CHANNELS = 200
-_FAR = 86_400.0
+FAR = 86_400.0
 """s from the start of the test, beyond which a time is of another clock."""
 PICTURES = "opendlv.proxy.ImageReading"
 """Whose data is not read here."""
@@ -77,7 +77,7 @@ def read(path: Path, messages: MessageSet) -> RecordedTest:
         else:
             return RecordedTest()
         seconds = (times - begin) / MICROSECONDS
-        rows = rows[np.abs(seconds) < _FAR]
+        rows = rows[np.abs(seconds) < FAR]
         clock = _Clock(begin)
         channels = list(_channels(recording, messages, rows, clock))
         ends = seconds[recording.rows({messages.id(_END)})]
@@ -108,9 +108,9 @@ class _Clock:
         if not self._walls:
             return np.empty(0), np.empty(0)
         walls, moments = np.concatenate(self._walls), np.concatenate(self._moments)
-        known = (walls > 0) & (np.abs(walls - self._begin) > _FAR * MICROSECONDS)
+        known = (walls > 0) & (np.abs(walls - self._begin) > FAR * MICROSECONDS)
         if not known.any():  # in real time both are one; in lockstep departures may be the test's, too
-            return np.array([self._begin, self._begin + _FAR * MICROSECONDS]), np.array([0.0, _FAR])
+            return np.array([self._begin, self._begin + FAR * MICROSECONDS]), np.array([0.0, FAR])
         walls, moments = walls[known], moments[known]
         order = np.argsort(walls, kind="stable")
         walls, moments = walls[order], np.maximum.accumulate(moments[order])

@@ -90,6 +90,7 @@ class DockerBackend:
         self._addresses: dict[str, Address] = {}
         """Where services of the test hear what the bus must not carry."""
         self._out_of_memory: set[str] = set()
+        self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
         self._watch = EventWatch(self._take, lambda why: self._events.put_nowait(Lost(why)))
         self._copied, self._copy_problem = asyncio.Event(), ""
@@ -163,7 +164,11 @@ class DockerBackend:
                     )
 
     def _take(self, name: str, action: str, attributes: Mapping[str, str]) -> None:
-        if action == "oom":
+        if self._is_closing:
+            code = int(attributes.get("exitCode", 0)) if action == "die" else 0
+            if code > 128 and code != _KILLED:  # process 1 may not hear SIGTERM, and miss a world that has ended
+                self._events.put_nowait(Exited(name, code))
+        elif action == "oom":
             self._take_memory_kill(name)
         elif name == FILES:
             self._take_of_copies(action)
@@ -389,7 +394,7 @@ class DockerBackend:
         return await asyncio.to_thread(self._processes.first, names)
 
     async def close(self, keep: bool) -> list[str]:
-        self._watch.ignores = True
+        self._is_closing = True
         for turn in self._turns:
             turn.cancel()
         await asyncio.gather(*self._turns, return_exceptions=True)

@@ -8,7 +8,6 @@ import asyncio
 import contextlib
 import json
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -124,20 +123,12 @@ class Compose:
         if code and _NO_COMPOSE in problem and (await self._run("version"))[0]:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
         if code:
-            why = f"{traced(self.plan, problem)}{self._of_env_file(problem)}"
-            raise BackendError(f"docker compose rejects the compiled test: {why}")
+            raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         config = compose_paths.unescaped(json.loads(out))
         self._refuse(compiled_findings(config, self._test))
         self._refuse(_unseen(config, hidden_paths(self.plan.application, self.folder, self.report)))
         self._secrets = config.get("secrets") or {}
         self._take(config)
-
-    def _of_env_file(self, problem: str) -> str:
-        """The files of variables that a problem with a line may be of, as compose does not name them."""
-        files = sorted({path for service in self.plan.application.services for path in service.env_files})
-        if not files or not re.search(r"\bline \d+", problem) or any(name in problem for name in files):
-            return ""
-        return f"; the line may be of an env_file: {', '.join(files)}"
 
     def _take(self, config: dict[str, Any]) -> None:
         """Keeps what the engine is asked for of the test as ``docker compose config`` shows it."""

@@ -21,7 +21,8 @@ from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.process import host_isolation
 from dodo_dsl.run.process.slot import new_key
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.session import attended, is_real, refuse_hardware
+from dodo_dsl.run.rigs.permission import refuse_unattended
+from dodo_dsl.run.rigs.session import attended
 from dodo_dsl.spec.rig import CAMERA_SOURCE, RPICAM
 
 _FLAG = CAMERA_SOURCE.rpartition(".")[2]
@@ -73,7 +74,7 @@ class Containers:
         plan, key = job.plan, new_key()
         refuse_rpicam(plan)
         with self.project(DockerBackend, job, say, key) as backend:
-            if plan.isolation == "network" and not is_real(plan):
+            if plan.isolation == "network" and not plan.is_real:
                 yield backend
             else:
                 async with (
@@ -88,7 +89,7 @@ class Containers:
         if self._client is None or self._pulls is None:
             raise BackendError(self._problem)
         plan = job.plan
-        refuse_hardware(plan)
+        refuse_unattended(plan)
         project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
         lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"

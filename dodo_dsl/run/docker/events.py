@@ -18,7 +18,7 @@ from dodo_dsl.run.protocol import BackendError
 class EventWatch:
     """Calls ``on_event`` with a service's name, action and attributes, and ``on_lost`` with the reason at the end.
 
-    Both are called in the event loop of the creator, and not after ``ignores`` was set, as during teardown.
+    Both are called in the event loop of the creator, and not after ``ignores`` was set.
     """
 
     def __init__(self, on_event: Callable[[str, str, Mapping[str, str]], None], on_lost: Callable[[str], None]) -> None:

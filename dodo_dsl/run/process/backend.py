@@ -87,6 +87,7 @@ class ProcessBackend:
         self._time_ready: asyncio.Event | None = None
         """Set when what gives the application the test's time is ready, or has ended."""
         self._has_time = False
+        self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
         self._sandbox = SandboxClient(
@@ -121,8 +122,7 @@ class ProcessBackend:
             for what in asked:
                 self._asked.pop(what).set_result(message[what])
         elif "exited" in message:
-            task = asyncio.ensure_future(self._exited(**message))
-            task.add_done_callback(lambda t: t.exception())
+            self._exits.append(asyncio.ensure_future(self._exited(**message)))
 
     async def _exited(self, exited: str, code: int, used: int, failed: bool) -> None:
         """Reports an exit after the last output has been read, so that no verdict follows it."""
@@ -372,6 +372,7 @@ class ProcessBackend:
         await self._sandbox.close()
         for output in self._outputs.values():
             output.close()
+        await asyncio.gather(*self._exits, return_exceptions=True)
         log = self.report / LOG
         if log.is_file() and log.stat().st_size == 0:
             log.unlink(missing_ok=True)

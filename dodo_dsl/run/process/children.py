@@ -219,7 +219,7 @@ class Children:
         With ``owns_namespace`` this process is process 1 of a namespace, and all others of it are its descendants.
         ``wait`` returns after some seconds, or sooner when a child has ended.
         """
-        for child in self._running.values():
+        for child in reversed(self._running.values()):  # the application first: without a world it would fail
             for pid in _within(child.pid) if isinstance(child, ConfinedProcess) else (-child.pid,):
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGTERM)

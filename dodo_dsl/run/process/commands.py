@@ -106,16 +106,20 @@ class Commands:
         cids = {name: str(self.slot.cid) for name in CID_VARIABLES}
         variables = {**own_dotenv(folder, outside), **outside}
         variables.update({name: cid for name, cid in cids.items() if name in self.plan.application.variables})
+        given = {
+            name: variables[name] if value is None else interpolate(value, variables)
+            for name, value in service.environment.items()
+            if value is not None or name in variables
+        }
         own: dict[str, str] = {}
         paths = application_paths(self.plan.application, self.folder)
         for path in service.env_files:
             file = interpolate(path, variables)
             if problem := paths.file_problem(file):
                 raise EnvironmentProblem(f"env_file of '{service.name}': {problem}")
-            own.update(dotenv_file(folder / expanded(file), variables))
-        for name, value in service.environment.items():
-            if value is not None or name in variables:
-                own[name] = variables[name] if value is None else interpolate(value, variables)
+            raw = path in service.raw_files
+            own.update(dotenv_file(folder / expanded(file), {**given, **variables}, own, raw=raw))
+        own.update(given)
         own = {name: cids.get(name, with_cid_text(value, self.slot.cid)) for name, value in own.items()}
         pairs = ((word, interpolate(word, variables)) for word in service.command)
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))

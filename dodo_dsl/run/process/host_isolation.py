@@ -152,8 +152,6 @@ async def host_slot(
             )
         descriptors = *(held_lease.descriptor for held_lease in held), *(claim.fileno() for claim in claims)
         yield Slot(cid, name, "" if alone else name, descriptors)
-    except leases.LeaseTimeout as error:
-        raise BackendError(str(error)) from error
     finally:
         if not keep:
             await asyncio.shield(asyncio.to_thread(end_slot, name))  # before its leases are released

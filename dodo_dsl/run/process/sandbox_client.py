@@ -1,6 +1,7 @@
 """The runner's end of a test's sandbox: starts it and exchanges messages, whose shapes ``sandbox`` documents."""
 
 import asyncio
+import contextlib
 import errno
 import json
 import select
@@ -157,6 +158,9 @@ class SandboxClient:
             loop = asyncio.get_running_loop()
             await loop.run_in_executor(None, end, self._process)
             loop.remove_reader(self._socket)
+            with contextlib.suppress(OSError):
+                while data := self._socket.recv(MAX_MESSAGE):  # how the last of them ended
+                    self._take(json.loads(data))
         if self._socket is not None:
             self._socket.close()
 

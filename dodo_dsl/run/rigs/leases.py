@@ -17,6 +17,7 @@ from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec.machine import MachineError, machine
@@ -126,6 +127,11 @@ def release(held: Sequence[leases.Lease]) -> None:
 def devices_in(words: Iterable[str]) -> list[str]:
     """The hardware that flags ``--name=value`` name."""
     return [value for flag, _, value in (word.partition("=") for word in words) if flag in DEVICE_FLAGS]
+
+
+def devices_of(plan: Plan) -> list[str]:
+    """The hardware that a test's services use."""
+    return devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
 
 
 def device_leases(devices: Sequence[str]) -> list[str]:

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl.plan.model import Plan, PlannedService
-from dodo_dsl.run.rigs.leases import devices_in, identity
+from dodo_dsl.run.rigs.leases import devices_of, identity
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec import machine as operator
 from dodo_dsl.spec.machine import UNITS, PermittedRig
-from dodo_dsl.spec.rig import CIRCLE, EMULATED, EMULATED_RIGS, MEMORY_FLAG, is_simulated
+from dodo_dsl.spec.rig import CIRCLE, EMULATED, MEMORY_FLAG, is_simulated
 
 LIMIT_FLAGS = {
     "x": "range-x",
@@ -201,15 +201,17 @@ def refuse_test(plan: Plan, roots: Sequence[Path]) -> None:
     """The same for a test on a real rig, by the flags of all its services; also where two would open one port."""
     refuse_shared_port(plan)
     words = {flag.name: flag.value for service in plan.services if service.uses == _GANTRY for flag in service.flags}
-    devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
     moves = any(service.uses == _GANTRY for service in plan.services)
-    refuse_forbidden(devices, motion_of(words) if moves else STILL, roots)
+    refuse_forbidden(devices_of(plan), motion_of(words) if moves else STILL, roots)
 
 
 def refuse_unattended(plan: Plan) -> None:
-    """Raises RigProblem for a test that would move hardware without a rig, which nothing leases or checks."""
-    if plan.rig and plan.rig not in EMULATED_RIGS:
+    """Raises RigProblem for a test that needs a rig and has none, or moves hardware that nothing leases or checks."""
+    if plan.is_real:
         return
+    if plan.lacks_rig and not any(service.port for service in plan.services):
+        text = f"the test needs a {plan.rig} rig, and dodo.yml has none: run it with --emulate, or let dodo.yml have an"
+        raise RigProblem(f"{text} emulated one: {{kind: {plan.rig}, emulated: true}} under 'rigs'")
     for service in plan.services:
         port = next((flag.value for flag in service.flags if flag.name == "serial"), EMULATED)
         if service.uses == _GANTRY and not is_simulated(port):

@@ -9,7 +9,7 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job, Say
 from dodo_dsl.run.process.host_isolation import is_claimed
 from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.leases import device_leases, devices_in, quarantined
+from dodo_dsl.run.rigs.leases import device_leases, devices_of, quarantined
 from dodo_dsl.run.rigs.permission import refuse_test
 from dodo_dsl.run.rigs.problems import RigProblem
 
@@ -49,12 +49,8 @@ async def _chosen(job: Job, say: Say, tickets: contextlib.ExitStack) -> Job:
     return chosen
 
 
-def _devices(job: Job) -> list[str]:
-    return devices_in(f"--{flag.name}={flag.value}" for service in job.plan.services for flag in service.flags)
-
-
 def _lease_names(job: Job) -> list[str]:
-    return [f"cid-{job.plan.cid}", *device_leases(_devices(job))]
+    return [f"cid-{job.plan.cid}", *device_leases(devices_of(job.plan))]
 
 
 def _is_free(names: Sequence[str], place: Path, since: int) -> bool:
@@ -73,7 +69,7 @@ def _usable(jobs: Sequence[Job]) -> list[Job]:
 
 def _refusal(job: Job) -> str:
     """Why a rig cannot be used; empty if it can."""
-    devices = _devices(job)
+    devices = devices_of(job.plan)
     absent = [device for device in devices if device.startswith("/") and not Path(device).exists()]
     if absent:
         return f"there is no '{absent[0]}'"

@@ -1,7 +1,9 @@
 """What can go wrong with a rig."""
 
+from dodo_dsl.run.protocol import BackendError
 
-class RigProblem(Exception):
+
+class RigProblem(BackendError):
     """A rig cannot do what was requested; ``usage`` when the request was not allowed."""
 
     def __init__(self, text: str, usage: bool = False) -> None:

@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.plan.model import Plan, PlannedService
-from dodo_dsl.run import leases
 from dodo_dsl.run.announce import heartbeat
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.access import query
-from dodo_dsl.run.rigs.leases import devices_in, leased, quarantine, quarantined
-from dodo_dsl.run.rigs.permission import refuse_test, refuse_unattended
+from dodo_dsl.run.rigs.leases import devices_of, leased, quarantine, quarantined
+from dodo_dsl.run.rigs.permission import refuse_test
 from dodo_dsl.run.rigs.problems import ProgramTimeout, RigProblem
-from dodo_dsl.spec.rig import EMULATED_RIGS
 
 PATIENCE_S, TRIES = 90.0, 2
 """s: from the far corner the rig searches its home position for 20 s, and for most of a minute if it repeats that."""
@@ -42,34 +40,16 @@ CHECKS = {
 """By the name of the service."""
 
 
-def refuse_quarantined(plan: Plan) -> None:
-    """Raises BackendError where the rig of a test is in quarantine, or that cannot be known."""
-    try:
-        reason = quarantined(plan.rig, _devices(plan))
-    except RigProblem as problem:
-        raise BackendError(f"the quarantine of rig '{plan.rig}' cannot be read: {problem}") from problem
-    if reason:
-        raise BackendError(_in_quarantine(plan, reason))
-
-
-def _devices(plan: Plan) -> list[str]:
-    return devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
-
-
-def _in_quarantine(plan: Plan, reason: str) -> str:
-    return f"rig '{plan.rig}' is in quarantine: {reason} ('dodo rig clear {plan.rig}' ends it)"
-
-
-async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...]) -> None:
-    """Checks the real rig of a test; a rig that fails goes into quarantine.
+async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int, ...], is_fit: bool = False) -> None:
+    """Checks the real rig of a test, unless it is known to be fit; a rig that fails goes into quarantine.
 
     Raises BackendError when the rig is in quarantine, fails, or cannot be checked. ``descriptors`` are those of the
     rig's leases, which the check goes on to hold if this process is killed.
     """
     try:
-        devices = _devices(plan)
+        devices = devices_of(plan)
         reason = quarantined(plan.rig, devices)
-        if not reason:
+        if not reason and not is_fit:
             say(f"checking rig '{plan.rig}'")
             reason = await _failure(plan, descriptors)
             if reason:
@@ -77,7 +57,7 @@ async def examine(plan: Plan, say: Callable[[str], None], descriptors: tuple[int
     except RigProblem as problem:
         raise BackendError(f"rig '{plan.rig}' cannot be checked: {problem}") from problem
     if reason:
-        raise BackendError(_in_quarantine(plan, reason))
+        raise BackendError(f"rig '{plan.rig}' is in quarantine: {reason} ('dodo rig clear {plan.rig}' ends it)")
 
 
 async def _failure(plan: Plan, descriptors: tuple[int, ...]) -> str:
@@ -134,19 +114,6 @@ class RigSession:
         return replace(plan, services=tuple(services))
 
 
-def is_real(plan: Plan) -> bool:
-    """Whether a test runs on hardware, which has its own CID."""
-    return bool(plan.rig) and plan.rig not in EMULATED_RIGS
-
-
-def refuse_hardware(plan: Plan) -> None:
-    """Raises BackendError for a test without a rig that would move hardware, which nothing leases or checks."""
-    try:
-        refuse_unattended(plan)
-    except RigProblem as problem:
-        raise BackendError(str(problem)) from problem
-
-
 @contextlib.asynccontextmanager
 async def attended(
     plan: Plan,
@@ -161,23 +128,15 @@ async def attended(
     test's repository, whose tests the machine's operator may not let use it. A rig that is fit in the ``session`` is
     not checked. Raises BackendError then, and when the rig is in use, in quarantine, or fails its health check.
     """
-    if not is_real(plan):
+    if not plan.is_real:
         yield slot.descriptors
         return
-    devices = devices_in(f"--{flag.name}={flag.value}" for service in plan.services for flag in service.flags)
     async with contextlib.AsyncExitStack() as stack:
-        try:
-            refuse_test(plan, roots)
-        except RigProblem as problem:
-            raise BackendError(str(problem)) from problem
-        try:
-            more = await stack.enter_async_context(leased(None, plan.slug, say, devices=devices))
-        except leases.LeaseTimeout as error:
-            raise BackendError(str(error)) from error
-        if session and plan.rig in session.fit:
+        refuse_test(plan, roots)
+        more = await stack.enter_async_context(leased(None, plan.slug, say, devices=devices_of(plan)))
+        is_fit = session is not None and plan.rig in session.fit
+        if session:
             session.fit.discard(plan.rig)
-            refuse_quarantined(plan)
-        else:
-            await examine(plan, say, (*slot.descriptors, *more))
+        await examine(plan, say, (*slot.descriptors, *more), is_fit)
         await stack.enter_async_context(heartbeat(slot.cid, slot.key))
         yield (*slot.descriptors, *more)

@@ -3,17 +3,24 @@
 #include "library.h"
 
 #include <linux/futex.h>
+#include <mqueue.h>
 #include <stdarg.h>
 #include <sys/epoll.h>
 #include <sys/random.h>
 #include <sys/select.h>
+#include <sys/sem.h>
+#include <sys/socket.h>
 #include <sys/time.h>
+#include <sys/timerfd.h>
 
 static bool is_ours(int futex_operation)
 {
     int command = futex_operation & FUTEX_CMD_MASK;
     return command == FUTEX_WAIT || command == FUTEX_WAIT_BITSET || command == FUTEX_WAKE || command == FUTEX_WAKE_BITSET;
 }
+
+#define P(at) ((void *)a[at])
+#define AS(name, ...) case SYS_##name: return name(__VA_ARGS__);
 
 PUBLIC long syscall(long number, ...)
 {
@@ -26,40 +33,43 @@ PUBLIC long syscall(long number, ...)
     if (!is_managed())
         return answer(RAW_6(number, a[0], a[1], a[2], a[3], a[4], a[5]));
     switch (number) {
-    case SYS_clock_gettime:
-        return clock_gettime((clockid_t)a[0], (struct timespec *)a[1]);
-    case SYS_gettimeofday:
-        return gettimeofday((struct timeval *)a[0], (void *)a[1]);
-#ifdef SYS_time
-    case SYS_time:
-        return time((time_t *)a[0]);
+        AS(clock_gettime, a[0], P(1))
+        AS(gettimeofday, P(0), P(1))
+        AS(nanosleep, P(0), P(1))
+        AS(getrandom, P(0), a[1], a[2])
+        AS(sched_yield)
+        AS(ppoll, P(0), a[1], P(2), P(3))
+        AS(epoll_pwait, a[0], P(1), a[2], a[3], P(4))
+        AS(epoll_pwait2, a[0], P(1), a[2], P(3), P(4))
+        AS(read, a[0], P(1), a[2])
+        AS(recvfrom, a[0], P(1), a[2], a[3], P(4), P(5))
+        AS(recvmsg, a[0], P(1), a[2])
+        AS(recvmmsg, a[0], P(1), a[2], a[3], P(4))
+        AS(semtimedop, a[0], P(1), a[2], P(3))
+        AS(mq_timedreceive, a[0], P(1), a[2], P(3), P(4))
+        AS(mq_timedsend, a[0], P(1), a[2], a[3], P(4))
+        AS(timerfd_create, a[0], a[1])
+        AS(timerfd_settime, a[0], a[1], P(2), P(3))
+        AS(timerfd_gettime, a[0], P(1))
+#ifdef __x86_64__
+        AS(time, P(0))
+        AS(poll, P(0), a[1], a[2])
+        AS(select, a[0], P(1), P(2), P(3), P(4))
+        AS(epoll_wait, a[0], P(1), a[2], a[3])
 #endif
-    case SYS_nanosleep:
-        return nanosleep((const struct timespec *)a[0], (struct timespec *)a[1]);
+    case SYS_pselect6:
+        return pselect((int)a[0], P(1), P(2), P(3), P(4), a[5] ? *(const sigset_t **)P(5) : NULL);
+    case SYS_rt_sigtimedwait:
+        return sigtimedwait(P(0), P(1), P(2));
     case SYS_clock_nanosleep: {
-        int error = clock_nanosleep((clockid_t)a[0], (int)a[1], (const struct timespec *)a[2], (struct timespec *)a[3]);
+        int error = clock_nanosleep((clockid_t)a[0], (int)a[1], P(2), P(3));
         return error ? fail_with(error) : 0;
     }
-    case SYS_getrandom:
-        return getrandom((void *)a[0], (size_t)a[1], (unsigned)a[2]);
-    case SYS_sched_yield:
-        return sched_yield();
-#ifdef SYS_poll
-    case SYS_poll:
-        return poll((struct pollfd *)a[0], (nfds_t)a[1], (int)a[2]);
-#endif
-#ifdef SYS_select
-    case SYS_select:
-        return select((int)a[0], (fd_set *)a[1], (fd_set *)a[2], (fd_set *)a[3], (struct timeval *)a[4]);
-#endif
-    case SYS_ppoll:
-        return ppoll((struct pollfd *)a[0], (nfds_t)a[1], (const struct timespec *)a[2], (const sigset_t *)a[3]);
-    case SYS_epoll_pwait:
-        return epoll_pwait((int)a[0], (struct epoll_event *)a[1], (int)a[2], (int)a[3], (const sigset_t *)a[4]);
+    case 449: /* futex_waitv: programs then wait for one word each */
+        return fail_with(ENOSYS);
     case SYS_futex:
         if (is_ours((int)a[1]))
-            return answer(virtual_futex((uint32_t *)a[0], (int)a[1], (uint32_t)a[2], (const struct timespec *)a[3],
-                                        (uint32_t)a[5]));
+            return answer(virtual_futex(P(0), (int)a[1], (uint32_t)a[2], P(3), (uint32_t)a[5]));
         break;
     default:
         break;

@@ -111,14 +111,14 @@ static void add_ours(char *const *given, char **result, struct environment *ours
                  && !is_named(*given, "DODO_TIME_PROCESS"))
             result[count++] = *given;
     }
-    bool has_ours = theirs && strstr(theirs, library_path());
+    bool has_ours = theirs && strstr(theirs, process.library);
     if (has_ours)
         snprintf(ours->preload, sizeof ours->preload, "LD_PRELOAD=%s", theirs);
     else
-        snprintf(ours->preload, sizeof ours->preload, "LD_PRELOAD=%s%s%s", library_path(), theirs && *theirs ? ":" : "",
+        snprintf(ours->preload, sizeof ours->preload, "LD_PRELOAD=%s%s%s", process.library, theirs && *theirs ? ":" : "",
                  theirs ? theirs : "");
-    snprintf(ours->folder, sizeof ours->folder, "DODO_TIME=%s", time_folder());
-    snprintf(ours->service, sizeof ours->service, "DODO_TIME_SERVICE=%u", own_service());
+    snprintf(ours->folder, sizeof ours->folder, "DODO_TIME=%s", process.folder);
+    snprintf(ours->service, sizeof ours->service, "DODO_TIME_SERVICE=%u", process.service);
     snprintf(ours->process, sizeof ours->process, "DODO_TIME_PROCESS=%u:%d", number, of);
     result[count++] = ours->preload;
     result[count++] = ours->folder;
@@ -147,7 +147,7 @@ PUBLIC int execve(const char *path, char *const words[], char *const environment
     if (!is_managed())
         return (int)answer(RAW_3(SYS_execve, path, words, environment));
     inspect(path);
-    WITH_OURS(environment, own_process(), getpid());
+    WITH_OURS(environment, process.number, getpid());
     return real.execve(path, words, complete);
 }
 
@@ -156,7 +156,7 @@ PUBLIC int execvpe(const char *name, char *const words[], char *const environmen
     if (!is_managed())
         return fail_with(EAGAIN);
     inspect_in_path(name);
-    WITH_OURS(environment, own_process(), getpid());
+    WITH_OURS(environment, process.number, getpid());
     return real.execvpe(name, words, complete);
 }
 
@@ -167,7 +167,7 @@ PUBLIC int fexecve(int file, char *const words[], char *const environment[])
         return fail_with(EAGAIN);
     snprintf(path, sizeof path, "/proc/self/fd/%d", file);
     inspect(path);
-    WITH_OURS(environment, own_process(), getpid());
+    WITH_OURS(environment, process.number, getpid());
     return real.fexecve(file, words, complete);
 }
 
@@ -217,25 +217,16 @@ PUBLIC int execle(const char *path, const char *first, ...)
     return execve(path, words, environment);
 }
 
-PUBLIC int posix_spawn(pid_t *restrict pid, const char *restrict path,
-                       const posix_spawn_file_actions_t *restrict actions, const posix_spawnattr_t *restrict attributes,
-                       char *const words[restrict], char *const environment[restrict])
-{
-    if (!is_managed())
-        return EAGAIN;
-    inspect(path);
-    WITH_OURS(environment, next_process_number(), 0);
-    return real.posix_spawn(pid, path, actions, attributes, words, complete);
-}
-
-PUBLIC int posix_spawnp(pid_t *restrict pid, const char *restrict name,
-                        const posix_spawn_file_actions_t *restrict actions,
-                        const posix_spawnattr_t *restrict attributes, char *const words[restrict],
-                        char *const environment[restrict])
-{
-    if (!is_managed())
-        return EAGAIN;
-    inspect_in_path(name);
-    WITH_OURS(environment, next_process_number(), 0);
-    return real.posix_spawnp(pid, name, actions, attributes, words, complete);
-}
+#define SPAWN(name, look)                                                                                               \
+    PUBLIC int name(pid_t *restrict pid, const char *restrict program,                                                 \
+                    const posix_spawn_file_actions_t *restrict actions, const posix_spawnattr_t *restrict attributes,  \
+                    char *const words[restrict], char *const environment[restrict])                                    \
+    {                                                                                                                  \
+        if (!is_managed())                                                                                             \
+            return EAGAIN;                                                                                             \
+        look(program);                                                                                                 \
+        WITH_OURS(environment, next_process_number(), 0);                                                              \
+        return real.name(pid, program, actions, attributes, words, complete);                                          \
+    }
+SPAWN(posix_spawn, inspect)
+SPAWN(posix_spawnp, inspect_in_path)

@@ -27,7 +27,7 @@ static int own_fifo(void)
         && found.st_dev == fifos[at].device)
         return fifos[at].file - 1;
     char path[300];
-    snprintf(path, sizeof path, "%s/w%u", time_folder(), at);
+    snprintf(path, sizeof path, "%s/w%u", process.folder, at);
     int file = (int)RAW_4(SYS_openat, AT_FDCWD, path, O_RDWR | O_NONBLOCK | O_CLOEXEC, 0);
     if (file < 0)
         return -1;

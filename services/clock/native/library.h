@@ -21,17 +21,19 @@
 #include <stdlib.h>
 #include <sys/syscall.h>
 #include <sys/types.h>
+#include <threads.h>
 #include <time.h>
 #include <unistd.h>
 
 #define PUBLIC __attribute__((visibility("default")))
+#define ALIAS(name, of) PUBLIC __typeof__(of) name __attribute__((alias(#of)))
 #define NANOSECONDS INT64_C(1000000000)
 
 enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900, INTERRUPTION = 63 /* a signal of ours */ };
 
 /* Functions of libc that are wrapped here and called there. */
 #define REAL_FUNCTIONS(X)                                                                                              \
-    X(fopen) X(fopen64) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp)               \
+    X(fopen) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp)               \
     X(pthread_barrier_wait) X(pthread_create) X(pthread_join) X(pthread_mutex_lock) X(pthread_mutex_trylock)           \
     X(pthread_mutex_unlock) X(pthread_once) X(pthread_rwlock_tryrdlock) X(pthread_rwlock_trywrlock)                    \
     X(pthread_rwlock_unlock) X(pthread_spin_trylock) X(pthread_tryjoin_np) X(sem_post) X(sem_trywait)                  \
@@ -55,6 +57,14 @@ struct self {
 extern __thread struct self self __attribute__((tls_model("initial-exec")));
 extern struct time_page *page;
 
+/* Which process of which service this is, how many threads it has had, where the page lies and the library. */
+struct process {
+    _Atomic uint32_t threads;
+    uint32_t service, number;
+    char folder[256], library[PATH_MAX];
+};
+extern struct process process;
+
 /* -- preload.c ------------------------------------------------------------------------------------------------------ */
 
 /* Whether this thread has a slot, after making sure of it: false while the library begins and when a thread ends. */
@@ -68,6 +78,7 @@ int pass_gate_as_ready(void);
 /* Around a wait that the kernel ends. */
 void enter_kernel(void);
 void leave_kernel(void);
+void begin_as_ready(void);
 void announce(void);
 void note(uint32_t kind, const char *name);
 unsigned own_index(void);
@@ -75,15 +86,14 @@ unsigned own_index(void);
 unsigned take_slot(uint32_t process, uint32_t thread);
 void adopt_slot(unsigned at);
 void release_slot(void);
-uint32_t next_thread_number(void);
 uint32_t next_process_number(void);
-const char *library_path(void);
-const char *time_folder(void);
-uint32_t own_service(void), own_process(void);
 void before_fork(void);
 void in_forked_child(void);
 void block_signals(uint64_t *before);
 void restore_signals(const uint64_t *before);
+/* A lock for a moment, which no signal's handler of its holder can want. */
+void take_lock(_Atomic uint32_t *lock, uint64_t *signals);
+void give_lock(_Atomic uint32_t *lock, const uint64_t *signals);
 
 /* -- time.c --------------------------------------------------------------------------------------------------------- */
 
@@ -122,7 +132,8 @@ void files_after_fork(void);
 int interrupt_at(int64_t deadline_ns);
 void interrupt_end(int timer);
 void timers_after_fork(void);
-void forget_timer_file(int file);
+/* Before the application closes a descriptor: false if it is ours. */
+bool forget_timer_file(int file);
 
 /* -- signals.c, process.c, random.c --------------------------------------------------------------------------------- */
 
@@ -130,7 +141,6 @@ void processes_start(void);
 void processes_after_fork(void);
 void draw(void *bytes, size_t size);
 bool is_random_file(int file);
-void forget_random_file(int file);
 
 /* -- raw system calls: -errno, or the result ------------------------------------------------------------------------ */
 
@@ -181,6 +191,18 @@ static inline int fail_with(int error)
     errno = error;
     return -1;
 }
+
+static inline int in_c11(int error)
+{
+    return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
+}
+
+/* What C11 calls otherwise. */
+#define IN_C11(name, type, of)                                                                                         \
+    PUBLIC int name(type *object)                                                                                      \
+    {                                                                                                                  \
+        return in_c11(of((void *)object));                                                                             \
+    }
 
 static inline int64_t now_ns(void)
 {

@@ -6,7 +6,6 @@
 #define _GNU_SOURCE
 #include "library.h"
 
-#include <threads.h>
 
 enum { MUTEX_KINDS = 3, MUTEX_ROBUST = 16, MUTEX_SHARED = 128, ONCE_RUNS = 1, ONCE_DONE = 2 }; /* glibc's bits */
 enum { LOOK_AGAIN_NS = 10000000, RETRY_NS = 100000 };
@@ -98,25 +97,9 @@ PUBLIC int pthread_mutex_timedlock(pthread_mutex_t *restrict mutex, const struct
     return pthread_mutex_clocklock(mutex, CLOCK_REALTIME, until);
 }
 
-static int in_c11(int error)
-{
-    return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
-}
-
-PUBLIC int mtx_lock(mtx_t *mutex)
-{
-    return in_c11(pthread_mutex_lock((pthread_mutex_t *)mutex));
-}
-
-PUBLIC int mtx_unlock(mtx_t *mutex)
-{
-    return in_c11(pthread_mutex_unlock((pthread_mutex_t *)mutex));
-}
-
-PUBLIC int mtx_trylock(mtx_t *mutex)
-{
-    return in_c11(pthread_mutex_trylock((pthread_mutex_t *)mutex));
-}
+IN_C11(mtx_lock, mtx_t, pthread_mutex_lock)
+IN_C11(mtx_unlock, mtx_t, pthread_mutex_unlock)
+IN_C11(mtx_trylock, mtx_t, pthread_mutex_trylock)
 
 PUBLIC int mtx_timedlock(mtx_t *restrict mutex, const struct timespec *restrict until)
 {
@@ -152,37 +135,23 @@ static int lock_readers_writer_until(pthread_rwlock_t *object, int (*attempt)(vo
     return lock_readers_writer(object, attempt, deadline_on(clock, until));
 }
 
-PUBLIC int pthread_rwlock_rdlock(pthread_rwlock_t *object)
-{
-    return lock_readers_writer(object, try_to_read, TIME_NEVER);
-}
-
-PUBLIC int pthread_rwlock_wrlock(pthread_rwlock_t *object)
-{
-    return lock_readers_writer(object, try_to_write, TIME_NEVER);
-}
-
-PUBLIC int pthread_rwlock_timedrdlock(pthread_rwlock_t *restrict object, const struct timespec *restrict until)
-{
-    return lock_readers_writer_until(object, try_to_read, CLOCK_REALTIME, until);
-}
-
-PUBLIC int pthread_rwlock_timedwrlock(pthread_rwlock_t *restrict object, const struct timespec *restrict until)
-{
-    return lock_readers_writer_until(object, try_to_write, CLOCK_REALTIME, until);
-}
-
-PUBLIC int pthread_rwlock_clockrdlock(pthread_rwlock_t *restrict object, clockid_t clock,
-                                      const struct timespec *restrict until)
-{
-    return lock_readers_writer_until(object, try_to_read, clock, until);
-}
-
-PUBLIC int pthread_rwlock_clockwrlock(pthread_rwlock_t *restrict object, clockid_t clock,
-                                      const struct timespec *restrict until)
-{
-    return lock_readers_writer_until(object, try_to_write, clock, until);
-}
+/* The three ways to wait for it. */
+#define WAYS_TO(how, attempt)                                                                                           \
+    PUBLIC int pthread_rwlock_##how(pthread_rwlock_t *object)                                                          \
+    {                                                                                                                  \
+        return lock_readers_writer(object, attempt, TIME_NEVER);                                                       \
+    }                                                                                                                  \
+    PUBLIC int pthread_rwlock_timed##how(pthread_rwlock_t *restrict object, const struct timespec *restrict until)     \
+    {                                                                                                                  \
+        return lock_readers_writer_until(object, attempt, CLOCK_REALTIME, until);                                      \
+    }                                                                                                                  \
+    PUBLIC int pthread_rwlock_clock##how(pthread_rwlock_t *restrict object, clockid_t clock,                           \
+                                         const struct timespec *restrict until)                                        \
+    {                                                                                                                  \
+        return lock_readers_writer_until(object, attempt, clock, until);                                               \
+    }
+WAYS_TO(rdlock, try_to_read)
+WAYS_TO(wrlock, try_to_write)
 
 PUBLIC int pthread_rwlock_unlock(pthread_rwlock_t *object)
 {

@@ -21,10 +21,9 @@ struct real_functions real;
 __thread struct self self __attribute__((tls_model("initial-exec")));
 struct time_page *page;
 
+struct process process;
+
 static _Atomic int stage;
-static _Atomic uint32_t threads_so_far;
-static uint32_t service, process;
-static char folder[256], library[PATH_MAX];
 
 /* -- what this process is ------------------------------------------------------------------------------------------- */
 
@@ -33,39 +32,14 @@ bool is_starting(void)
     return stage == STARTING;
 }
 
-const char *library_path(void)
-{
-    return library;
-}
-
-const char *time_folder(void)
-{
-    return folder;
-}
-
-uint32_t own_service(void)
-{
-    return service;
-}
-
-uint32_t own_process(void)
-{
-    return process;
-}
-
 unsigned own_index(void)
 {
     return (unsigned)(self.slot - page->slot);
 }
 
-uint32_t next_thread_number(void)
-{
-    return threads_so_far++;
-}
-
 uint32_t next_process_number(void)
 {
-    return page->processes[service]++;
+    return page->processes[process.service]++;
 }
 
 static void fail(const char *why)
@@ -81,7 +55,7 @@ void note(uint32_t kind, const char *name)
 {
     struct time_message *message = &page->note[page->notes++ % TIME_NOTES];
     message->kind = TIME_NOTE_NONE;
-    message->service = service;
+    message->service = process.service;
     strncpy(message->name, name, sizeof message->name);
     message->kind = kind;
 }
@@ -95,6 +69,19 @@ void block_signals(uint64_t *before)
 void restore_signals(const uint64_t *before)
 {
     RAW_4(SYS_rt_sigprocmask, SIG_SETMASK, before, NULL, sizeof *before);
+}
+
+void take_lock(_Atomic uint32_t *lock, uint64_t *signals)
+{
+    block_signals(signals);
+    for (uint32_t free = 0; !atomic_compare_exchange_strong(lock, &free, 1); free = 0)
+        RAW_1(SYS_sched_yield, 0);
+}
+
+void give_lock(_Atomic uint32_t *lock, const uint64_t *signals)
+{
+    *lock = 0;
+    restore_signals(signals);
 }
 
 /* -- slots ---------------------------------------------------------------------------------------------------------- */
@@ -115,7 +102,7 @@ static void reclaim_slots(void)
 {
     for (unsigned at = 0; at < TIME_SLOTS; at++) {
         struct time_slot *slot = &page->slot[at];
-        if (slot->service == service && slot->pid && RAW_3(SYS_tgkill, slot->pid, slot->tid, 0) == -ESRCH)
+        if (slot->service == process.service && slot->pid && RAW_3(SYS_tgkill, slot->pid, slot->tid, 0) == -ESRCH)
             slot->state = TIME_FREE;
     }
 }
@@ -136,7 +123,7 @@ unsigned take_slot(uint32_t of_process, uint32_t thread)
     slot->kind = TIME_START;
     slot->deadline_ns = TIME_NEVER;
     slot->key = 0;
-    slot->service = service;
+    slot->service = process.service;
     slot->process = of_process;
     slot->thread = thread;
     return at;
@@ -230,6 +217,15 @@ int pass_gate_as_ready(void)
     return pass_gate();
 }
 
+void begin_as_ready(void)
+{
+    if (!self.slot)
+        return;
+    self.slot->state = TIME_READY; /* also if a handler that ran meanwhile had been granted */
+    announce();
+    pass_gate();
+}
+
 void enter_kernel(void)
 {
     if (is_managed())
@@ -239,11 +235,7 @@ void enter_kernel(void)
 void leave_kernel(void)
 {
     int error = errno;
-    if (self.slot) {
-        self.slot->state = TIME_READY; /* also if a handler that ran meanwhile had been granted */
-        announce();
-        pass_gate();
-    }
+    begin_as_ready();
     errno = error;
 }
 
@@ -256,17 +248,17 @@ static void find_real_functions(void)
 #undef X
     Dl_info own;
     if (dladdr(&page, &own) && own.dli_fname)
-        strncpy(library, own.dli_fname, sizeof library - 1);
+        strncpy(process.library, own.dli_fname, sizeof process.library - 1);
 }
 
 static void open_page(void)
 {
-    char path[sizeof folder + 8];
+    char path[sizeof process.folder + 8];
     const char *given = getenv("DODO_TIME");
-    if (!given || strlen(given) >= sizeof folder)
+    if (!given || strlen(given) >= sizeof process.folder)
         fail("no folder of the test's time is given");
-    strcpy(folder, given);
-    strcat(strcpy(path, folder), "/page");
+    strcpy(process.folder, given);
+    strcat(strcpy(path, process.folder), "/page");
     long file = RAW_4(SYS_openat, AT_FDCWD, path, O_RDWR | O_CLOEXEC, 0);
     if (file < 0)
         fail("the page of the test's time cannot be opened");
@@ -289,26 +281,17 @@ static void take_process_number(void)
     char *end = NULL;
     unsigned long number = given ? strtoul(given, &end, 10) : 0;
     if (!given || end == given || *end != ':') {
-        process = next_process_number();
+        process.number = next_process_number();
         return;
     }
     int of = atoi(end + 1), own = (int)RAW_1(SYS_getpid, 0);
     *given = 0; /* nobody inherits it */
-    process = of == 0 || of == own ? (uint32_t)number : next_process_number();
+    process.number = of == 0 || of == own ? (uint32_t)number : next_process_number();
     for (unsigned at = 0; of == own && at < TIME_SLOTS; at++) {
         struct time_slot *slot = &page->slot[at];
-        if (slot->service == service && slot->process == process && slot->pid == own)
+        if (slot->service == process.service && slot->process == process.number && slot->pid == own)
             slot->state = TIME_FREE; /* of the program before */
     }
-}
-
-static void begin_as_ready(void)
-{
-    if (!self.slot)
-        return;
-    self.slot->state = TIME_READY;
-    announce();
-    pass_gate();
 }
 
 static void start(void)
@@ -319,9 +302,9 @@ static void start(void)
     find_real_functions();
     open_page();
     given = getenv("DODO_TIME_SERVICE");
-    service = given ? (uint32_t)strtoul(given, NULL, 10) % TIME_SERVICES : 0;
+    process.service = given ? (uint32_t)strtoul(given, NULL, 10) % TIME_SERVICES : 0;
     take_process_number();
-    adopt_slot(take_slot(process, next_thread_number()));
+    adopt_slot(take_slot(process.number, process.threads++));
     processes_start();
     begin_as_ready();
     stage = STARTED;
@@ -337,7 +320,7 @@ bool is_managed(void)
     if (stage == NEW)
         start();
     else /* not begun by pthread_create */
-        adopt_slot(take_slot(process, next_thread_number()));
+        adopt_slot(take_slot(process.number, process.threads++));
     return self.slot != NULL;
 }
 
@@ -379,10 +362,7 @@ PUBLIC void _exit(int status)
         RAW_1(SYS_exit_group, status);
 }
 
-PUBLIC void _Exit(int status)
-{
-    _exit(status);
-}
+ALIAS(_Exit, _exit);
 
 /* -- fork ----------------------------------------------------------------------------------------------------------- */
 
@@ -397,8 +377,8 @@ void before_fork(void)
 
 void in_forked_child(void)
 {
-    process = child_process;
-    threads_so_far = 1;
+    process.number = child_process;
+    process.threads = 1;
     queues_after_fork();
     files_after_fork();
     timers_after_fork();

@@ -2,12 +2,12 @@
 #define _GNU_SOURCE
 #include "library.h"
 
+#include <aio.h>
 #include <string.h>
 #include <sys/msg.h>
 #include <sys/resource.h>
 #include <sys/sem.h>
 #include <sys/wait.h>
-#include <threads.h>
 
 #ifndef SYS_pidfd_open
 #define SYS_pidfd_open 434
@@ -46,11 +46,7 @@ static void *begin(void *given)
     free(given);
     adopt_slot(beginning.slot);
     pthread_setspecific(at_end, &at_end);
-    if (self.slot) {
-        self.slot->state = TIME_READY;
-        announce();
-        pass_gate();
-    }
+    begin_as_ready();
     return beginning.routine(beginning.argument);
 }
 
@@ -62,7 +58,7 @@ PUBLIC int pthread_create(pthread_t *restrict thread, const pthread_attr_t *rest
     struct beginning *beginning = malloc(sizeof *beginning);
     if (!beginning)
         return EAGAIN;
-    unsigned slot = take_slot(own_process(), next_thread_number());
+    unsigned slot = take_slot(process.number, process.threads++);
     *beginning = (struct beginning){routine, argument, slot};
     int error = real.pthread_create(thread, attributes, begin, beginning);
     if (error) {
@@ -172,10 +168,7 @@ PUBLIC pid_t fork(void)
 }
 
 /* The parent of a vfork waits until the child executes a program; that of a fork need not. */
-PUBLIC pid_t vfork(void)
-{
-    return fork();
-}
+ALIAS(vfork, fork);
 
 /* Until a child may have ended: 0 or EINTR. In wait4 itself, a thread seems to sleep while it takes the child's status,
  * and the agent would let time go on. */
@@ -276,6 +269,22 @@ PUBLIC int semtimedop(int id, struct sembuf *operations, size_t count, const str
     leave_kernel();
     interrupt_end(timer);
     return (int)answer(result == -EINTR && now_ns() >= deadline ? -EAGAIN : result);
+}
+
+/* Threads of libc read and write meanwhile, unseen. */
+PUBLIC int aio_suspend(const struct aiocb *const list[], int count, const struct timespec *timeout)
+{
+    int64_t deadline = timeout && is_managed() ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
+    for (;;) {
+        for (int at = 0; at < count; at++)
+            if (list[at] && __atomic_load_n(&list[at]->__error_code, __ATOMIC_ACQUIRE) != EINPROGRESS)
+                return 0;
+        int64_t again = later(now_ns(), RETRY_NS);
+        if (now_ns() >= deadline)
+            return fail_with(EAGAIN);
+        if (sleep_until(again < deadline ? again : deadline) == EINTR)
+            return fail_with(EINTR);
+    }
 }
 
 PUBLIC int semop(int id, struct sembuf *operations, size_t count)

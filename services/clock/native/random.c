@@ -6,10 +6,9 @@
 #include <stdarg.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 
-enum { RANDOM_FILES = 1024, FILE_BYTES = 1 << 16 };
-
-static _Atomic bool is_random[RANDOM_FILES];
+enum { FILE_BYTES = 1 << 16, SOURCE_MODE = 01446 /* which no other file has */ };
 
 static uint64_t mixed(uint64_t value)
 {
@@ -20,7 +19,7 @@ static uint64_t mixed(uint64_t value)
 
 static uint64_t next(void)
 {
-    uint64_t who = (uint64_t)own_service() << 48 | (uint64_t)own_process() << 24 | (self.slot ? self.slot->thread : 0);
+    uint64_t who = (uint64_t)process.service << 48 | (uint64_t)process.number << 24 | (self.slot ? self.slot->thread : 0);
     uint64_t seed = mixed(page->seed + UINT64_C(0x9e3779b97f4a7c15)) ^ mixed(who + 1);
     return mixed(seed + UINT64_C(0x9e3779b97f4a7c15) * ++self.drawn);
 }
@@ -82,15 +81,11 @@ PUBLIC unsigned _ZNSt13random_device9_M_getvalEv(void *device)
 
 /* -- /dev/urandom: a file of drawn bytes, without an end for `read` ------------------------------------------------------- */
 
+/* Known by its mode, not by its number: libc closes files without a word, and programs copy descriptors. */
 bool is_random_file(int file)
 {
-    return file >= 0 && file < RANDOM_FILES && is_random[file];
-}
-
-void forget_random_file(int file)
-{
-    if (is_random_file(file))
-        is_random[file] = false;
+    struct stat found;
+    return page && page->sources && !fstat(file, &found) && found.st_mode == (S_IFREG | SOURCE_MODE) && !found.st_nlink;
 }
 
 static bool is_source(const char *path)
@@ -106,8 +101,8 @@ static int open_source(int flags)
         return -1;
     draw(bytes, sizeof bytes);
     RAW_4(SYS_pwrite64, file, bytes, sizeof bytes, 0);
-    if (file < RANDOM_FILES)
-        is_random[file] = true;
+    RAW_2(SYS_fchmod, file, SOURCE_MODE);
+    page->sources++;
     return file;
 }
 
@@ -139,34 +134,12 @@ PUBLIC int openat(int folder, const char *path, int flags, ...)
     return open_at(folder, path, flags, mode);
 }
 
-PUBLIC int open64(const char *path, int flags, ...)
-{
-    MODE(flags)
-    return open_at(AT_FDCWD, path, flags, mode);
-}
-
-PUBLIC int openat64(int folder, const char *path, int flags, ...)
-{
-    MODE(flags)
-    return open_at(folder, path, flags, mode);
-}
-
 PUBLIC int __open_2(const char *path, int flags)
 {
     return open_at(AT_FDCWD, path, flags, 0);
 }
 
-PUBLIC int __open64_2(const char *path, int flags)
-{
-    return open_at(AT_FDCWD, path, flags, 0);
-}
-
 PUBLIC int __openat_2(int folder, const char *path, int flags)
-{
-    return open_at(folder, path, flags, 0);
-}
-
-PUBLIC int __openat64_2(int folder, const char *path, int flags)
 {
     return open_at(folder, path, flags, 0);
 }
@@ -181,7 +154,9 @@ PUBLIC FILE *fopen(const char *restrict path, const char *restrict how)
     return file < 0 ? NULL : fdopen(file, how);
 }
 
-PUBLIC FILE *fopen64(const char *restrict path, const char *restrict how)
-{
-    return is_source(path) ? fopen(path, how) : is_managed() ? real.fopen64(path, how) : NULL;
-}
+/* With 64 bits these are the same. */
+ALIAS(open64, open);
+ALIAS(openat64, openat);
+ALIAS(__open64_2, __open_2);
+ALIAS(__openat64_2, __openat_2);
+ALIAS(fopen64, fopen);

@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <linux/sockios.h>
+#include <mqueue.h>
 #include <stdarg.h>
 #include <string.h>
 #include <sys/ioctl.h>
@@ -19,7 +20,7 @@ static bool may_block(int file, int flags)
     return status >= 0 && !(status & O_NONBLOCK);
 }
 
-enum { NOTED_FILES = 1024, LONGEST_TICK_NS = 10000001 };
+enum { LIBRARY_FILES_UP_TO = 2 * TIME_SLOTS + LIBRARY_FILES_FROM, NOTED_FILES = 1024, LONGEST_TICK_NS = 10000001 };
 
 static int64_t receive_timeouts[NOTED_FILES];
 
@@ -231,6 +232,8 @@ PUBLIC ssize_t __read_chk(int file, void *bytes, size_t size, size_t room)
 
 PUBLIC ssize_t readv(int file, const struct iovec *parts, int count)
 {
+    if (count > 0 && is_random_file(file))
+        return read(file, parts->iov_base, parts->iov_len);
     int error = await_ready(file, POLLIN);
     return error ? fail_with(error) : answer(RAW_3(SYS_readv, file, parts, count));
 }
@@ -279,11 +282,72 @@ PUBLIC ssize_t sendmsg(int file, const struct msghdr *message, int flags)
     return error ? fail_with(error) : answer(RAW_3(SYS_sendmsg, file, message, flags));
 }
 
+PUBLIC int sendmmsg(int file, struct mmsghdr *messages, unsigned count, int flags)
+{
+    unsigned sent = 0;
+    for (ssize_t size; sent < count && (size = sendmsg(file, &messages[sent].msg_hdr, flags)) >= 0;)
+        messages[sent++].msg_len = (unsigned)size;
+    return sent || !count ? (int)sent : -1;
+}
+
+/* -- POSIX message queues, descriptors of the kernel's, too ----------------------------------------------------------- */
+
+static long on_queue(long number, mqd_t queue, const char *message, size_t size, uintptr_t priority,
+                     const struct timespec *until)
+{
+    static const struct timespec past = {0, 0};
+    if (!is_managed())
+        return answer(RAW_6(number, queue, message, size, priority, until, 0));
+    if (until && (!is_valid(until) || until->tv_sec < 0))
+        return fail_with(EINVAL);
+    int64_t deadline = until ? deadline_on(CLOCK_REALTIME, until) : TIME_NEVER;
+    for (;;) {
+        long result = RAW_6(number, queue, message, size, priority, &past, 0);
+        if (result != -ETIMEDOUT)
+            return answer(result);
+        int error = await_file(queue, number == SYS_mq_timedreceive ? POLLIN : POLLOUT, deadline);
+        if (error)
+            return fail_with(error);
+    }
+}
+
+PUBLIC ssize_t mq_timedreceive(mqd_t queue, char *restrict message, size_t size, unsigned *restrict priority,
+                               const struct timespec *restrict until)
+{
+    return on_queue(SYS_mq_timedreceive, queue, message, size, (uintptr_t)priority, until);
+}
+
+PUBLIC ssize_t mq_receive(mqd_t queue, char *message, size_t size, unsigned *priority)
+{
+    return on_queue(SYS_mq_timedreceive, queue, message, size, (uintptr_t)priority, NULL);
+}
+
+PUBLIC int mq_timedsend(mqd_t queue, const char *message, size_t size, unsigned priority, const struct timespec *until)
+{
+    return (int)on_queue(SYS_mq_timedsend, queue, message, size, priority, until);
+}
+
+PUBLIC int mq_send(mqd_t queue, const char *message, size_t size, unsigned priority)
+{
+    return (int)on_queue(SYS_mq_timedsend, queue, message, size, priority, NULL);
+}
+
 /* -- closing -------------------------------------------------------------------------------------------------------- */
 
 PUBLIC int close(int file)
 {
-    forget_timer_file(file);
-    forget_random_file(file);
-    return (int)answer(RAW_1(SYS_close, file));
+    return forget_timer_file(file) ? (int)answer(RAW_1(SYS_close, file)) : fail_with(EBADF);
+}
+
+PUBLIC int close_range(unsigned first, unsigned last, int flags)
+{
+    unsigned file = first;
+    while (!flags && file <= last && file < LIBRARY_FILES_UP_TO)
+        close((int)file++);
+    return file > first && file > last ? 0 : (int)answer(RAW_3(SYS_close_range, file, last, flags));
+}
+
+PUBLIC void closefrom(int first)
+{
+    close_range(first < 0 ? 0 : (unsigned)first, UINT_MAX, 0);
 }

@@ -4,7 +4,6 @@
 
 #include <sys/time.h>
 #include <sys/times.h>
-#include <threads.h>
 
 int64_t later(int64_t from_ns, int64_t by_ns)
 {

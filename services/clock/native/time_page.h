@@ -54,7 +54,8 @@ struct time_page {
     _Atomic uint32_t activity; /* futex word: increments when a slot begins to wait or becomes READY */
     _Atomic uint32_t notes; /* how many were written; the n-th is at n % TIME_NOTES */
     _Atomic uint32_t processes[TIME_SERVICES]; /* how many each service has had */
-    char unused[4096 - 48 - 4 * TIME_SERVICES];
+    _Atomic uint32_t sources; /* of randomness that were opened */
+    char unused[4096 - 52 - 4 * TIME_SERVICES];
     struct time_message note[TIME_NOTES];
     struct time_slot slot[TIME_SLOTS];
 };

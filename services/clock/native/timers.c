@@ -30,19 +30,6 @@ static _Atomic uint32_t timers_lock;
 static struct time_slot *_Atomic keeper;
 static bool has_keeper;
 
-static void lock_timers(uint64_t *signals)
-{
-    block_signals(signals);
-    for (uint32_t free = 0; !atomic_compare_exchange_strong(&timers_lock, &free, 1); free = 0)
-        RAW_1(SYS_sched_yield, 0);
-}
-
-static void unlock_timers(const uint64_t *signals)
-{
-    timers_lock = 0;
-    restore_signals(signals);
-}
-
 void timers_after_fork(void)
 {
     timers_lock = 0;
@@ -123,12 +110,12 @@ static void fire_what_is_due(void)
     uint64_t signals;
     for (int at = 0; at < MOST_TIMERS; at++) {
         struct timer *timer = &timers[at], copy = {0};
-        lock_timers(&signals);
+        take_lock(&timers_lock, &signals);
         if (timer->use != UNUSED && timer->deadline_ns <= now_ns()) {
             copy = *timer;
             timer->deadline_ns = timer->interval_ns ? later(timer->deadline_ns, timer->interval_ns) : TIME_NEVER;
         }
-        unlock_timers(&signals);
+        give_lock(&timers_lock, &signals);
         if (copy.use != UNUSED)
             fire(timer == &timers[ITIMER] ? timer : &copy);
     }
@@ -169,13 +156,13 @@ static struct timer *new_timer(enum use use, clockid_t clock)
 {
     uint64_t signals;
     struct timer *found = NULL;
-    lock_timers(&signals);
+    take_lock(&timers_lock, &signals);
     for (int at = ITIMER + 1; at < MOST_TIMERS && !found; at++)
         if (timers[at].use == UNUSED) {
             found = &timers[at];
             *found = (struct timer){.use = use, .clock = clock, .deadline_ns = TIME_NEVER};
         }
-    unlock_timers(&signals);
+    give_lock(&timers_lock, &signals);
     return found;
 }
 
@@ -221,11 +208,15 @@ static struct timer *timer_of_file(int file)
     return NULL;
 }
 
-void forget_timer_file(int file)
+bool forget_timer_file(int file)
 {
     struct timer *timer = timer_of_file(file);
     if (timer)
         free_timer(timer);
+    for (int at = 0; at < MOST_TIMERS; at++)
+        if (timers[at].use == OF_FILE && timers[at].kept_file == file)
+            return false;
+    return true;
 }
 
 PUBLIC int timerfd_create(clockid_t clock, int flags)
@@ -235,6 +226,7 @@ PUBLIC int timerfd_create(clockid_t clock, int flags)
     if (flags & ~(TFD_CLOEXEC | TFD_NONBLOCK))
         return fail_with(EINVAL);
     int file = (int)answer(RAW_2(SYS_eventfd2, 0, flags));
+    forget_timer_file(file); /* that libc has closed without a word */
     struct timer *timer = file < 0 ? NULL : new_timer(OF_FILE, clock);
     if (!timer) {
         if (file >= 0)

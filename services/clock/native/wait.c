@@ -7,7 +7,6 @@
 #include "library.h"
 
 #include <linux/futex.h>
-#include <threads.h>
 
 /* One a slot: this process's thread there waits for `address`. */
 struct waiter {
@@ -23,19 +22,6 @@ static _Atomic unsigned queued;
 static _Atomic uint32_t queue_lock;
 
 /* -- queues --------------------------------------------------------------------------------------------------------- */
-
-static void lock_queues(uint64_t *signals)
-{
-    block_signals(signals);
-    for (uint32_t free = 0; !atomic_compare_exchange_strong(&queue_lock, &free, 1); free = 0)
-        RAW_1(SYS_sched_yield, 0);
-}
-
-static void unlock_queues(const uint64_t *signals)
-{
-    queue_lock = 0;
-    restore_signals(signals);
-}
 
 void queues_after_fork(void)
 {
@@ -57,14 +43,14 @@ void queue_join(const void *address, bool is_shared, uint32_t bits)
         self.slot->key = key_of(address);
         return;
     }
-    lock_queues(&signals);
+    take_lock(&queue_lock, &signals);
     *own = (struct waiter){.slot = self.slot, .address = address, .bits = bits, .is_queued = true};
     struct waiter **end = &first;
     while (*end)
         end = &(*end)->next;
     *end = own;
     queued++;
-    unlock_queues(&signals);
+    give_lock(&queue_lock, &signals);
 }
 
 /* Whether nobody has woken this thread before. */
@@ -73,7 +59,7 @@ bool queue_leave(void)
     struct waiter *own = &waiters[own_index()];
     bool was_waiting = atomic_exchange(&self.slot->key, 0) != 0;
     uint64_t signals;
-    lock_queues(&signals);
+    take_lock(&queue_lock, &signals);
     for (struct waiter **each = &first; own->is_queued && *each; each = &(*each)->next)
         if (*each == own) {
             *each = own->next;
@@ -82,7 +68,7 @@ bool queue_leave(void)
             break;
         }
     own->is_queued = false;
-    unlock_queues(&signals);
+    give_lock(&queue_lock, &signals);
     return was_waiting;
 }
 
@@ -118,7 +104,7 @@ int queue_wake(const void *address, bool is_shared, int most, uint32_t bits)
         return wake_shared(address);
     if (!queued)
         return 0;
-    lock_queues(&signals);
+    take_lock(&queue_lock, &signals);
     for (struct waiter **each = &first; *each && count < most;) {
         struct waiter *found = *each;
         if (found->address != address || !(found->bits & bits)) {
@@ -131,7 +117,7 @@ int queue_wake(const void *address, bool is_shared, int most, uint32_t bits)
         found->is_queued = false;
         make_ready(found->slot);
     }
-    unlock_queues(&signals);
+    give_lock(&queue_lock, &signals);
     return count;
 }
 
@@ -208,11 +194,6 @@ PUBLIC int pthread_cond_broadcast(pthread_cond_t *cond)
     return 0;
 }
 
-static int in_c11(int error)
-{
-    return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
-}
-
 PUBLIC int cnd_wait(cnd_t *cond, mtx_t *mutex)
 {
     return in_c11(pthread_cond_wait((pthread_cond_t *)cond, (pthread_mutex_t *)mutex));
@@ -223,15 +204,8 @@ PUBLIC int cnd_timedwait(cnd_t *restrict cond, mtx_t *restrict mutex, const stru
     return in_c11(pthread_cond_timedwait((pthread_cond_t *)cond, (pthread_mutex_t *)mutex, until));
 }
 
-PUBLIC int cnd_signal(cnd_t *cond)
-{
-    return in_c11(pthread_cond_signal((pthread_cond_t *)cond));
-}
-
-PUBLIC int cnd_broadcast(cnd_t *cond)
-{
-    return in_c11(pthread_cond_broadcast((pthread_cond_t *)cond));
-}
+IN_C11(cnd_signal, cnd_t, pthread_cond_signal)
+IN_C11(cnd_broadcast, cnd_t, pthread_cond_broadcast)
 
 /* -- semaphores ----------------------------------------------------------------------------------------------------- */
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.access.secret_problems import in_files, left_out, withheld, written
+from dodo_dsl.application.access.secret_problems import in_file, left_out, withheld, written
 from dodo_dsl.diagnostics import format_text
 from tests.source.nodes import mapping
 
@@ -52,7 +52,7 @@ def test_values_that_look_like_secrets(tmp_path: Path) -> None:
     assert {problem.span.length for problem in found} == {0}
     file = tmp_path / "own.env"
     file.write_text(f"SPEED=1\nT={token}\n")
-    (problem,) = in_files([file])
+    (problem,) = in_file(file, raw=False)
     assert (problem.span.file, problem.span.line, problem.span.column) == (str(file), 2, 1)
     assert token not in format_text([problem])
 

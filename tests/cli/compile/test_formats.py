@@ -129,3 +129,12 @@ def test_a_report_on_a_terminal_stands_there_alone(folder: Path) -> None:
 def test_every_rule_has_a_page(folder: Path) -> None:
     """As SARIF's descriptions of rules are made of them."""
     assert {result["ruleId"] for result in sarif()["results"]} <= set(catalogue.pages())
+
+
+def test_what_planning_finds_is_told_beside_what_other_tests_have(folder: Path) -> None:
+    (folder / "tests" / "taken").mkdir()
+    taken = examples.SPEC.replace("example", "taken").replace("camera:", "driver:")
+    (folder / "tests" / "taken" / "taken.dodo.yml").write_text(taken)
+    code, out, _ = run("compile", "--check", "--format", "json")
+    assert code == 2
+    assert {"unknown-parameter", "service-taken"} <= {found["rule"] for found in json.loads(out)}

@@ -274,7 +274,7 @@ def test_a_copy_is_the_same_test(repository: Path) -> None:
     copies = load([repository / "tests"]).specs
     assert [spec.name for spec in copies] == ["further", "mine"]
     for copy in copies:
-        assert (copy.level, copy.kind, copy.rig, copy.timeout_s) == ("hil", "closed-loop", "emulated", 60.0)
+        assert (copy.level, copy.kind, copy.rig, copy.timeout_s) == ("hil", "closed-loop", "dynamic", 60.0)
         assert [(u.name, u.uses.text, list(u.parameters)) for u in copy.uses] == [
             (u.name, u.uses.text, list(u.parameters)) for u in shipped.uses
         ]
@@ -397,7 +397,7 @@ def test_an_application_may_print_or_drive_by_two_wheels(empty: Path, language: 
 
 
 def run_first(folder: Path) -> None:
-    command = [sys.executable, "-m", "dodo_dsl", "run", "sil-first"]
+    command = [sys.executable, "-m", "dodo_dsl", "run"]
     environment = {**os.environ, "PYTHONPATH": str(package_data.root()), "DODO_LEASES": str(folder / "leases")}
     result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
     assert result.returncode == 0, result.stdout + result.stderr
@@ -408,7 +408,41 @@ def run_first(folder: Path) -> None:
 @pytest.mark.parametrize("answers", ["wheels", *(pytest.param(a, marks=pytest.mark.proof) for a in ("bus", "printed"))])
 def test_the_application_passes_its_test(empty: Path, answers: str) -> None:
     assert dodo("new", "--application", "--answers", answers)[0] == 0
+    if answers != "wheels":
+        assert dodo("new", "sil-open", "--kind", "open-loop")[0] == 0
     run_first(empty)
+
+
+BLIND = """\
+import sys
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+flags = dict(word[2:].partition("=")[::2] for word in sys.argv[1:])
+with SharedMemory.attach(flags["name"]) as memory, Session(int(flags["cid"])) as session:
+    steer, pedal = (session.messages.type(f"opendlv.proxy.{n}Request") for n in ("GroundSteering", "PedalPosition"))
+    while memory.wait():
+        with memory.lock():
+            sampled = memory.sample_time()
+        session.send(steer(groundSteering=float(flags["always"])), sampled)
+        session.send(pedal(position=0.1), sampled)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "always", ["0", "0.005", *(pytest.param(v, marks=pytest.mark.proof) for v in ("0.01", "-0.1"))]
+)
+def test_a_blind_program_passes_none_of_the_first_tests(empty: Path, always: str) -> None:
+    """At 0.005 rad it would come along a straight track from a start that is only askew."""
+    assert dodo("new", "--application")[0] == dodo("new", "sil-open", "--kind", "open-loop")[0] == 0
+    (empty / "steering.py").write_text(BLIND)
+    compose = empty / "docker-compose.yml"
+    compose.write_text(compose.read_text().replace("video0.argb", f"video0.argb --always={always}"))
+    command = [sys.executable, "-m", "dodo_dsl", "run"]
+    environment = {**os.environ, "PYTHONPATH": str(package_data.root()), "DODO_LEASES": str(empty / "leases")}
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300).stdout
+    assert re.search(r"^FAILED  sil-first +hit wall ", said, re.MULTILINE), said
+    assert re.search(r"^FAILED  sil-open +the share of frames with the sign of the target is 0", said, re.MULTILINE)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+import yaml
 
 from dodo_dsl.application.read import as_written
 from dodo_dsl.cli.existing_application import declarable, pictures
@@ -84,6 +85,38 @@ def test_pictures(command: str, parameters: dict[str, str], size: tuple[int, int
     file.write_text(f"services: {{steer: {{image: team/steer, command: '{command}'}}}}")
     found = pictures(as_written(file))
     assert (found.parameters("virtual-camera"), (found.width, found.height)) == (parameters, size)
+
+
+ALL = "command: --cid=111, x-dodo: {out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}"
+RESPONDER = """\
+cluon::OD4Session od4{112, [](cluon::data::Envelope &&e) {
+  if (e.dataType() == opendlv::proxy::GroundSteeringRequest::ID()) {
+    auto heard = cluon::extractMessage<opendlv::proxy::PedalPositionRequest>(std::move(e));
+    od4.send(answer); } }};
+"""
+
+
+@pytest.mark.parametrize(
+    ("services", "left_out"),
+    [
+        ("view: {image: opendlv-vehicle-view}, dec: {image: 'h264decoder:v1'}", ["view", "dec"]),
+        (f"a: {{image: a, {ALL}}}, b: {{image: b, command: --cid=112}}, v: {{image: opendlv-ui-x}}", ["v", "b"]),
+        (f"a: {{image: a, {ALL}}}, b: {{build: src, environment: {{CID: 112}}}}", ["b"]),
+        (f"a: {{image: a, {ALL}}}, b: {{build: src}}", ["b"]),
+        ("b: {build: src}", []),
+        (f"a: {{image: a, {ALL}}}, log: {{image: c, command: sh -c 'cluon-OD4toStdout --cid=9 > x'}}", ["log"]),
+    ],
+)
+def test_what_is_written_beside_a_compose_file_compiles(repository: Path, services: str, left_out: list[str]) -> None:
+    (repository / "docker-compose.yml").write_text(f"services: {{{services}}}\n")
+    (repository / "src/steer.cpp").write_text(RESPONDER)
+    assert run("new", "--deployment")[0] == 0
+    deployment = yaml.safe_load((repository / "dodo.yml").read_text())
+    has_own = len(left_out) <= services.count("image:") + services.count("build:") - 1
+    assert ("application" in deployment) == has_own
+    assert not has_own or deployment["application"].get("without", []) == left_out
+    assert run("new", "sil-first")[0] == 0
+    assert run("compile", "--check")[:2] == (0, "1 test checked: no problems\n")
 
 
 def test_a_compose_file_that_says_all_is_named_alone(tmp_path: Path) -> None:

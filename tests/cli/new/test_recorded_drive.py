@@ -37,13 +37,13 @@ def spec(folder: Path, name: str) -> dict[str, object]:
     }
 
 
-def write(path: Path, *streams: tuple[str, int, list[float]]) -> None:
-    """A recording with a message of each value every 0.1 s, by name and sender stamp."""
+def write(path: Path, *streams: tuple[str, int, list[float]], step: int = 100_000) -> None:
+    """A recording with a message of each value every ``step`` us, by name and sender stamp."""
     messages = MessageSet.standard()
     frames = []
     for name, sender, values in streams:
         for number, value in enumerate(values):
-            time = 1_700_000_000_000_000 + number * 100_000
+            time = 1_700_000_000_000_000 + number * step
             message = messages.type(name)(**{SIGNALS[name]: value})
             frames.append(encode_frame(Envelope(messages.id(name), messages.encode(message), time, time, time, sender)))
     path.write_bytes(b"".join(frames))
@@ -56,7 +56,7 @@ def test_cameras_senders_and_target_are_looked_up(empty: Path, file: str) -> Non
     code, out, err = dodo("new", "mine", "--level", "dil", "--rec", file)
     assert (code, err) == (0, "")
     assert f"{file}: 15.0 s, pictures of the camera with sender stamp 0\n" in out
-    assert f"judged: groundSteering of {STEERING}/0, 151 values from -0.0672978 to 0.113228\n" in out
+    assert f"judged: groundSteering of {STEERING}/0, 151 values from -0.0675461 to 0.113257\n" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     found = spec(empty, "mine")
     assert found["rec"] == found["target"] == f"../recordings/{file}"
@@ -141,6 +141,33 @@ def test_pictures_alone_have_to_be_answered(empty: Path) -> None:
 
 
 @pytest.mark.thorough
+def test_what_is_written_compiles(empty: Path) -> None:
+    """Whatever a recording holds, and however its file is called; breaks without a signal are played shorter."""
+    compose = empty / "compose.yml"
+    compose.write_text(compose.read_text().replace("--cid=111", "--cid=111 --name=video0.argb"))
+    pictures = [encode_frame(e) for e in read_envelopes(SHIPPED) if e.data_type == 1055]
+    later = [e._replace(sample_time=e.sample_time + 3 * 3600 * 10**6) for e in read_envelopes(SHIPPED)]
+    gap = [*pictures[:10], *(encode_frame(e) for e in later if e.data_type == 1055)]
+    names = ("break.rec", "Run [1].REC", "no suffix", "a\nb.rec", "true", "-.rec", "${X}'\".rec")
+    for number, name in enumerate(names):
+        (empty / name).write_bytes(b"".join(pictures[:12] if number else gap))
+        code, out, err = dodo("new", f"t{number}", f"--rec={name}")
+        assert (code, err) == (0, "")
+        assert "320x240" not in out or "warning: the pictures of" in out
+    streams: tuple[tuple[str, list[float], int], ...] = (
+        (STEERING, [0.1] * 10, 1_000),
+        (STEERING, [float("nan")] * 10 + [1e30, -1e-12], 59 * 60 * 10**6),
+        ("opendlv.proxy.PedalPositionRequest", [-5.0] * 40, 10_000),
+    )
+    for number, (message, values, step) in enumerate(streams):
+        write(empty / f"s{number}", (message, 3, values), step=step)
+        assert dodo("new", f"s{number}", "--rec", f"s{number}")[0] == 0
+    code, out, _ = dodo("compile", "--check")
+    assert (code, out.splitlines()[-1][:17], "error" in out) == (0, "10 tests checked:", False)
+    assert "timeout: 3" in (empty / "tests/t0/t0.dodo.yml").read_text()
+
+
+@pytest.mark.thorough
 def test_a_matrix_of_recordings_makes_one_test_over_all(empty: Path) -> None:
     shutil.copy(SHIPPED, empty / "drive.rec")
     assert dodo("new", "mine", "--rec", "drive.rec")[0] == 0
@@ -169,6 +196,15 @@ def test_a_matrix_of_recordings_makes_one_test_over_all(empty: Path) -> None:
             ["--rec", "few.rec"],
             "'few.rec' has no signal to judge, expected 10 or more messages of one of opendlv.proxy.",
         ),
+        (["--rec", "empty.rec"], "'empty.rec' has no messages to play"),
+        (
+            ["--rec", "break.rec"],
+            "'break.rec' takes 1,080 minutes with a break of 120 minutes, and a test 24 h with one of",
+        ),
+        (
+            ["--rec", "other.rec"],
+            "'other.rec' has no signal to judge, expected 10 or more messages of one of opendlv.p",
+        ),
         (["--rec", "few.rec", "--level", "sil"], "a recording is played at level dil, not sil"),
         (["--rec", "few.rec", "--kind", "perception"], "--rec begins an open-loop test, not a perception one; a perc"),
         (["--rec", "few.rec", "--extends", "x"], "--level, --kind and --rec do not apply with --extends"),
@@ -177,13 +213,19 @@ def test_a_matrix_of_recordings_makes_one_test_over_all(empty: Path) -> None:
 @pytest.mark.thorough
 def test_what_makes_no_test_is_said(empty: Path, words: list[str], said: str) -> None:
     write(empty / "few.rec", (STEERING, 0, [0.1] * 9))
+    write(empty / "break.rec", (STEERING, 0, [0.1] * 10), step=2 * 3600 * 10**6)
+    write(empty / "empty.rec")
+    write(empty / "other.rec", ("opendlv.proxy.AngleRequest", 0, [0.1] * 10))
     before = contents(empty)
     code, out, err = dodo("new", "mine", *words)
     assert (code, out, contents(empty)) == (2, "", before)
     assert err.startswith(f"dodo new: {said}")
 
 
-@pytest.mark.parametrize(("values", "limit"), [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30")])
+@pytest.mark.parametrize(
+    ("values", "limit"),
+    [([0.5] * 10, "0.050"), ([0.0] * 10, "0.10"), ([0.0, 300.0] * 5, "30"), ([0.0] * 19 + [1.0], "0.025")],
+)
 @pytest.mark.thorough
 def test_limits_have_two_digits_and_are_never_zero(empty: Path, values: list[float], limit: str) -> None:
     write(empty / "drive.rec", (STEERING, 0, values))

@@ -30,7 +30,10 @@ def test_the_lines_shown_run(
         for name, sender_stamp in (("opendlv.proxy.DistanceReading", 0), ("opendlv.proxy.GroundSteeringRequest", 0))
     ]
     others += [message("opendlv.proxy.GroundSteeringRequest", BEGIN + n * 100_000) for n in range(1, 4)]
-    box = [message("opendlv.logic.perception.DetectionBoundingBox", BEGIN + 100_000, stamp) for stamp in (0, 3)]
+    box = [
+        message("opendlv.logic.perception.DetectionBoundingBox", BEGIN + 100_000, stamp, width=1, height=1)
+        for stamp in (0, 3)
+    ]
     for name in ("drive.rec", "old.rec", "desk.rec"):
         record([*video(4), *others, *box], name)
     (tmp_path / "desk.json").write_text(truth_text([Mark("yellow", 1, 2, 3, 4)], "desk.png", WIDTH, HEIGHT))

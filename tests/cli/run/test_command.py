@@ -154,6 +154,7 @@ def test_a_user_without_a_home_folder_runs_tests(dodo: Command, monkeypatch: pyt
 
 
 def test_a_verdict_without_room_for_a_report_is_printed(dodo: Command, small_disk: Path) -> None:
+    (small_disk / ".gitignore").write_text("*\n")
     (small_disk / "full").write_bytes(bytes(60_000))
     with (small_disk / "fuller").open("wb", buffering=0) as file, pytest.raises(OSError, match="No space left"):
         while True:
@@ -162,6 +163,19 @@ def test_a_verdict_without_room_for_a_report_is_printed(dodo: Command, small_dis
     assert code == 3
     assert re.search(r"^PASSED  test .* it drove$", out, re.MULTILINE)
     assert f"'{small_disk}' cannot take the whole report: No space left on device\n" in out
+
+
+def test_a_report_among_files_of_others_is_refused(dodo: Command, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    assert dodo.run(report=str(tmp_path / "other"))[0] == 0, "it is empty"
+    (tmp_path / "other" / "mine.txt").touch()
+    assert dodo.run(report=str(tmp_path / "other"))[0] == 0, "it holds a report"
+    (tmp_path / "index").mkdir()
+    for name, text in (("index.html", "mine"), (".gitignore", "*.pyc\n"), ("results.json", "[]")):
+        (tmp_path / "index" / name).write_text(text)
+        code, out, err = dodo.run(report=str(tmp_path / "index"))
+        assert code == 2 and "holds other files and no report; name a new or empty folder with --report" in out + err
+    assert (tmp_path / "index" / "index.html").read_text() == "mine"
 
 
 def test_report_among_tests_is_refused_and_harms_nothing(dodo: Command) -> None:

@@ -108,6 +108,12 @@ def seek(app: Application, number: int) -> None:
     app.send("cluon.data.PlayerCommand", command=3, seekTo=0.99)
 
 
+def nan_once(app: Application, number: int) -> None:
+    """One request that is not a number, and that a vehicle would not follow."""
+    if number == LATER:
+        app.send(STEER, groundSteering=math.nan)
+
+
 def unrecorded(app: Application, number: int) -> None:
     """The recorder stops."""
     app.send("cluon.data.RecorderCommand", command=2)
@@ -285,9 +291,9 @@ def easy(app: Application, number: int) -> None:
 
 
 ATTACKS = {name.replace("_", "-"): function for name, function in list(globals().items()) if name in (
-    "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "unrecorded", "join", "join_again",
-    "disguise", "step_to_ports", "answer_to_ports", "step_on_bus", "answer_on_bus", "repeat_steps", "spy", "echo",
-    "boxes", "easy", "directly", "true_pose", "true_pose_curve",
+    "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "nan_once", "unrecorded", "join",
+    "join_again", "disguise", "step_to_ports", "answer_to_ports", "step_on_bus", "answer_on_bus", "repeat_steps", "spy",
+    "echo", "boxes", "easy", "directly", "true_pose", "true_pose_curve",
 )}  # fmt: skip
 
 

@@ -27,6 +27,9 @@ def only(message: str, *services: str) -> str:
     return f"^the application sent {message}, which only {who} may send$"
 
 
+NAN = "^the application sent opendlv.proxy.GroundSteeringRequest/0 to '.*' after .* s: groundSteering is nan, not a "
+
+
 def nobody(message: str) -> str:
     return f"^the application sent {message}, which no service of this test sends$"
 
@@ -53,6 +56,8 @@ ATTACKS = (
     BusAttack("begin", STRAIGHT, "realtime", RUNNER),
     BusAttack("seek", REPLAY, "lockstep", nobody("cluon.data.PlayerCommand")),
     BusAttack("seek", REPLAY, "realtime", nobody("cluon.data.PlayerCommand"), long=True),
+    BusAttack("nan-once", STRAIGHT, "lockstep", NAN),
+    BusAttack("nan-once", STRAIGHT, "realtime", NAN),
     BusAttack("unrecorded", STRAIGHT, "lockstep", WALL),
     BusAttack("join", STRAIGHT, "realtime", only(FRAME, "pose")),
     BusAttack("join-again", STRAIGHT, "realtime", only(FRAME, "pose")),

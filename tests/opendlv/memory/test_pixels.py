@@ -12,7 +12,6 @@ SMOOTH = cv2.resize(np.random.default_rng(3).integers(100, 156, (3, 4, 3), np.ui
 @pytest.mark.parametrize(("format_", "size"), [("argb", 12288), ("bgr", 9216), ("rgb", 9216), ("i420", 4608)])
 def test_a_picture_goes_through_memory(format_: str, size: int) -> None:
     assert pixels.size(format_, WIDTH, HEIGHT) == size
-    assert pixels.format_of(f"video0.{'rgb' if format_ == 'rgb' else 'argb'}", size, WIDTH, HEIGHT) == format_
     memory = bytearray(size + 5)
     pixels.view(memory, format_, WIDTH, HEIGHT)[:] = pixels.from_bgr(SMOOTH, format_)
     back = pixels.to_bgr(pixels.view(memory, format_, WIDTH, HEIGHT), format_)
@@ -34,7 +33,6 @@ def test_the_order_of_the_bytes() -> None:
     [
         (lambda: pixels.size("yuyv", 2, 2), "unknown pixel format 'yuyv'"),
         (lambda: pixels.size("i420", 3, 2), "even width and height, not 3 x 2"),
-        (lambda: pixels.format_of("video0.argb", 100, 64, 48), "100 bytes, not an image of 64 x 48"),
         (lambda: pixels.view(bytes(11), "bgr", 2, 2), "11 bytes are too few for bgr of 2 x 2 pixels, 12 bytes"),
     ],
 )

@@ -135,6 +135,14 @@ def test_own_messages_replace_standard_ones(message_set: Callable[[str], Message
             messages.type(gone)
 
 
+def test_what_is_kept_is_not_replaced(tmp_path: Path) -> None:
+    path, frame, type_ = tmp_path / "own.odvd", "opendlv.sim.Frame", "opendlv.logic.perception.DetectionType"
+    path.write_text(f"message {frame} [id = 1001] {{ float x; }} message team.Object [id = 1130] {{ float size; }}")
+    messages = MessageSet.load(path, kept={frame, type_})
+    assert (messages.id(frame), messages.id(type_), messages.id("team.Object")) == (1003, 1130, 1130)
+    assert messages.name(1130) == "team.Object" and 1001 not in messages.ids()
+
+
 def test_nested_messages_and_fields_out_of_order(message_set: Callable[[str], MessageSet]) -> None:
     messages = message_set(
         "package own; message Inner [id = 3000] { uint8 b [id = 2]; uint8 a [id = 1]; }"
@@ -155,7 +163,8 @@ def test_nested_messages_and_fields_out_of_order(message_set: Callable[[str], Me
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("message M [id = 2950] {}", ":1:9: ids 2900 to 2999 are DoDo's own"),
+        ("message M [id = 2950] {}", ":1:9: ids 2900 to 2999 and names that begin with 'dodo.'"),
+        ("message dodo.Step [id = 3000] {}", ":1:9: ids 2900 to 2999 and names that begin with 'dodo.'"),
         ("message M [id = 3000] { Nothing x; }", ":1:33: 'Nothing' is neither a type nor a message"),
         ("message M [id = 3000] { M x; }", "'M' nests messages without end"),
     ],

@@ -34,6 +34,14 @@ def test_defaults_are_those_of_the_specification(number: int, flag: bool) -> Non
     assert (message.n, message.b) == (number, flag)  # type: ignore[attr-defined]
 
 
-def test_names_that_protobuf_cannot_tell_apart() -> None:
-    with pytest.raises(OdvdError, match=r":1:9: the name 'M' or the name of a field in it clashes with another"):
-        protobuf_classes.build(parse("message M [id = 1] { float speed; float speed_; }"))
+@pytest.mark.parametrize("names", [("speed", "speed_"), ("foo_bar", "fooBar"), ("x", "X")])
+def test_names_that_are_alike_in_json_are_two(names: tuple[str, str]) -> None:
+    fields = "".join(f"float {name};" for name in names)
+    message = layout(f"message M [id = 1] {{ {fields} }}", "M").type(**dict.fromkeys(names, 1.0))
+    assert [field.name for field, _ in message.ListFields()] == list(names)
+
+
+@pytest.mark.parametrize("name", ["DESCRIPTOR", "ListFields"])
+def test_names_that_are_protobufs_own(name: str) -> None:
+    with pytest.raises(OdvdError, match=f":1:28: the name '{name}' is protobuf's own, expected another"):
+        protobuf_classes.build(parse(f"message M [id = 1] {{ float {name}; }}"))

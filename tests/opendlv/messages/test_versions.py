@@ -100,6 +100,15 @@ def test_what_only_0_9_has_is_decoded(id_: int, payload: bytes, fields: dict[str
     assert fields.items() <= found.items()
 
 
+def test_a_copy_of_a_set_replaces_nothing_of_the_other(tmp_path: Path) -> None:
+    copy = tmp_path / "team.odvd"
+    copy.write_text(STANDARD_0_9.read_text() + "message team.Lane [id = 3144] { float offset; }")
+    for version in (OLD, NEW):
+        found = message_versions.load(version, copy)
+        assert {*found.names()} - {*SETS[version].names()} == {"team.Lane"}
+        assert found.id("opendlv.sim.Frame") == SETS[version].id("opendlv.sim.Frame")
+
+
 def test_every_id_whose_payloads_tell_the_sets_apart_is_looked_at() -> None:
     old, new = SETS[OLD], SETS[NEW]
     apart = old.ids() ^ new.ids() | {id_ for id_ in old.ids() & new.ids() if wire(old, id_) != wire(new, id_)}

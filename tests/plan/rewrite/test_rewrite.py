@@ -40,7 +40,11 @@ def planned(tmp_path: Path, text: str = COMPOSE, isolation: str = "network", see
     (folder / "docker-compose.yml").write_text(text)
     (folder / "perception.py").touch()
     source, problems = read_application(folder / "docker-compose.yml")
-    assert problems == []
+    assert [problem.message.partition(",")[0] for problem in problems] == [
+        f"the process of '{name}' has no '{target}'"
+        for name, target in [("perception", "/weights")]
+        if "./weights" in text and "x-dodo-process" in text
+    ]
     assert source is not None
     folder = tmp_path / "generated" / "my-test"
     return plan_application(source, Setting(140, isolation, folder, ("track",), time_seed=seed))

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.report import child_jobs, results
+from dodo_dsl.report import child_jobs
 from dodo_dsl.report.child_jobs import NoChildJobs
+from dodo_dsl.report.results import GivenReport
 from tests.report.joined.gitlab_api import Api, serving
 from tests.report.joined.reports import named, tree, write
 
@@ -25,17 +26,15 @@ def api(tmp_path: Path) -> Iterator[Api]:
         yield served
 
 
-def fetched(api: Api, folder: Path, **more: str) -> dict[str, Path | None]:
-    return dict(child_jobs.fetch(child_jobs.of_job(api.environment(**more)), folder))
+def fetched(api: Api, folder: Path, **more: str) -> tuple[list[GivenReport], list[str]]:
+    return child_jobs.fetch(child_jobs.of_job(api.environment(**more)), folder)
 
 
 def test_the_reports_of_all_jobs_are_fetched(api: Api, tmp_path: Path) -> None:
-    found = fetched(api, tmp_path / "target")
-    assert list(found) == ["broken", "drive", "look"]
-    assert found["broken"] is None
-    for name in ("drive", "look"):
-        place = found[name]
-        assert place is not None and tree(place) == tree(tmp_path / "jobs" / name / "dodo-report")
+    found, sentences = fetched(api, tmp_path / "target")
+    assert sentences == ["job 'broken' has no report"]
+    for name, place in zip(("drive", "look"), (report.folder for report in found), strict=True):
+        assert tree(place) == tree(tmp_path / "jobs" / name / "dodo-report")
         assert [each.name for each in place.parent.iterdir()] == ["dodo-report"]
     assert {*api.tokens} == {("secret", None)}
 
@@ -76,19 +75,19 @@ def test_an_answer_that_is_no_list_of_jobs_is_said(api: Api, tmp_path: Path, ans
         fetched(api, tmp_path / "target")
 
 
-def test_an_archive_writes_only_into_its_report(api: Api, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["/tmp/absolute", "dodo-report/../../above", "../beside"])
+def test_an_archive_writes_only_into_its_report(name: str, api: Api, tmp_path: Path) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
-        for name in ("/tmp/absolute", "dodo-report/../../above", "../beside", "elsewhere/file"):
-            archive.writestr(name, "x")
         link = zipfile.ZipInfo("dodo-report/link")
         link.external_attr = (stat.S_IFLNK | 0o777) << 16
         archive.writestr(link, "/etc/passwd")
-        archive.writestr("dodo-report/results.json", "[]")
-    api.changed["artifacts"] = buffer.getvalue()
-    found = fetched(api, tmp_path / "target")
-    assert tree(tmp_path / "target") == {f"{n}/dodo-report/results.json": b"[]" for n in (2, 3)}
-    assert results.FILE_NAME == "results.json" and len(found) == 3
+        archive.writestr("elsewhere/file", "x")
+        archive.writestr(name, "x")
+    api.changed["jobs/3/artifacts"] = buffer.getvalue()
+    reports, sentences = fetched(api, tmp_path / "target")
+    assert len(reports) == 1 and not any((tmp_path / "target" / "3").iterdir())
+    assert f"'look' is left out: its artifacts, job 3, cannot be read ('{name}' lies outside)" in sentences[1]
 
 
 def archive(change: Callable[[bytearray], None]) -> bytes:
@@ -113,14 +112,43 @@ def encrypt(data: bytearray) -> None:
     data[6] |= 1
 
 
-@pytest.mark.parametrize("data", [b"not a zip", archive(damage), archive(encrypt)], ids=["no", "damaged", "encrypted"])
-def test_a_damaged_archive_is_said(data: bytes, api: Api, tmp_path: Path) -> None:
-    api.changed["artifacts"] = data
-    with pytest.raises(NoChildJobs, match="the artifacts of job 2 cannot be read"):
-        fetched(api, tmp_path / "target")
+def renamed(name: str) -> bytes:
+    return archive(lambda data: None).replace(b"dodo-report/results.json", name.ljust(24, "x").encode())
 
 
-def test_what_is_too_large_is_refused(api: Api, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+EXPECTED = "expected a zip archive with dodo-report/results.json"
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"not a zip", f"its artifacts, job 3, cannot be read (File is not a zip file), {EXPECTED}"),
+        (archive(lambda _: None)[:-30], EXPECTED),
+        (archive(damage), EXPECTED),
+        (archive(encrypt), f"is encrypted, password required for extraction), {EXPECTED}"),
+        (archive(lambda data: data.__setitem__(slice(data.index(b"PK\1\2") + 16, data.index(b"PK\1\2") + 20), b"abcd")),
+         f"(Bad CRC-32 for file 'dodo-report/results.json'), {EXPECTED}"),
+        (archive(lambda _: None), "dodo-report/results.json: not results of DoDo ("),
+        (renamed("dodo-report/test.rec"), "there is no dodo-report/results.json"),
+        (renamed("elsewhere/"), "job 'look' has no report"),
+    ],
+    ids=["no zip", "truncated", "damaged", "encrypted", "crc", "other results", "no results", "no report"],
+)  # fmt: skip
+def test_a_job_without_a_whole_report_is_named_and_the_others_are_drawn(
+    data: bytes, said: str, api: Api, tmp_path: Path
+) -> None:
+    api.changed["jobs/3/artifacts"] = data
+    reports, sentences = fetched(api, tmp_path / "target")
+    assert [outcome.slug for report in reports for outcome in report.outcomes] == ["drive"]
+    assert len(sentences) == 2 and sentences[1].startswith("job 'look' ") and said in sentences[1]
+
+
+def test_what_is_too_large_or_refused_is_left_out(api: Api, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(child_jobs, "MOST_BYTES", 100)
-    with pytest.raises(NoChildJobs, match="the artifacts are larger than a report may be"):
-        fetched(api, tmp_path / "target")
+    api.refused = "jobs/2/artifacts"
+    said = fetched(api, tmp_path / "target")[1]
+    assert said[1:] == [
+        "job 'drive' is left out: GitLab answers '401 Unauthorized' to jobs/2/artifacts; "
+        "set DODO_API_TOKEN to a token of scope read_api",
+        "job 'look' is left out: the artifacts are larger than a report may be",
+    ]

@@ -1,5 +1,6 @@
 """Drives of tests that failed, made without running them: a recording, logs, an outcome, and the test's real Plan."""
 
+import functools
 import importlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -7,6 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from dodo_dsl import compiler
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.log_times import JUDGED_SUFFIX
 from dodo_dsl.opendlv.envelope import Envelope
@@ -14,14 +18,12 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.report.report_folder import Drawable, write_report
 from services.base import Context, Service
 from services.base.flags import load_manifest, parse
 from services.base.service import Build
 
 ROOT = Path(__file__).parents[3]
-GOLDEN = ROOT / "tests" / "emit" / "golden"
 EPOCH = 1_700_000_000_000_000
 WALL = 1_795_000_000_000_000
 """us since the epoch: of a test in lockstep, and of the machine that it ran on."""
@@ -47,6 +49,15 @@ class MadeDrive:
     """Lines by the log's name, each with its time in s of the test."""
 
 
+@functools.cache
+def shipped(slug: str) -> Plan:
+    """The Plan of a test of the registry."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        made = compiler.plan(compiler.load([ROOT / "tests_registry" / slug]), Path("generated"))
+    return made.compiled.suite.plans[0]
+
+
 def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
     """A report of these drives, as ``dodo run`` writes one."""
     compiled = report.parent / "compiled"
@@ -54,7 +65,7 @@ def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
     (compiled / "files").symlink_to(ROOT / "tests_registry")
     outcomes, tests = [], {}
     for number, drive in enumerate(drives):
-        plan = from_json((GOLDEN / drive.slug / "test.json").read_text())
+        plan = shipped(drive.slug)
         slug = f"test-{number}"
         outcomes.append(outcome_of(drive, slug))
         tests[slug] = Drawable(replace(plan, slug=slug), compiled)

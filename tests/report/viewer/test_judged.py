@@ -8,19 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dodo_dsl.plan.model import Plan
-from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.report.trajectory import Way, read_drive
 from dodo_dsl.report.viewer import encoded, page
 from dodo_dsl.report.viewer.record import JudgedRecord, read
 from services.base import Judged, JudgedBoxes
 from services.base import judged as recording
 from tests.report.viewer import drives, failures
-from tests.report.viewer.drives import EPOCH, GOLDEN, ROOT
-
-
-def plan(slug: str) -> Plan:
-    return from_json((GOLDEN / slug / "test.json").read_text())
+from tests.report.viewer.drives import EPOCH, ROOT
+from tests.report.viewer.drives import shipped as plan
 
 
 def recorded(folder: Path, fill: Callable[[Judged], object], *more: str) -> JudgedRecord:

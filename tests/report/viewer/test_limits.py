@@ -7,9 +7,8 @@ import pytest
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Place
-from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.report.viewer.page import SpecLines, checks
-from tests.report.viewer.drives import GOLDEN, ROOT, check
+from tests.report.viewer.drives import ROOT, check, shipped
 
 RESPONSE = "response: {max: 100 ms, over: 10 %, sample-times: copied}"
 OUTCOME = Outcome("t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad", 130, 0, "lockstep", "process")
@@ -20,7 +19,7 @@ RESOURCES = Place("tests_registry/dil-static-rig/dil-static-rig.dodo.yml", 9, 1)
 
 
 def test_the_place_of_a_limit_of_memory() -> None:
-    plan = from_json((GOLDEN / "dil-static-rig" / "test.json").read_text())
+    plan = shipped("dil-static-rig")
     plan = replace(plan, source_map={**plan.source_map, "resources": RESOURCES})
     outcome = replace(OUTCOME, checks=(check("peak-memory-perception", 210.0, False, max=200),))
     (found,) = checks(plan, outcome, SpecLines((ROOT,)), RECORDED)
@@ -40,7 +39,7 @@ def test_the_place_of_a_limit_of_memory() -> None:
     ],
 )
 def test_places_of_limits(slug: str, name: str, expected: list[tuple[str, int, str]]) -> None:
-    plan = from_json((GOLDEN / slug / "test.json").read_text())
+    plan = shipped(slug)
     outcome = replace(OUTCOME, checks=(check(name, 1.0, False, max=0.5),))
     (found,) = checks(plan, outcome, SpecLines((ROOT,)), RECORDED)
     assert [(p["flag"], p["line"], p["text"]) for p in found["places"]] == expected

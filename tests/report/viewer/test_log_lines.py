@@ -48,6 +48,15 @@ def test_in_real_time_both_clocks_are_one(tmp_path: Path) -> None:
     assert [time for time, *_ in log_lines.merged(tmp_path, test)["lines"]] == [-0.5, 0.25, 0.75, 1.0]
 
 
+@pytest.mark.parametrize("test", [RecordedTest(), RecordedTest(begin=1_700_000_000_000_000)], ids=["no", "lockstep"])
+def test_without_a_clock_in_common_times_count_from_when_all_were_ready(tmp_path: Path, test: RecordedTest) -> None:
+    write(tmp_path, "action.a", (WALL, b'{"dodo": "ready"}\n'))
+    write(tmp_path, "action.b", (WALL + 250_000, b'{"dodo": "ready"}\n'), (WALL + 2_250_000, b"end\n"))
+    write(tmp_path, "application.c", (WALL + 750_000, b"Traceback\n"))
+    (tmp_path / "application.d.log").write_text("untimed\n")
+    assert [time for time, *_ in log_lines.merged(tmp_path, test)["lines"]] == [-0.25, 0.0, 0.5, 2.0, None]
+
+
 @pytest.mark.parametrize(
     ("text", "levels"),
     [

@@ -34,6 +34,19 @@ def test_words_of_a_program_are_no_excuse(tmp_path: Path) -> None:
     assert event.code == 127
 
 
+def test_a_crash_upon_the_end_is_reported(tmp_path: Path) -> None:
+    async def ends() -> list[Event]:
+        client: Any = None
+        backend = DockerBackend(plan("t"), tmp_path, tmp_path, client, client, "dodo-t", [], print, b"")
+        backend._is_closing = True
+        for code in (0, 1, 134, 137, 139, 143):
+            backend._take(f"app{code}", "die", {"exitCode": str(code)})
+        backend._take("app", "oom", {})
+        return [backend._events.get_nowait() for _ in range(backend._events.qsize())]
+
+    assert asyncio.run(ends()) == [Exited("app134", 134), Exited("app139", 139), Exited("app143", 143)]
+
+
 CHECK = {"test": ["CMD", "false"]}
 
 

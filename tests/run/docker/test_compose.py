@@ -71,24 +71,6 @@ def test_an_image_that_cannot_be_pulled(
     assert str(raised.value) == f"image {image} cannot be pulled: not found{said}"
 
 
-@pytest.mark.parametrize(
-    ("problem", "more"), [("line 9: unexpected [", "; the line may be of an env_file: a.env"), ("x", "")]
-)
-def test_a_line_without_a_file_may_be_of_an_env_file(
-    problem: str, more: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = tmp_path / "docker"
-    program.write_text(f"#!/bin/sh\necho '{problem}' >&2\nexit 1\n")
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-    made = plan()
-    service = ApplicationService("a", None, env_files=("a.env",))
-    made = replace(made, application=replace(made.application, services=(service,)))
-    with pytest.raises(BackendError) as raised:
-        asyncio.run(Compose(made, tmp_path, tmp_path, "project", print).read())
-    assert str(raised.value) == f"docker compose rejects the compiled test: {problem}{more}"
-
-
 @pytest.mark.parametrize("key", ["configs", "secrets"])
 def test_files_of_the_report_are_no_configs(key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiled test may be run with a report anywhere."""

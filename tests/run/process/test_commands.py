@@ -21,7 +21,7 @@ services:
   planner:
     image: team/planner
     command: run --cid=${CID} --rate=${RATE} --greeting=${GREETING} ${NOTHING} session=${CID}
-    env_file: [car.env, {path: private.env, required: false}]
+    env_file: [car.env, {path: private.env, required: false}, {path: raw.env, format: raw}, last.env]
     environment:
       LEVEL: debug
       FROM_OUTSIDE:
@@ -41,6 +41,10 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *passed: str) -> Co
     (tmp_path / "docker-compose.yml").write_text(COMPOSE)
     (tmp_path / ".env").write_text("CID=111\nRATE=20\nGREETING='costs $5'\n")
     (tmp_path / "car.env").write_text("WHEELBASE=0.257\nLEVEL=info\nOD4SESSION_CID=111\nTWICE=${RATE}${RATE}\n")
+    (tmp_path / "raw.env").write_text('RAW="$RATE" # all\nLEVEL=raw\n')
+    (tmp_path / "last.env").write_text(
+        "SAID=${LEVEL} ${WHEELBASE} ${RAW}\nNOTE=   # of the service, and earlier files\n"
+    )
     source, problems = read_application(tmp_path / "docker-compose.yml")
     assert source is not None, problems
     folder = tmp_path / "generated" / "t"
@@ -64,6 +68,9 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         "WHEELBASE": "0.257",
         "OD4SESSION_CID": "150",
         "TWICE": "2020",
+        "RAW": '"$RATE" # all',
+        "SAID": 'debug 0.257 "$RATE" # all',
+        "NOTE": "# of the service, and earlier files",
         "LEAK": "",
         "LICENSE": "none",
     }

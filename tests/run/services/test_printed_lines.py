@@ -93,6 +93,37 @@ def test_what_matches_nothing_is_no_message(desk: Desk, line: bytes) -> None:
     assert (desk.print(line), desk.said) == ([], [])
 
 
+CODES = (
+    b"\x1b[32m", b"\x1b[m", b"\x1b[38;2;1;22;3m", b"\x1b[2K", b"\x1b[?25l", b"\x1b(B", b"\x1b7", b"\x1b=", b"\x1bM",
+    b"\x1b]0;group_06;1;7\x07", b"\x1b]8;;http://host\x1b\\", b"\x1bPq\x1b\\",
+)  # fmt: skip
+"""What programs write to a terminal beside their text."""
+
+
+def test_lines_for_a_terminal_are_the_messages_of_plain_ones(desk: Desk) -> None:
+    chosen = random.Random(7)
+    for _ in range(200):
+        line = b"group_%02d;%d;%.3f" % (chosen.randrange(99), chosen.randrange(10**9), chosen.uniform(-1, 1))
+        plain, cuts = desk.print(line), sorted(chosen.randrange(len(line) + 1) for _ in range(6))
+        parts = [line[begin:end] for begin, end in zip([0, *cuts], [*cuts, len(line)], strict=True)]
+        coloured = b"".join(part + chosen.choice(CODES) for part in parts)
+        bar = chosen.choice((b"", b"\r", b"10 %\r20 %\x1b[K\r", b"\x1b[31m99\x1b[m\r"))
+        assert len(plain) == 1
+        assert desk.print(bar + coloured) == plain
+    assert desk.silence() == "since its last match 'app' printed no line"
+    desk.print(b"\x1b[1mgroup_0X;\x1b[m")
+    assert desk.silence() == "since its last match no line of 'app' matched, the nearest is 'group_0X;'"
+
+
+@pytest.mark.parametrize(
+    "match", ["\x1b\\[32m(?P<groundSteering>[0-9.]+)", "(?:\x1b\\[[0-9]*m)?(?P<groundSteering>[0-9.]+)"]
+)
+def test_a_pattern_may_know_the_colours(tmp_path: Path, match: str) -> None:
+    assert [found for _, _, found in Desk(tmp_path, Line(match, STEERING)).print(b"\x1b[32m0.5\x1b[m")] == [
+        {"groundSteering": 0.5}
+    ]
+
+
 def test_the_sender_proves_that_it_is_the_runners(desk: Desk) -> None:
     (said,) = desk.sent
     assert is_proven(KEY, said.data_type, said.payload)

@@ -1,6 +1,7 @@
 """What the clock reports to the runner."""
 
 import json
+import math
 from fractions import Fraction
 
 import pytest
@@ -13,7 +14,7 @@ from dodo_dsl.opendlv.session import Session
 from services.base.clock_link import ClockChannel, encode
 from services.base.members import Producers, SenderTable
 from services.clock import model
-from services.clock.answers import Answers
+from services.clock.answers import Answers, MessageFilter
 from services.clock.exchange import Exchange, Patience, Roles, Timing
 from services.clock.service import ClockService
 
@@ -132,4 +133,31 @@ def test_an_answer_that_is_printed_comes_from_the_runner_alone(cid: int, capsys:
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
         f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",
         "the application sent F, which only 'pose' may send",
+    ]
+
+
+def test_a_number_of_the_application_that_is_not_finite_is_reported_once(
+    cid: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of what services take, and of no other message or sender stamp; the answer counts as before."""
+    with Session(cid) as session:
+        steering, pedal = (session.messages.id(name) for name in (STEERING, "opendlv.proxy.PedalPositionRequest"))
+        answers = Answers((MessageFilter(STEERING, steering, 0),), (MessageFilter("pedal", pedal),))
+        channel = ClockChannel(cid, session.messages)
+        clock = ClockService(
+            session, channel, Roles(("vehicle",), (), ("track",)), answers, Timing(STEP, 1, Patience(1, 1))
+        )
+        clock._stepper._consumed = {"track": frozenset({steering}), "vehicle": frozenset({steering})}
+        clock._stepper.now += 700_000
+        answers.expect([5])
+        sent = [(steering, math.nan, 7), (pedal, math.nan, 0), *[(steering, -math.inf, 0)] * 2]
+        for id_, value, stamp in sent:
+            message = session.messages.type(session.messages.name(id_))()
+            setattr(message, message.DESCRIPTOR.fields[0].name, value)
+            clock._take(Envelope(id_, session.messages.encode(message), 5, 0, 5, stamp))
+        assert answers.is_complete
+        channel.close()
+    assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
+        f"the application sent {STEERING}/0 to 'vehicle' and 'track' after 0.70 s: "
+        "groundSteering is -inf, not a finite number"
     ]

@@ -3,6 +3,7 @@ import json
 import math
 import random
 from array import array
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.base import UnjudgeableError, Verdict
+from services.base.service import SINGLE
 from services.continuous_signal import model
 from services.continuous_signal.measures import SignalLimits, measure
 from services.continuous_signal.model import SignalEvaluator
 from services.continuous_signal.target import Target
+from tests.services.built import hide
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND
@@ -492,3 +495,76 @@ def test_a_target_without_a_sign_is_an_error_of_the_test() -> None:
 @pytest.mark.parametrize("limits", [SignalLimits(band=9, frame_share=0.0), SignalLimits(sign_share=0.0)])
 def test_no_sample_is_in_no_frame(limits: SignalLimits) -> None:
     assert decided(judge(limits)).outcome == "failed"
+
+
+def test_nothing_has_to_be_held_while_no_frame_is_shown() -> None:
+    """Samples at 10 Hz from 4 s to 6 s and from 8 s on; nothing was shown before 4 s and from 6 s to 8 s."""
+    limits = SignalLimits(coverage=1.0, gap=SECOND // 10, hold=SECOND // 10)
+    heard = [(step / 10, step / 100) for step in (*range(40, 60), *range(80, 101))]
+    for is_told, expected in ((True, ("passed", 1.0, 0.1)), (False, ("failed", 0.4, 4.0))):
+        it = judge(limits)
+        for begin, end in ((0, 1), (1, 4), (6, 7), (7, 8)) if is_told else ():
+            hide(it, BEGIN + begin * SECOND, BEGIN + end * SECOND)
+        hear(it, *heard)
+        verdict = decided(it)
+        found = values(verdict)
+        assert (verdict.outcome, found["coverage"], found["gap"]) == (expected[0], *map(pytest.approx, expected[1:]))
+    it = judge(limits)
+    hide(it, BEGIN, BEGIN + 90 * SECOND)
+    hear(it, (1, 0.1))
+    with pytest.raises(UnjudgeableError, match="no frame was shown"):
+        decided(it)
+
+
+def test_frames_are_counted_where_samples_have_times_of_their_own() -> None:
+    """Of 40 frames of 10 Hz 10 are answered, at any time; the target has its sign in all but the first."""
+    it = SignalEvaluator(SIGNAL, RAMP, SignalLimits(band=1.0, frame_share=0.5, sign_share=0.5), 60.0, True,
+                         np.arange(0, 10 * SECOND, SECOND // 10), is_copied=False)  # fmt: skip
+    it.begin(BEGIN)
+    hear(it, *[(step * 0.37, 1.0) for step in range(10)])
+    verdict = decided(it, 4)
+    assert values(verdict)["frame-share"] == pytest.approx(10 / 39)
+    assert values(verdict)["sign-share"] == pytest.approx(9 / 37, abs=0.02)
+    assert "29 had no sample" in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("value", "delay", "notes"),
+    [
+        (lambda _: 0.5, 0.0, ["all 101 samples of {} have the same value, 0.5"]),
+        (lambda time: abs(time - 3) / 10, 0.0, []),
+        (lambda time: abs(time - 0.3 - 3) / 10, 0.0, ["{} follows its target 0.30 s late, and no max-lag is set"]),
+        (lambda time: abs(time - 3) / 10, 0.3, ["samples of {} came 0.30 s after their time (median)"]),
+    ],
+)
+def test_a_verdict_is_noted_that_says_nothing_of_a_blind_or_late_signal(
+    value: Callable[[float], float], delay: float, notes: list[str]
+) -> None:
+    target = Target(np.array([0, 3 * SECOND, 10 * SECOND]), np.array([0.3, 0.0, 0.7]))
+    it = judge(SignalLimits(delay=SECOND), target)
+    for step in range(101):
+        it.arrived = BEGIN + step * SECOND // 10 + round(delay * SECOND)
+        hear(it, (step / 10, value(step / 10)))
+    decided(it)
+    assert it.notes == [each.format(SIGNAL) for each in notes]
+
+
+@pytest.mark.parametrize(("sent", "is_kept"), [(0.3, True), (0.29999998, True), (0.30000004, False)])
+@pytest.mark.parametrize("limit", [{"mean": 0.3}, {"distance": 0.3}, {"band": 0.3, "frame_share": 1.0}])
+def test_singles_are_compared_by_what_they_are_exact_to(limit: dict[str, float], sent: float, is_kept: bool) -> None:
+    it = judge(SignalLimits(exact=SINGLE, **limit), Target(np.array([0, 10 * SECOND]), np.zeros(2)))  # type: ignore[arg-type]
+    hear(it, *[(step / 10, float(np.float32(sent))) for step in range(101)])
+    verdict = decided(it)
+    assert (verdict.outcome == "passed") == is_kept
+    if sent == 0.3 and "band" not in limit:
+        assert values(verdict)[next(iter(limit))] == 0.3
+
+
+def test_times_of_another_clock_are_told_by_their_date() -> None:
+    it = judge(SignalLimits(delay=SECOND))
+    it.arrived = BEGIN
+    it.take(0.5, 1_746_700_000_000_000)
+    assert (
+        "but 1 sample with times of 2025-05-08, which are not the test's; if they are a recording's"
+        in decided(it).reason
+    )

@@ -34,7 +34,7 @@ CAR = SingleTrack(
 
 
 def driven(drive: Drive, seconds: float, requests: dict[str, float], freq: int = 100, **condition: float) -> Vehicle:
-    vehicle = Vehicle(freq, condition=Condition(**condition), drive=drive)
+    vehicle = Vehicle(condition=Condition(**condition), drive=drive)
     vehicle.update(0)
     for actuator, value in requests.items():
         vehicle.request(actuator, value)
@@ -108,7 +108,7 @@ def test_the_point_before_the_axle_moves_sideways() -> None:
 @pytest.mark.parametrize("drive", [DifferentialDrive(WHEELS), BicycleDrive(CAR, True), BicycleDrive(CAR)])
 def test_a_request_acts_after_the_latency_and_a_reset_forgets_all(drive: DifferentialDrive | BicycleDrive) -> None:
     actuators = [name for name in drive.rest if name != STEERING]
-    vehicle = Vehicle(100, condition=Condition(latency=0.1), drive=drive)
+    vehicle = Vehicle(condition=Condition(latency=0.1), drive=drive)
     vehicle.update(0)
     for actuator in actuators:
         vehicle.request(actuator, 1.0)
@@ -133,10 +133,16 @@ def test_the_speed_follows_the_first_order_response(has_tyres: bool) -> None:
 
 
 @pytest.mark.parametrize("has_tyres", [False, True])
+def test_a_short_lag_is_no_shorter_than_the_steps(has_tyres: bool) -> None:
+    vehicle = driven(BicycleDrive(replace(CAR, speed_lag=0.01), has_tyres), 2.0, {SPEED: 1.5, STEERING: 0.3}, freq=1)
+    assert vehicle.motion.vx == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("has_tyres", [False, True])
 def test_motor_brakes_and_ground_limit_the_acceleration(has_tyres: bool) -> None:
     def gained(start: float, asked: float, power: float = 1.0, friction: float = 1.0) -> float:
         drive = BicycleDrive(replace(CAR, friction=friction), has_tyres, by_speed=False, power=power)
-        vehicle = Vehicle(100, drive=drive)
+        vehicle = Vehicle(drive=drive)
         vehicle.motion = BodyMotion(start)
         vehicle.update(0)
         vehicle.request(ACCELERATION, asked)
@@ -200,7 +206,7 @@ def equations(car: SingleTrack, asked: float) -> Callable[[float, list[float]], 
 @pytest.mark.parametrize(("steering", "friction"), [(0.05, 1.0), (0.3, 1.0), (0.2, 0.4)])
 def test_tyres_agree_with_a_solver_of_high_order(steering: float, friction: float) -> None:
     car = replace(CAR, friction=friction)
-    vehicle = Vehicle(100, drive=BicycleDrive(car, True, by_speed=False))
+    vehicle = Vehicle(drive=BicycleDrive(car, True, by_speed=False))
     vehicle.motion = BodyMotion(20.0)
     vehicle.update(0)
     vehicle.request(STEERING, steering)
@@ -214,7 +220,7 @@ def test_tyres_agree_with_a_solver_of_high_order(steering: float, friction: floa
 @pytest.mark.parametrize("freq", [10, 100])
 def test_tyres_are_stable_from_a_standstill_through_the_blend_and_back(freq: int) -> None:
     drive = BicycleDrive(CAR, True)
-    vehicle = Vehicle(freq, drive=drive)
+    vehicle = Vehicle(drive=drive)
     vehicle.request(STEERING, 0.2)
     for number in range(20 * freq):
         now = number * SECOND // freq

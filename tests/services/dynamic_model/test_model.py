@@ -19,13 +19,13 @@ def drive(vehicle: Vehicle, seconds: float, period: int = 10_000, start: int = 0
 
 @pytest.mark.parametrize(("pedal", "speed"), [(0.14, 0.91), (1.0, 0.91), (-0.9, -1.125), (-5.0, -1.125), (0.0, 0.0)])
 def test_steady_speed(pedal: float, speed: float) -> None:
-    vehicle = Vehicle(freq=100)
+    vehicle = Vehicle()
     vehicle.press(pedal)
     assert drive(vehicle, 10).vx == pytest.approx(speed, abs=1e-9)
 
 
 def test_speed_follows_the_first_order_response() -> None:
-    vehicle = Vehicle(freq=1000)
+    vehicle = Vehicle()
     vehicle.press(0.1)
     for millisecond in range(0, 2001):
         vehicle.update(millisecond * 1000)
@@ -38,32 +38,6 @@ def test_speed_follows_the_first_order_response() -> None:
         assert vehicle.motion.vx == pytest.approx(exact, abs=1e-3)
 
 
-def test_euler_steps_are_the_ones_of_the_difference_equation() -> None:
-    vehicle = Vehicle(freq=100)
-    vehicle.press(0.1)
-    drive(vehicle, 0.5)
-    ratio = 1 - 0.01 * KIWI.resistance / KIWI.mass
-    assert vehicle.motion.vx == pytest.approx(KIWI.gain_forward * 0.1 / KIWI.resistance * (1 - ratio**50), rel=1e-12)
-
-
-def test_one_step_by_hand() -> None:
-    wheel, dt = 0.2, 0.01
-    before = BodyMotion(vx=0.5, vy=0.02, yaw_rate=0.3)
-    front = wheel - (0.02 + 0.12 * 0.3) / 0.5
-    rear = (0.104 * 0.3 - 0.02) / 0.5
-    after = step(before, wheel, 0.1, dt)
-    assert after.vx == pytest.approx(0.5 + dt * (2.6 - 2.0) / 1.113)
-    assert after.vy == pytest.approx(0.02 + dt * ((15 * front + 15 * rear) / 1.113 - 0.5 * 0.3))
-    assert after.yaw_rate == pytest.approx(0.3 + dt * (0.12 * 15 * front - 0.104 * 15 * rear) / 0.01)
-
-
-def test_slip_in_reverse_divides_by_the_amount_of_the_speed() -> None:
-    before = BodyMotion(vx=-0.5, vy=0.02, yaw_rate=0.3)
-    after = step(before, 0.2, 0.0, 0.01)
-    front, rear = 0.2 - (0.02 + 0.036) / 0.5, (0.0312 - 0.02) / 0.5
-    assert after.vy == pytest.approx(0.02 + 0.01 * (15 * (front + rear) / 1.113 + 0.5 * 0.3))
-
-
 @pytest.mark.parametrize("vx", [0.0, 0.1, -0.1, 0.05])
 def test_tyres_carry_nothing_sideways_at_low_speed(vx: float) -> None:
     after = step(BodyMotion(vx, 0.3, 2.0), 0.6, 0.0, 0.01)
@@ -71,19 +45,19 @@ def test_tyres_carry_nothing_sideways_at_low_speed(vx: float) -> None:
 
 
 def test_steady_turn_agrees_with_the_linear_single_track_model() -> None:
-    vehicle = Vehicle(freq=100)
+    vehicle = Vehicle()
     vehicle.press(0.1)
     vehicle.steer(0.1)
     motion = drive(vehicle, 5)
     base = KIWI.front + KIWI.rear
     balance = KIWI.rear * KIWI.cornering_rear - KIWI.front * KIWI.cornering_front
     gradient = KIWI.mass * balance / (base * KIWI.cornering_front * KIWI.cornering_rear)
-    assert motion.yaw_rate == pytest.approx(motion.vx * wheel_angle(0.1) / (base + gradient * motion.vx**2), rel=1e-9)
+    assert motion.yaw_rate == pytest.approx(motion.vx * wheel_angle(0.1) / (base + gradient * motion.vx**2), rel=1e-7)
     assert KIWI.inertia > 0 and motion.yaw_rate > 0
 
 
 def test_left_is_positive_and_right_its_mirror() -> None:
-    left, right = Vehicle(100), Vehicle(100)
+    left, right = Vehicle(), Vehicle()
     for vehicle, sign in ((left, 1), (right, -1)):
         vehicle.press(0.1)
         vehicle.steer(sign * 0.15)
@@ -101,30 +75,29 @@ def test_requests_are_scaled_and_limited() -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_requests_that_are_no_numbers_change_nothing(value: float) -> None:
-    vehicle, same = Vehicle(100), Vehicle(100)
+    vehicle, same = Vehicle(), Vehicle()
     for each in (vehicle, same):
         assert each.press(0.1) and each.steer(0.1)
     assert not vehicle.press(value) and not vehicle.steer(value)
-    assert vehicle.rejected == 2
     assert drive(vehicle, 1) == drive(same, 1)
 
 
 def test_the_first_update_advances_nothing() -> None:
-    vehicle = Vehicle(100)
+    vehicle = Vehicle()
     vehicle.press(0.14)
     assert vehicle.update(5 * SECOND) == BodyMotion()
-    assert vehicle.update(5 * SECOND + 10_000).vx == pytest.approx(0.01 * KIWI.gain_forward * 0.14 / KIWI.mass)
+    assert vehicle.update(5 * SECOND + 10_000).vx == pytest.approx(-0.91 * math.expm1(-0.04 / KIWI.mass), rel=1e-4)
 
 
 def test_time_does_not_run_backwards() -> None:
-    vehicle = Vehicle(100)
+    vehicle = Vehicle()
     vehicle.update(10)
     with pytest.raises(ValueError, match="backwards by 3 us"):
         vehicle.update(7)
 
 
 def test_a_long_pause_is_taken_in_steps_of_the_period() -> None:
-    once, often = Vehicle(100), Vehicle(100)
+    once, often = Vehicle(), Vehicle()
     for vehicle in (once, often):
         vehicle.press(0.1)
         vehicle.steer(0.2)
@@ -133,57 +106,38 @@ def test_a_long_pause_is_taken_in_steps_of_the_period() -> None:
     assert once.motion == drive(often, 3)
 
 
-@given(st.integers(1, 2_000_000), st.sampled_from([7.5, 10, 30, 60, 100, 300, 1000]))
-def test_steps_are_never_longer_than_the_period_and_lose_no_time(elapsed: int, freq: float) -> None:
-    vehicle = Vehicle(freq)
+@given(st.integers(1, 2_000_000))
+def test_however_seldom_it_is_updated_the_steps_are_fine_and_lose_no_time(elapsed: int) -> None:
+    vehicle = Vehicle()
     vehicle.press(0.1)
     vehicle.update(0)
     vehicle.update(elapsed)
-    steps = math.ceil(elapsed / math.ceil(SECOND / freq))
-    limit = KIWI.gain_forward * 0.1 / KIWI.resistance
-    ratio = 1 - elapsed / SECOND / steps * KIWI.resistance / KIWI.mass
-    assert vehicle.motion.vx == pytest.approx(limit * (1 - ratio**steps), rel=1e-4)
+    limit, decay = KIWI.gain_forward * 0.1 / KIWI.resistance, KIWI.resistance / KIWI.mass * elapsed / SECOND
+    assert vehicle.motion.vx == pytest.approx(-limit * math.expm1(-decay), rel=1e-4)
 
 
-def test_finer_steps_are_stable_where_the_public_scheme_is_not() -> None:
-    def swing(steps: int) -> float:
-        vehicle = Vehicle(100, steps=steps)
-        vehicle.press(4 * 0.12 / 26)
-        vehicle.motion = BodyMotion(0.12, 0.0, 0.1)
-        drive(vehicle, 2)
-        return abs(vehicle.motion.yaw_rate)
-
-    assert swing(steps=1) > 1e3
-    assert swing(steps=2) < 1e-9
-
-
-@pytest.mark.parametrize("rate", [100, 200])
-def test_the_limit_of_stability_is_where_the_motion_stops_to_decay(rate: float) -> None:
-    limit = KIWI.stable_above(rate)
-    assert limit == pytest.approx(19.14 / rate, rel=1e-3)
-    for speed, decays in ((limit * 0.99, False), (limit * 1.01, True)):
-        motion = BodyMotion(speed, 0.0, 0.1)
-        for _ in range(4000):
-            motion = step(
-                BodyMotion(speed, motion.vy, motion.yaw_rate), 0.0, 0.0, 1 / rate, replace(KIWI, slip_speed=0.01)
-            )
-        assert (abs(motion.yaw_rate) < 0.1) is decays
-
-
-def test_one_step_in_each_period_is_what_it_always_was() -> None:
-    """The drive of the public scheme, written out once more, bit for bit."""
-    vehicle = Vehicle(100)
+def test_the_public_scheme_is_not_far_away() -> None:
+    """Explicit Euler at 100 Hz, where it is stable: it is late by less than half a step, and settles to the same."""
+    vehicle, motion = Vehicle(), BodyMotion(0.5)
+    vehicle.motion = motion
     vehicle.press(0.12)
     vehicle.steer(0.2)
-    motion = BodyMotion()
-    vehicle.update(0)
-    for tick in range(1, 500):
-        motion = step(motion, 0.2 * (0.6 / 0.290888), 0.12, 0.01)
-        assert vehicle.update(tick * 10_000) == motion
+    wheel = wheel_angle(0.2)
+    for tick in range(301):
+        assert vehicle.update(tick * 10_000).vx == pytest.approx(motion.vx, abs=2e-3)
+        assert tick < 10 or vehicle.motion.yaw_rate == pytest.approx(motion.yaw_rate, abs=0.02)
+        vx, vy, r = motion.vx, motion.vy, motion.yaw_rate
+        front, rear = wheel - (vy + 0.12 * r) / vx, (0.104 * r - vy) / vx
+        motion = BodyMotion(
+            vx + 0.01 * (26 * 0.12 - 4 * vx) / 1.113,
+            vy + 0.01 * (15 * (front + rear) / 1.113 - vx * r),
+            r + 0.01 * 15 * (0.12 * front - 0.104 * rear) / 0.01,
+        )
+    assert (vehicle.motion.vy, vehicle.motion.yaw_rate) == (pytest.approx(vy, abs=1e-4), pytest.approx(r, abs=1e-4))
 
 
 def test_reset_is_standing_still() -> None:
-    vehicle = Vehicle(100)
+    vehicle = Vehicle()
     vehicle.press(0.1)
     vehicle.steer(0.2)
     assert drive(vehicle, 1).vx > 0
@@ -191,17 +145,17 @@ def test_reset_is_standing_still() -> None:
     assert drive(vehicle, 1, start=SECOND) == BodyMotion()
 
 
-def test_steps_too_long_for_the_tyres_are_an_error_and_not_a_state() -> None:
-    vehicle = Vehicle(10)
-    vehicle.press(0.05)
+def test_a_car_that_is_not_stable_is_an_error_and_not_a_state() -> None:
+    vehicle = Vehicle(replace(KIWI, cornering_rear=0.0, steering_gain=1.0))
+    vehicle.press(0.14)
     vehicle.steer(0.1)
-    with pytest.raises(ArithmeticError, match="higher freq"):
+    with pytest.raises(ArithmeticError, match="the car that its parameters describe is not stable"):
         drive(vehicle, 600, period=100_000)
 
 
 @given(latency=st.integers(0, 300_000), period=st.sampled_from([10_000, 7_000, 50_000]))
 def test_a_request_acts_after_the_latency_and_not_before(latency: int, period: int) -> None:
-    late, prompt = (Vehicle(100, condition=Condition(latency=seconds)) for seconds in (latency / SECOND, 0))
+    late, prompt = (Vehicle(condition=Condition(latency=seconds)) for seconds in (latency / SECOND, 0))
     late.update(0)
     late.press(0.1)
     for now in range(period, 1_000_001, period):
@@ -216,7 +170,7 @@ def test_a_request_acts_after_the_latency_and_not_before(latency: int, period: i
 
 
 def test_requests_that_come_while_others_are_under_way_act_in_their_order() -> None:
-    vehicle = Vehicle(100, condition=Condition(latency=0.1))
+    vehicle = Vehicle(condition=Condition(latency=0.1))
     speeds = []
     for now in range(0, 1_000_001, 10_000):
         speeds.append(vehicle.update(now).vx)
@@ -226,7 +180,7 @@ def test_requests_that_come_while_others_are_under_way_act_in_their_order() -> N
 
 
 def test_a_reset_forgets_what_is_under_way() -> None:
-    vehicle = Vehicle(100, condition=Condition(latency=0.1))
+    vehicle = Vehicle(condition=Condition(latency=0.1))
     vehicle.update(0)
     vehicle.press(0.1)
     vehicle.reset()
@@ -235,7 +189,7 @@ def test_a_reset_forgets_what_is_under_way() -> None:
 
 def test_half_the_power_has_half_the_speed_and_less_grip_a_wider_turn() -> None:
     def steady(condition: Condition) -> BodyMotion:
-        vehicle = Vehicle(100, condition=condition)
+        vehicle = Vehicle(condition=condition)
         vehicle.press(0.14)
         vehicle.steer(0.05)
         return drive(vehicle, 10)
@@ -247,7 +201,7 @@ def test_half_the_power_has_half_the_speed_and_less_grip_a_wider_turn() -> None:
 
 
 def test_the_offset_of_the_steering_is_that_of_the_wheel_in_degrees_of_a_request() -> None:
-    bent, asked = Vehicle(100, condition=Condition(steering_offset=wheel_angle(0.05))), Vehicle(100)
+    bent, asked = Vehicle(condition=Condition(steering_offset=wheel_angle(0.05))), Vehicle()
     for vehicle in (bent, asked):
         vehicle.press(0.1)
     asked.steer(0.05)

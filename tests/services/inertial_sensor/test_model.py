@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dodo_dsl.opendlv.attitude import quaternion
 from services.dynamic_model.drives import SPEED, BicycleDrive, SingleTrack
 from services.dynamic_model.model import STEERING, Vehicle
 from services.inertial_sensor.model import (
@@ -20,7 +21,7 @@ from services.inertial_sensor.model import (
     mounted,
     turned,
 )
-from services.integrator.model import BodyPose, Integrator, Twist, angles, quaternion
+from services.integrator.model import BodyPose, Integrator, Twist, angles
 
 SECOND = 1_000_000
 G = 9.81
@@ -76,7 +77,7 @@ def test_beginning_to_turn_pushes_a_sensor_before_the_centre_sideways() -> None:
 def test_the_readings_are_the_derivative_of_a_drive() -> None:
     """A car with tyres that steers and brakes, at 1 kHz, and the sensor's place differentiated twice."""
     car = SingleTrack(1500, 2500, 2.7, 1.2, 9e4, 1.1e5, 1.0, 0.6, 0.5, 0.5, 4.0, 8.0, 50.0, 3.0)
-    vehicle, body = Vehicle(1000, drive=BicycleDrive(car, True)), Integrator(BodyPose((0, 0, 0), quaternion(0, 0, 0.7)))
+    vehicle, body = Vehicle(drive=BicycleDrive(car, True)), Integrator(BodyPose((0, 0, 0), quaternion(0, 0, 0.7)))
     lever, mount = (0.8, 0.3, 0.5), mounted(0.1, -0.2, 0.3)
     model = InertialModel(lever, mount)
     places: list[NDArray[np.float64]] = []

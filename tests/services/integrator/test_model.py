@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.integrator.model import BodyPose, Integrator, Twist, quaternion
+from dodo_dsl.opendlv.attitude import quaternion
+from services.integrator.model import BodyPose, Integrator, Twist
 
 SECOND = 1_000_000
 CIRCLE = Twist((0.8, 0.1, 0.0), (0.0, 0.0, 1.3))

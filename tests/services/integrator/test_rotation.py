@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from services.integrator.model import angles, displacement, multiply, quaternion, rotate, turn
+from dodo_dsl.opendlv.attitude import quaternion
+from services.integrator.model import angles, displacement, multiply, rotate, turn
 
 rates = st.tuples(*[st.floats(-20, 20)] * 3)
 velocities = st.tuples(*[st.floats(-2, 2)] * 3)

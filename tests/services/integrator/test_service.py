@@ -36,14 +36,14 @@ def test_the_frame_starts_where_the_flags_say_and_follows_the_states() -> None:
     assert [output.message.x, output.message.y, output.message.z] == pytest.approx([0.5, 4.0, 0.5])
 
 
-def test_a_state_that_is_not_finite_is_said_once_and_changes_nothing(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_state_that_is_not_finite_is_said_and_changes_nothing(caplog: pytest.LogCaptureFixture) -> None:
     body, kind = service(), MessageSet.standard().type(STATE)
     list(body.update(0))
     body.inputs[STATE, 4](kind(vx=1.0), 0)
     with caplog.at_level(logging.WARNING):
         for _ in range(2):
             body.inputs[STATE, 4](kind(vx=math.inf, yawRate=math.nan), 500_000)
-    assert len(caplog.records) == 1 and "ignored a KinematicState" in caplog.text
+    assert len(caplog.records) == 2 and "ignored a KinematicState" in caplog.text
     (output,) = body.update(1_000_000)
     assert output.message.y == pytest.approx(3)
 
@@ -72,7 +72,9 @@ def test_the_command_reset_and_no_other() -> None:
         assert output.message.y == pytest.approx(y)
 
 
-def test_on_the_bus(cid: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("own", [[], [OLD_FRAME]])
+def test_on_the_bus(cid: int, own: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DODO_ODVD", ":".join(map(str, own)))
     flags = (f"--cid={cid}", "--frame-id=4", "--x=1", "--yaw=180")
     with Session(cid) as session, running("integrator", tmp_path, *flags):
         _, frame = receive(session, "opendlv.sim.Frame", 4)

@@ -6,6 +6,7 @@ from services.base import UnjudgeableError, Verdict
 from services.object_detection.boxes import Box, FrameKey, LabelledBox, Truth, TypeNumber
 from services.object_detection.model import DetectionEvaluator
 from services.object_detection.score import DetectionLimits, Rules
+from tests.services.built import hide
 
 SECOND = 1_000_000
 BEGIN = 7_000 * SECOND
@@ -454,3 +455,41 @@ def test_without_a_verdict_what_came_is_recorded_and_what_has_no_truth() -> None
         (9 * SECOND, False, ["false"]),
         (BEGIN, False, ["false"]),
     ]
+
+
+def test_pictures_that_were_not_shown_are_neither_missed_nor_a_gap() -> None:
+    """Of five pictures of a film, one a second, the third and the fourth were not shown."""
+    for is_told, outcome in ((True, "passed"), (False, "failed")):
+        it = judge(FILM, DetectionLimits(recall=1.0, unanswered=0.0, gap=1.5))
+        for frame in (1, 2, 5):
+            at(it, frame)
+            detect(it, frame, YELLOW, BLUE)
+        for frame in (3, 4) if is_told else ():
+            begin, end = (BEGIN + each * SECOND for each in (frame, frame + 1))
+            hide(it, begin, end, sampled=frame * SECOND, sampled_until=(frame + 1) * SECOND)
+        verdict = decided(it, 5.5)
+        assert verdict.outcome == outcome, verdict.reason
+        assert values(verdict)["gap"] == (1.0 if is_told else 3.0)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.2])
+def test_in_lockstep_a_frame_waits_from_its_own_time_for_its_answer(delay: float) -> None:
+    """The truth comes with the step that ends at the frame's time, the answer with the next one."""
+    it = judge(None, max_delay=delay)
+    for step in range(1, 21):
+        if step > 1:
+            detect(it, 7_000 + (step - 1) / 10, YELLOW)
+        reveal(it, 7_000 + step / 10, YELLOW)
+        for part in (-0.05, 0.0):
+            at(it, step / 10 + part)
+    verdict = decided(it, 2.0)
+    assert (values(verdict)["true-positives"], values(verdict)["late"]) == (19, 0)
+
+
+def test_true_boxes_are_no_late_detections() -> None:
+    it = judge(None, max_delay=0.2)
+    reveal(it, 7_000, YELLOW)
+    at(it, 1)
+    reveal(it, 7_000, BLUE)
+    detect(it, 7_000, YELLOW)
+    assert values(decided(it, 3))["late"] == 1

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 import shapely
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from services.range_finder.outlines import Cut, Outlines, Place, slice_mesh
-from services.scene.mesh_library import trimesh
 
 INSTANCE = [2.0, 0.0, 0.0, 0.0]
 COORDINATES = st.integers(-400, 400).map(lambda number: number / 100)

@@ -1,3 +1,4 @@
+import logging
 import os
 from collections.abc import Iterator
 
@@ -91,6 +92,15 @@ def test_it_never_stands_in_line(memory: SharedMemory) -> None:
 )
 def test_layouts(text: str, size: int, layout: tuple[str, int, int]) -> None:
     assert parse(text).layout(size) == layout
+
+
+def test_an_assumption_is_said_once_a_memory(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO):
+        for _ in range(3):
+            for name in ("once0.i420", "once1.i420"):
+                parse(name).layout(640 * 480 * 3 // 2)
+    assumed = "assuming that memory 'once{}.i420' has 640 x 480 pixels of i420"
+    assert caplog.messages == [assumed.format(0), assumed.format(1)]
 
 
 @pytest.mark.parametrize(

@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording, read_envelopes
 from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.video import VideoEncoder
 from services.base import Output
 from services.rec_replay.service import Replay
 from tests.services.built import built, hand, refusal
 from tests.services.process import PATIENCE, running, send
-from tests.services.rec_replay.recordings import T0, S, images, message, picture, write
+from tests.services.rec_replay.recordings import HEIGHT, IMAGE, T0, WIDTH, S, images, message, picture, write
 from tests.services.rec_replay.viewer import Viewer
 
 STATUS, END = 10, 2901
@@ -234,3 +236,30 @@ def test_every_picture_of_the_track(cid: int, tmp_path: Path, shared_data: Calla
         errors = process.communicate(timeout=PATIENCE)[1]
     assert "591 pictures were shown" in errors
     assert "could not be decoded" not in errors
+
+
+@pytest.mark.parametrize(("times", "zero"), [("recorded", T0), ("test", BEGIN)])
+def test_what_cannot_be_shown_is_told_with_the_time_until_the_next_frame(times: str, zero: int, tmp_path: Path) -> None:
+    """Two frames before a key frame, a damaged one, one of another size, and one of an unknown format at the end."""
+    frames = images([0, 1, 2, 3, 4, 5, 6, 7, 8])
+    damaged = message(IMAGE, 5, data=b"x", format="h264", width=WIDTH, height=HEIGHT)
+    small = VideoEncoder("i420", 32, 32, 1, lossless=True).encode(pixels.view(np.zeros(1536, np.uint8), "i420", 32, 32))
+    other = message(IMAGE, 6, data=small, format="h264", width=32, height=32)
+    unknown = message(IMAGE, 9, data=b"x", format="unknown", width=WIDTH, height=HEIGHT)
+    rec = write(tmp_path / "part.rec", [*frames[2:5], damaged, other, frames[8], unknown])
+    with staged(rec, "--start=0", "--timemod=2", f"--sample-times={times}") as stage:
+        stage.service.begin(stage.now)
+        stage.run(6)
+    told = [each for each in stage.status if each.DESCRIPTOR.name == "NotShown"]
+    sampled = [((each.sampled - zero) / S, (each.sampledUntil - each.sampled) / S) for each in told]
+    due = [each.dueUntil / S - BEGIN / S for each in told[:-1]]
+    assert [each.number for each in told] == [0, 1, 3, 4, 6]
+    if times == "recorded":
+        assert sampled == [(2, 1), (3, 1), (5, 1), (6, 2), (9, 86_400)]
+    else:
+        assert sampled == [(pytest.approx(at, abs=0.01), pytest.approx(for_, abs=0.01)) for at, for_ in
+                           [(0, 0.5), (0.5, 0.5), (1.5, 0.5), (2, 0.5), (3, 86_400)]]  # fmt: skip
+    assert due == pytest.approx([0.5, 1, 2, 2.5], abs=0.01)
+    assert stage.service.notes == [
+        "5 frames could not be shown, 2 of them before the first key frame, 1 of them of another size than the first"
+    ]

@@ -12,7 +12,7 @@ from dodo_dsl.opendlv.envelope import Envelope
 from services.base import JudgedTime, UnjudgeableError, Verdict
 from services.rec_replay.selection import Selection, select
 from services.responds.model import PlayedPart, of_recording
-from tests.services.built import MESSAGES, built, hand, refusal
+from tests.services.built import MESSAGES, built, hand, hide, refusal
 from tests.services.rec_replay.recordings import IMAGE, T0, message, write
 
 STEERING, S = "opendlv.proxy.GroundSteeringRequest", 1_000_000
@@ -159,3 +159,41 @@ def test_frames_are_due_as_the_player_shows_them(tmp_path: Path, timemod: float)
 def test_flags_that_leave_something_open_are_refused(tmp_path: Path, flags: tuple[str, ...], said: str) -> None:
     path = str(pictures(tmp_path, 0))
     assert refusal("responds", *(word.replace("REC", path) for word in flags)) == said.replace("REC", path)
+
+
+@pytest.mark.parametrize("is_copied", [True, False])
+def test_frames_that_were_not_shown_need_no_answer(is_copied: bool, tmp_path: Path) -> None:
+    """Of 20 frames 5 were not shown; what came then answers the frame before, and one that was shown has no answer."""
+    with judge(f"--rec={pictures(tmp_path, *[step / 10 for step in range(20)])}", "--video-sender=2") as it:
+        for step in (0, 1, 10, 11, 12):
+            hide(it, BEGIN + S + step * S // 10, BEGIN + S + (step + 1) * S // 10, step)
+        for step in (2, 3, 4, 5, 6, 7, 8, 13, 14, 15, 16, 17, 18, 19):
+            stamp = T0 + step * S // 10 if is_copied else 0
+            answer(it, stamp, 1.05 + step / 10)
+        answer(it, 0, 2.15)
+        verdict = decided(it, 4)
+    assert (values(verdict)["frames"], values(verdict)["late"]) == (15, 0)
+    assert values(verdict)["share"] == 1.0
+
+
+def test_a_recording_with_fewer_frames_than_answers_are_asked_for_is_no_verdict(tmp_path: Path) -> None:
+    flags = f"--rec={pictures(tmp_path, 0.0, 0.1, 0.2)}", "--video-sender=2", "--min-frames=3"
+    with (
+        built("responds", *ANSWER[:2], *flags) as it,
+        pytest.raises(UnjudgeableError, match=r"^only 2 frames came before .* 3 have to be"),
+    ):
+        it.begin(BEGIN)
+        hide(it, BEGIN + S, BEGIN + S + S // 10)
+        decided(it, 4)
+
+
+@pytest.mark.parametrize(("sent", "is_kept"), [(0.3, True), (0.29999998, True), (0.30000004, False), (0.31, False)])
+def test_a_value_is_what_it_was_before_it_became_a_single(sent: float, is_kept: bool) -> None:
+    with built("responds", *ANSWER[:2], "--max=0.3", "--min-frames=1", "--freq=10", "--max-time=2") as it:
+        it.begin(BEGIN)
+        for step in range(3):
+            answer(it, BEGIN + step * S // 10, step / 10 + 0.05, sent)
+        verdict = decided(it, 0.25)
+    assert (verdict.outcome == "passed") == is_kept
+    assert values(verdict)["highest"] == (0.3 if sent == 0.3 else pytest.approx(sent))
+    assert [*it.notes] == ([f"all 3 answers have the same groundSteering, {sent:.4g}"] if is_kept else [])

@@ -100,6 +100,11 @@ def test_everything(tmp_path: Path) -> None:
             ("rig-cid", "CID 120 is taken by rig 'a', expected one that only this rig has"),
         ),
         (
+            "rigs: {a: {kind: static, emulated: maybe}}",
+            ("wrong-type", "'emulated' is a string, expected true or false"),
+        ),
+        ("rigs: {a: {kind: static, emulated: false}}", ("missing-key", "'a' has no key 'cid'")),
+        (
             "rigs: {a: {kind: static, cid: 112}}",
             ("rig-cid", "CID 112 is taken by real cars, expected one that only this rig has"),
         ),

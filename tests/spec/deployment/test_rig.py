@@ -30,7 +30,16 @@ def test_hardware_and_the_emulated_rig() -> None:
     assert (KIWI.is_emulated, KIWI.tag, KIWI.isolation, KIWI.privileged) == (False, "hil-static", "host", True)
     rig = emulated()
     assert (rig.name, rig.cid) == (EMULATED, None)
-    assert (rig.is_emulated, rig.tag, rig.isolation, rig.privileged) == (True, "sil", "network", False)
+    assert (rig.is_emulated, rig.tag, rig.isolation, rig.privileged) == (True, "hil-dynamic", "network", False)
+
+
+def test_one_that_the_deployment_emulates_has_the_size_of_its_frames_alone() -> None:
+    text = "kind: {}\nserial: /dev/ttyACM0\ncamera: {{source: rpicam, width: 320}}\nlimits: {{x: 1 m}}\ntags: [rig-2]\n"
+    rig, still = (Rig("bench", kind, None, mapping(text.format(kind))) for kind in ("dynamic", "static"))
+    keys = ("serial", "camera.source", "camera.width", "camera.height", "limits.x")
+    assert [rig.text(key) for key in keys] == ["emulated", "emulated", "320", "480", ""]
+    assert (rig.tag, rig.more_tags, rig.entry(MEMORY), still.text("serial")) == ("sil", (), None, "")
+    assert (rig.is_missing, emulated("static").is_missing, emulated("static").tag) == (False, True, "hil-static")
 
 
 def test_its_runner_may_have_more_tags_than_that_of_its_kind() -> None:
@@ -41,7 +50,12 @@ def test_its_runner_may_have_more_tags_than_that_of_its_kind() -> None:
 
 def test_a_rig_that_turns_without_end_alone_gives_its_kind_to_the_gantry() -> None:
     endless = emulated(EMULATED_CIRCLE)
-    assert (endless.name, endless.kind, endless.tag, endless.is_emulated) == (EMULATED_CIRCLE, CIRCLE, "sil", True)
+    assert (endless.name, endless.kind, endless.tag, endless.is_emulated) == (
+        EMULATED_CIRCLE,
+        CIRCLE,
+        "hil-circle",
+        True,
+    )
     assert Rig("round", CIRCLE, 122, mapping("kind: circle\n")).tag == "hil-circle"
     entry = endless.entry(CIRCLE)
     assert entry is not None and isinstance(entry.value, Scalar) and entry.value.value == CIRCLE

@@ -43,6 +43,24 @@ def test_an_instance_for_each_rig() -> None:
     ]
 
 
+def test_a_kind_means_the_only_rig_of_it_or_a_pool_and_real_ones_first() -> None:
+    camera = "camera: {source: rpicam}\n"
+    one, two, model = (
+        Rig(name, "dynamic", cid, mapping(f"serial: /dev/{name}\n{camera}"))
+        for name, cid in (("one", 121), ("two", 122), ("model", None))
+    )
+    rigs = {"bare": RIGS["a"], "model": model}
+    spec = written("dynamic")
+    assert on_each(spec, RIGS) == on_each(spec, {"one": replace(one, kind="static")}) == [spec]
+    for found, expected in (
+        (rigs, [("model", "t")]),
+        ({**rigs, "one": one}, [("one", "t")]),
+        ({**rigs, "one": one, "two": two}, [("one", "t--rig-one"), ("two", "t--rig-two")]),
+        ({"dynamic": replace(one, kind="static"), "two": two}, [("dynamic", "t")]),
+    ):
+        assert [(each.rig, each.slug) for each in on_each(spec, found)] == expected
+
+
 def test_the_test_of_an_instance_has_no_rig_but_what_else_its_name_says() -> None:
     spec = written("{any: dynamic}")
     dimension = [("rig", Scalar(spec.span("rig"), "old", "old"))]

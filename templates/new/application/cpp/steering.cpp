@@ -44,7 +44,7 @@ double steer(const uint8_t *picture) {
             if (pixel[1] - pixel[0] > 80) {
                 yellow.see(column);
             }
-            if (pixel[0] - pixel[2] > 80) {
+            if (pixel[0] - pixel[2] > 20) {
                 blue.see(column);
             }
         }

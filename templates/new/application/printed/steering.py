@@ -22,5 +22,5 @@ with SharedMemory.attach(flags.name) as memory:
         with memory.lock():
             blue, green, red = (pixels[280:340, :, channel].astype(int) for channel in range(3))
             sampled = memory.sample_time()
-        left, right = middle(green - blue > 80, -0.5), middle(blue - red > 80, 0.5)
+        left, right = middle(green - blue > 80, -0.5), middle(blue - red > 20, 0.5)
         print(f"group_01;{sampled};{-(left + right):.6f};0.1")  # steering in rad, positive to the left, and pedal

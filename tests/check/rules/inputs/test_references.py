@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.file_rules import check_references
+from dodo_dsl.check.file_rules import check_input, check_references
 from tests.check.contexts import context, found
 
 GOAL = "evaluation: {track: {uses: collision, with: {goal: finnish}}}\n"
@@ -50,3 +50,69 @@ def test_a_timeout_shorter_than_an_evaluator_waits(timeout: str, rules: list[str
     problems = list(check_references(context(example, tmp_path)))
     assert [problem.rule for problem in problems] == rules
     assert all(problem.severity == "warning" for problem in problems)
+
+
+SIGNAL = """
+kind: open-loop
+clock: {clock}
+timeout: 90 s
+environment:
+  camera: {{uses: virtual-camera, with: {{map-path: ../maps/plain, freq: 10 Hz}}}}
+  {source}
+evaluation:
+  judge:
+    uses: continuous-signal
+    with: {{message: opendlv.proxy.GroundSteeringRequest, field: groundSteering, target: ../t.csv, max-mean: 1{limits}}}
+# tests/t.csv
+time,value
+{begin},0
+{end},0
+# tests/a.rec
+any
+"""
+END = "path: {uses: beacon, with: {length: 1 m}}"
+HOLD = "path: {uses: beacon, with: {length: 1 m, hold: true}}"
+REPLAY = "drive: {uses: rec-replay, with: {rec: ../a.rec, name.argb: b.argb, name.i420: b.i420}}"
+
+
+SHORT = "expects 10 answers, and what it judges has {} frames"
+OWN_TIMES = "expects samples with times of the test, and frames of 'drive' keep those of the recording"
+
+
+@pytest.mark.parametrize(
+    ("source", "limits", "begin", "end", "problem", "severities"),
+    [
+        (END, "", 0, 0.5, SHORT.format(6), "ew"),
+        (END, ", min-samples: 6", 0, 0.5, "", ""),
+        (END, ", from: 2 s, until: 2.8 s", 0, 9, SHORT.format(9), "ew"),
+        (END, "", 1.7e9, 1.7e9 + 9, "has nothing to judge: its target begins at 1,700,000,000 s", "ee"),
+        (END, ", align: sample-time", 0, 9, "aligns by sample times, which count from 1970", "ee"),
+        (END, ", max-gap: 50 ms", 0, 9, "expects an answer each 0.05 s, and frames come each 0.1 s", "ew"),
+        (HOLD, "", 0, 89, "judges 60 s of the 90 s that it may take, as nothing ends the input", "ww"),
+        (HOLD, ", max-time: 60 s", 0, 89, "", ""),
+        (END, "", 0, 89, "", ""),
+        (REPLAY, "", 0, 9, OWN_TIMES, "ew"),
+        (REPLAY.replace("rec,", "rec, sample-times: test,"), "", 0, 9, "", ""),
+    ],
+)
+def test_limits_that_the_input_cannot_meet(
+    source: str, limits: str, begin: float, end: float, problem: str, severities: str, tmp_path: Path
+) -> None:
+    for clock, severity in zip(("lockstep", "realtime"), severities or "  ", strict=True):
+        text = SIGNAL.format(clock=clock, source=source, limits=limits, begin=begin, end=end)
+        (tmp_path / clock).mkdir()
+        found = list(check_input(context(text, tmp_path / clock)))
+        assert [each.severity[0] for each in found] == severity.split()
+        for each in found:
+            assert each.message.startswith(f"'judge' {problem}") and (each.rule, bool(each.hint)) == (
+                "input-limit",
+                True,
+            )
+
+
+def test_where_the_input_ends_by_itself_it_is_judged_for_the_tests_timeout(tmp_path: Path) -> None:
+    for name, source, limit in (("a", END, "90"), ("b", HOLD, "60"), ("c", REPLAY, "90")):
+        (tmp_path / name).mkdir()
+        text = SIGNAL.format(clock="lockstep", source=source, limits="", begin=0, end=9)
+        judge = next(each for each in context(text, tmp_path / name).services if each.use.name == "judge")
+        assert judge.texts["max-time"] == limit

@@ -1,11 +1,13 @@
 """Services of a test know each other's addresses; the application cannot become one of them."""
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 import pytest
 
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
 from services.base.loop import Loop
@@ -139,6 +141,49 @@ def test_what_does_not_count_is_recorded_as_never_received(enter: Join, capsys: 
 
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
+BOX = "opendlv.logic.perception.DetectionBoundingBox"
+
+
+class Taking(Service):
+    """Takes any of these messages."""
+
+    def __init__(self) -> None:
+        names = (FRAME, STEERING, BOX, "opendlv.sim.KinematicState", "opendlv.logic.sensation.Geolocation")
+        self.inputs = {(name, None): lambda _message, _time: None for name in names}
+
+
+@pytest.mark.parametrize(
+    ("sender", "message", "fields", "said"),
+    [
+        ("stranger", STEERING, {"groundSteering": math.nan}, "groundSteering is nan"),
+        ("stranger", STEERING, {"groundSteering": 0.1}, ""),
+        ("dodo-lines", STEERING, {"groundSteering": math.inf}, "groundSteering is inf"),
+        ("stranger", BOX, {"x": 0.5, "width": -math.inf, "height": math.nan}, "width is -inf"),
+        ("stranger", "opendlv.logic.sensation.Geolocation", {"latitude": math.nan}, "latitude is nan"),
+        ("pose", FRAME, {"x": math.nan}, ""),
+        ("pose", BOX, {"x": math.nan}, ""),
+        ("own", "opendlv.sim.KinematicState", {"vx": math.nan}, ""),
+    ],
+)
+def test_a_number_that_is_not_finite_fails_the_application_that_sent_it(
+    enter: Join, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    sender: str, message: str, fields: dict[str, float], said: str,
+) -> None:  # fmt: skip
+    """In real time; it is said once. A service's own, and a replayed one, are not the application's."""
+    printed = f"{STEERING}/0=dodo-lines " if sender == "dodo-lines" else ""
+    monkeypatch.setenv(VARIABLE, f"{printed}opendlv.sim.Frame/0=pose opendlv.sim.KinematicState/0=own?")
+    session, members = enter("track")
+    source = enter(sender, b"" if sender in ("stranger", "own") else KEY)[0]
+    admitted(session, members)
+    loop = Loop("track", Taking(), session, RealTimeClock(), 0, members)
+    for time in (1, 2):
+        source.send(source.messages.type(message)(**fields), time)
+        envelope = session.receive(5.0)
+        assert envelope is not None
+        loop.handle(envelope)
+    sentence = f"the application sent {message}/0 to 'track' before the test began: {said}, not a finite number"
+    out = [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()]
+    assert out == ([sentence] if said else [])
 
 
 def test_what_the_application_prints_comes_from_the_runner_alone(
@@ -159,3 +204,13 @@ def test_what_the_application_prints_comes_from_the_runner_alone(
         f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",
         "the application sent opendlv.sim.Frame/0, which only 'pose' may send",
     ]
+
+
+def test_who_may_end_the_input_alone_may_say_what_was_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "dodo.EndOfInput=camera,drive")
+    messages = MessageSet.standard()
+    table = SenderTable.load(messages, b"")
+    told = table.by_message[messages.id("dodo.NotShown"), None]
+    assert (told.services, told.reason) == (
+        ("camera", "drive"), "the application sent dodo.NotShown, which only 'camera' and 'drive' may send",
+    )  # fmt: skip

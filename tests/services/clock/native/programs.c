@@ -1,8 +1,10 @@
 /* What tests of the test's time run: each program prints what it did, and when, in ms since it began. */
 #define _GNU_SOURCE
+#include <aio.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/futex.h>
+#include <mqueue.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
@@ -279,6 +281,65 @@ static void datagrams(void)
     say("then", (long)(stamp.tv_sec * 1000 + stamp.tv_usec / 1000 - 1699999990000));
 }
 
+static mqd_t queue;
+
+static void *send_later(void *unused)
+{
+    usleep(10000);
+    mq_send(queue, "x", 1, 0);
+    return unused;
+}
+
+static void queues(void)
+{
+    char name[32], byte;
+    struct mq_attr attributes = {.mq_maxmsg = 1, .mq_msgsize = 1};
+    struct timespec until = from_now(CLOCK_REALTIME, 20), timeout = {0, 20000000};
+    snprintf(name, sizeof name, "/dodo-%d", getpid());
+    queue = mq_open(name, O_RDWR | O_CREAT, 0600, &attributes);
+    mq_unlink(name);
+    say("timed", mq_timedreceive(queue, &byte, 1, NULL, &until));
+    in_thread(send_later, NULL);
+    say("received", mq_receive(queue, &byte, 1, NULL));
+    say("sent", mq_send(queue, "x", 1, 0));
+    until = from_now(CLOCK_REALTIME, 20);
+    say("full", mq_timedsend(queue, "x", 1, 0, &until));
+    if (pipe(pair))
+        exit(1);
+    struct aiocb request = {.aio_fildes = pair[0], .aio_buf = &byte, .aio_nbytes = 1};
+    const struct aiocb *requests[] = {&request};
+    aio_read(&request);
+    say("aio", aio_suspend(requests, 1, &timeout));
+    struct epoll_event event;
+    int epoll = epoll_create1(0);
+    say("epoll", syscall(SYS_epoll_pwait2, epoll, &event, 1, &timeout, NULL, 0));
+    say("select", syscall(SYS_pselect6, 0, NULL, NULL, NULL, &timeout, NULL));
+}
+
+/* What the next file with the number of a source or a timer is. */
+static void numbers(void)
+{
+    char bytes[100000];
+    struct pollfd timer;
+    struct itimerspec once = {{0, 0}, {0, 10000000}};
+    fclose(fopen("/dev/urandom", "r"));
+    int file = open("/dev/null", O_RDONLY), source = open("/dev/random", O_RDONLY), copy = dup(source);
+    say("fclose", read(file, bytes, sizeof bytes));
+    say("dup", read(copy, bytes, sizeof bytes));
+    dup2(file, source);
+    say("dup2", read(source, bytes, sizeof bytes));
+    close_range((unsigned)copy, (unsigned)copy, 0);
+    say("range", read(open("/dev/null", O_RDONLY), bytes, sizeof bytes));
+    fclose(fdopen(timerfd_create(CLOCK_MONOTONIC, 0), "r"));
+    timer = (struct pollfd){timerfd_create(CLOCK_MONOTONIC, 0), POLLIN, 0};
+    close_range((unsigned)timer.fd + 1, UINT32_MAX, 0);
+    for (int other = 3; other < 1024; other++)
+        if (other != timer.fd)
+            close(other);
+    timerfd_settime(timer.fd, 0, &once, NULL);
+    say("timer", poll(&timer, 1, 1000));
+}
+
 /* -- timers and signals --------------------------------------------------------------------------------------------- */
 
 static void on_signal(int number)
@@ -508,7 +569,7 @@ int main(int count, char **words)
 {
     static const struct { const char *name; void (*run)(void); } programs[] = {
         {"sleeps", sleeps}, {"day", day}, {"conds", conds}, {"semaphores", semaphores}, {"locks", locks}, {"futexes", futexes},
-        {"workers", workers}, {"files", files}, {"datagrams", datagrams}, {"timers", timers}, {"signals", signals},
+        {"workers", workers}, {"files", files}, {"queues", queues}, {"numbers", numbers}, {"datagrams", datagrams}, {"timers", timers}, {"signals", signals},
         {"system_v", system_v}, {"forks", forks}, {"nap", nap}, {"shares", shares}, {"spins", spins},
         {"randoms", randoms}, {"garbage", garbage}, {"ticks", ticks}, {"reads", reads}};
     own = words[0];

@@ -24,6 +24,10 @@ WAITS = {
         "select 0 at 20, left 0 at 20, poll 0 at 40, epoll 0 at 60, poll 1 at 70, epoll 1 at 70, read 1 at 70, "
         "recv -1 at 100, recv 1 at 110, none -1 at 110, pipe 0 at 110, read 1 at 120, nothing 0 at 130"
     ),
+    "queues": (
+        "timed -1 at 20, received 1 at 30, sent 0 at 30, full -1 at 50, aio -1 at 70, epoll 0 at 90, select 0 at 110"
+    ),
+    "numbers": "fclose 0 at 0, dup 100000 at 0, dup2 0 at 0, range 0 at 0, timer 1 at 10",
     "datagrams": "sent 1 at 7, got 1 at 7, stamped 0 at 7, then 7 at 7",
     "timers": (
         "read 8 at 15, count 1 at 15, left 5000 at 40, read 8 at 40, count 2 at 40, signal 14 at 60, sleep -1 at 60, "

@@ -2,9 +2,9 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 
-from dodo_dsl.opendlv.assets.json_file import MapError
-from services.scene.meshes import is_closed, load_obj, oriented, volume
+from services.scene.meshes import is_closed, load_obj, oriented
 from services.scene.shape import convex_parts, join, make_shape
 
 
@@ -38,7 +38,7 @@ def test_a_box_becomes_six_faces_that_look_outwards(obj, cube_obj):
 def test_a_box_that_is_inside_out_is_turned(obj, cube_obj):
     flipped = [f"f {' '.join(reversed(s.split()[1:]))}" if s[0] == "f" else s for s in cube_obj.splitlines()]
     vertices, triangles = load_obj(obj("\n".join(flipped)))
-    assert volume(vertices, triangles) == pytest.approx(8.0)
+    assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(8.0)
 
 
 def test_corners_that_a_file_repeats_are_welded(obj, cube_obj):
@@ -56,9 +56,11 @@ def test_an_open_surface_shows_from_both_sides(obj):
 
 def test_a_fine_solid_of_revolution_gets_sixteen_sides(obj):
     vertices, triangles = load_obj(obj(cylinder(96)))
-    assert (len(vertices), is_closed(triangles)) == (32, True)
+    assert (len(vertices), is_closed(vertices, triangles)) == (32, True)
     assert np.hypot(vertices[:, 0], vertices[:, 1]) == pytest.approx(np.full(32, 0.5))
-    assert volume(vertices, triangles) == pytest.approx(2.0 * 8 * 0.25 * math.sin(math.pi / 8))
+    assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(
+        2.0 * 8 * 0.25 * math.sin(math.pi / 8)
+    )
 
 
 def test_a_coarse_one_keeps_its_sides(obj):
@@ -74,7 +76,7 @@ def test_a_fine_prism_that_is_not_round_keeps_its_corners(obj):
 
 def test_joined_polygons_cover_what_the_triangles_did(obj):
     vertices, triangles = load_obj(obj(cylinder(16)))
-    loops, normals = join(vertices, triangles)
+    loops, normals, _ = join(vertices, triangles)
     assert max(map(len, loops)) <= 8
     assert len(loops) < 16 + 2 * 4
     shape = make_shape(vertices, oriented(vertices, triangles))
@@ -102,23 +104,3 @@ def test_a_cone_on_a_plate_has_two_convex_parts_and_a_box_one(obj, cube_obj):
     assert [len(part) for part in convex_parts(*load_obj(obj(cube_obj)))] == [8]
     parts = convex_parts(*load_obj(obj(stepped([4, 4, 3, 1], [0, 1, 1, 9]))))
     assert sorted(len(part) for part in parts) == [32, 48]
-
-
-BAD = [
-    ("", "has no faces"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "has no faces"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", r"a\.obj:4: the face has vertex 9, expected 1 to 3"),
-    ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"a\.obj:1: 'v 0 0 x' is not a vertex"),
-    ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite numbers"),
-    ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "no face of the OBJ file has an area"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n", "count vertices by negative numbers"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 50_001, "50001 triangles, expected at most 50000"),
-]
-
-
-@pytest.mark.parametrize(("text", "message"), BAD)
-def test_bad_objs_are_told_with_their_file(obj, text, message):
-    path = obj(text)
-    with pytest.raises(MapError, match=message) as caught:
-        load_obj(path)
-    assert str(caught.value).startswith(f"{path}:")
