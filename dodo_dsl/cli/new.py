@@ -336,7 +336,8 @@ def _test(options: argparse.Namespace, stdout: TextIO) -> int:
     stdout.write(note)
     todo = [place.todo] if place.todo else []
     spec = shown_path(str(made[0].path))
-    say_next([f"make {spec} yours", "dodo compile --check", *todo, f"dodo run {wanted.name}"], stdout)
+    emulate = " --emulate" if wanted.level == "hil" and not checked.deployment.rigs else ""
+    say_next([f"make {spec} yours", "dodo compile --check", *todo, f"dodo run {wanted.name}{emulate}"], stdout)
     return Exit.OK
 
 

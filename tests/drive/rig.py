@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import os
 import shutil
 import signal
@@ -150,7 +151,7 @@ class Run:
 @contextlib.contextmanager
 def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
     """hil-dynamic, as test `unplugged`, on a rig as if it were the emulated one, which needs no check."""
-    for name in ("maps", "sil-closed-straight", "hil-dynamic"):
+    for name in ("maps", "vehicles", "sil-closed-straight", "hil-dynamic"):
         shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)
     spec = {
         "dodo": 1,
@@ -185,7 +186,10 @@ def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
 
 def at_its_start(run: Run) -> Pose:
     """The pose at which it stands and waits for the drive."""
-    return run.rig.until(lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw) < 0.2, 120, run.runner)
+    start = math.radians(-34)
+    return run.rig.until(
+        lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw - start) < 0.2, 120, run.runner
+    )
 
 
 def on_its_way(run: Run) -> Pose:

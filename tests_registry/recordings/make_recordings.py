@@ -23,6 +23,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))  # the services of this checkout
 
 from dodo_dsl.opendlv import pixels  # noqa: E402
+from dodo_dsl.opendlv.attitude import quaternion  # noqa: E402
 from dodo_dsl.opendlv.envelope import Envelope  # noqa: E402
 from dodo_dsl.opendlv.message_set import MessageSet  # noqa: E402
 from dodo_dsl.opendlv.video import FORMAT, VideoEncoder  # noqa: E402
@@ -31,7 +32,6 @@ from services.integrator.model import (  # noqa: E402
     BodyPose,
     Integrator,
     Twist,
-    quaternion,
 )
 from services.rec_recorder.model import RecordingFile  # noqa: E402
 from services.scene.camera import Pinhole, mount  # noqa: E402

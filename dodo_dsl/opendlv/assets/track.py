@@ -324,8 +324,10 @@ def track(flags: Mapping[str, Any]) -> Track:
     """The obstacles that the flags name, from the map; raises MapError, and ValueError for flags that make no track."""
     path, goal, walls, gates = Path(flags["map-path"]), flags["goal"], flags["walls"], flags["gates"]
     least = flags["min-distance"]
-    if not goal and not gates and (least is None or not (walls or least)):
-        raise ValueError("a vehicle that stands would pass: give --goal, --gates or --min-distance")
+    if not (goal or walls or gates or least):
+        raise ValueError("nothing to judge: give --goal, --gates, --walls or --min-distance")
+    if least is None:
+        least = 0.0 if goal or gates else flags["length"]
     if goal in walls:
         raise ValueError(f"--goal={goal} is one of the --walls too")
     for name in gates:
@@ -345,5 +347,5 @@ def track(flags: Mapping[str, Any]) -> Track:
         min_margin=flags["min-margin"],
         max_speed=flags["max-speed"],
         min_body_margin=flags["min-body-margin"] or 0.0,
-        min_distance=least or 0.0,
+        min_distance=least,
     )

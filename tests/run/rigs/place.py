@@ -39,7 +39,7 @@ class Place:
         self.folder, self.rig = folder, rig
         rig.memory, rig.source = [1.0 if name == "y" else widest for name, (_, widest) in LIMITS.items()], 1
         self._started: list[subprocess.Popen[bytes]] = []
-        for name in ("maps", "sil-closed-straight", "hil-dynamic"):
+        for name in ("maps", "vehicles", "sil-closed-straight", "hil-dynamic"):
             shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)
         (folder / "tests" / "hil-fake").mkdir()
         (folder / "tests" / "hil-fake" / "hil-fake.dodo.yml").write_text(yaml.safe_dump(SPEC, sort_keys=False))

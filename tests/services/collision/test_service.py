@@ -150,8 +150,7 @@ def test_slow_frames_and_a_single_one_are_waited_for(lane: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"goal": None, "walls": []}, "a vehicle that stands would pass: give --goal, --gates or --min-distance"),
-        ({"goal": None}, "a vehicle that stands would pass: give --goal, --gates or --min-distance"),
+        ({"goal": None, "walls": []}, "nothing to judge: give --goal, --gates, --walls or --min-distance"),
         ({"goal": "left"}, "--goal=left is one of the --walls too"),
         ({"gates": ["finish", "left"]}, "left of --gates is one of the --walls too"),
         ({"gates": ["finnish"]}, "--gates: the map {lane} has no obstacle 'finnish'; did you mean 'finish'?"),
@@ -280,3 +279,10 @@ def test_a_wheel_that_is_never_asked_is_named(lane: Path) -> None:
     hand(model, FRAME, START, 2, qw=1.0)
     model.update(START + 2_000_000)
     assert model.verdict is not None and "sent no PedalPositionRequest/1" in model.verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("changes", "least"), [({"goal": None}, 0.36), ({"goal": None, "min-distance": 0.0}, 0.0), ({}, 0.0)]
+)
+def test_walls_alone_ask_for_a_vehicle_that_drives(lane: Path, changes: dict[str, Any], least: float) -> None:
+    assert service(lane, **changes).track.min_distance == least
