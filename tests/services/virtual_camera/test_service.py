@@ -252,7 +252,7 @@ def test_a_model_keeps_its_number_from_picture_to_picture(camera):
     ("flag", "message"),
     [
         ("--truth-classes=cone_green", "no model 'cone_green' in the map, which has cone_yellow, cone_blue, cone_red"),
-        ("--lines=middle", "no obstacle 'middle' with lines; the map has finish, left, right"),
+        ("--lines=middle", "no obstacle 'middle' with lines; the map has behind, beyond, finish, left, right"),
         ("--distortion.k1=-1.5", "its distortion folds the picture"),
     ],
 )

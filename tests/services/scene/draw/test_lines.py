@@ -25,5 +25,5 @@ def test_tape_is_where_the_pinhole_puts_the_line(write_map):
 
 
 def test_an_unknown_line_is_told_with_those_that_there_are():
-    with pytest.raises(MapError, match=r"no obstacle 'middle' with lines; the map has finish, left, right"):
+    with pytest.raises(MapError, match=r"no obstacle 'middle' with lines; .* behind, beyond, finish"):
         load_scene(STRAIGHT, SceneOptions(lines=("middle",)))
