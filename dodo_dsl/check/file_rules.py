@@ -302,7 +302,8 @@ def _frames(
     elif period and judged and judged[1] < judged[2]:
         most = math.floor(judged[2] / period + _CLOSE) - math.ceil(judged[1] / period - _CLOSE) + 1
     elif period and name == "min-frames" and "max-delay" in texts:
-        most = math.floor((float(texts["max-time"]) - float(texts["max-delay"])) / period + _CLOSE) + 1
+        wait = 0.0 if "message" in texts else float(texts["max-delay"])  # responds counts an answer when it comes
+        most = math.floor((float(texts["max-time"]) - wait) / period + _CLOSE) + 1
     if most < least:
         why = f"expects {least} answers, and what it judges has {most} frame{'' if most == 1 else 's'}"
         yield name, why, f"write '{name}: {most}' or less", unsure

@@ -110,6 +110,14 @@ def test_limits_that_the_input_cannot_meet(
             )
 
 
+@pytest.mark.parametrize(("least", "problem"), [(16, []), (17, ["'judge' " + SHORT.replace("10", "17").format(16)])])
+def test_an_answer_counts_when_it_comes(least: int, problem: list[str], tmp_path: Path) -> None:
+    text = SIGNAL.format(clock="lockstep", source=HOLD, limits="", begin=0, end=9)
+    text = text.replace("target: ../t.csv, max-mean: 1", f"freq: 10 Hz, max-time: 1.5 s, min-frames: {least}")
+    text = text.replace("continuous-signal", "responds")
+    assert [each.message for each in check_input(context(text, tmp_path))] == problem
+
+
 def test_where_the_input_ends_by_itself_it_is_judged_for_the_tests_timeout(tmp_path: Path) -> None:
     for name, source, limit in (("a", END, "90"), ("b", HOLD, "60"), ("c", REPLAY, "90")):
         (tmp_path / name).mkdir()
