@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.file_rules import check_input, check_references
+from dodo_dsl.check import Rule
+from dodo_dsl.check.file_rules import check_input, check_references, check_starts
 from tests.check.contexts import context, found
 
 GOAL = "evaluation: {track: {uses: collision, with: {goal: finnish}}}\n"
@@ -50,6 +51,20 @@ def test_a_timeout_shorter_than_an_evaluator_waits(timeout: str, rules: list[str
     problems = list(check_references(context(example, tmp_path)))
     assert [problem.rule for problem in problems] == rules
     assert all(problem.severity == "warning" for problem in problems)
+
+
+@pytest.mark.parametrize(
+    ("rule", "judge"),
+    [
+        (check_starts, "collision, with: {goal: finish, length: 36}"),
+        (check_input, "responds, with: {message: opendlv.proxy.GroundSteeringRequest, freq: 10 Hz, max-time: 40}"),
+    ],
+)
+def test_where_a_value_has_no_unit_nothing_else_is_told(rule: Rule, judge: str, tmp_path: Path) -> None:
+    camera = "environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, freq: 10 Hz}}}"
+    pose = "action: {pose: {uses: integrator, with: {x: 1 m, y: 1 m}}}"
+    text = f"clock: lockstep\n{camera}\n{pose}\nevaluation: {{judge: {{uses: {judge}}}}}\n"
+    assert found(rule, text, tmp_path) == []
 
 
 SIGNAL = """
