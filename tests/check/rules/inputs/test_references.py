@@ -133,6 +133,15 @@ def test_an_answer_counts_when_it_comes(least: int, problem: list[str], tmp_path
     assert [each.message for each in check_input(context(text, tmp_path))] == problem
 
 
+@pytest.mark.parametrize(("written", "rate"), [(", freq: 20 Hz", "20"), ("", "10")])
+def test_frames_have_the_rate_of_the_camera_also_if_that_is_not_written(
+    written: str, rate: str, tmp_path: Path
+) -> None:
+    text = SIGNAL.format(clock="lockstep", source=HOLD, limits="", begin=0, end=9).replace(", freq: 10 Hz", written)
+    judge = next(each for each in context(text, tmp_path).services if each.use.name == "judge")
+    assert judge.texts["freq"] == rate
+
+
 def test_where_the_input_ends_by_itself_it_is_judged_for_the_tests_timeout(tmp_path: Path) -> None:
     for name, source, limit in (("a", END, "90"), ("b", HOLD, "60"), ("c", REPLAY, "90")):
         (tmp_path / name).mkdir()
