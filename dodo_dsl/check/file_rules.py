@@ -204,9 +204,9 @@ def fault_of_start(flags: tuple[tuple[str, str, str], ...], x: float, y: float, 
     values = defaultdict[str, Any](lambda: None, {name: read.get(kind, str)(text) for name, kind, text in flags})
     try:
         course, box = track.track(values), track.VehicleBox(values["length"], values["width"])
+        return track.fault_of_start(course, track.VehiclePose(x, y, math.radians(yaw)), box)
     except (TypeError, ValueError):
         return None
-    return track.fault_of_start(course, track.VehiclePose(x, y, math.radians(yaw)), box)
 
 
 _SINCE_1970 = 1e8
@@ -301,8 +301,9 @@ def _frames(
         most = pictures(path.path, int(player.texts.get("video-sender", 0)), least)
     elif period and judged and judged[1] < judged[2]:
         most = math.floor(judged[2] / period + _CLOSE) - math.ceil(judged[1] / period - _CLOSE) + 1
-    elif period and name == "min-frames" and "max-delay" in texts:
-        most = math.floor((float(texts["max-time"]) - float(texts["max-delay"])) / period + _CLOSE) + 1
+    elif period and name == "min-frames" and {"max-delay", "max-time"} <= texts.keys():
+        wait = 0.0 if "message" in texts else float(texts["max-delay"])  # responds counts an answer when it comes
+        most = math.floor((float(texts["max-time"]) - wait) / period + _CLOSE) + 1
     if most < least:
         why = f"expects {least} answers, and what it judges has {most} frame{'' if most == 1 else 's'}"
         yield name, why, f"write '{name}: {most}' or less", unsure

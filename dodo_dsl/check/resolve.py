@@ -199,6 +199,7 @@ def resolve(
             for use in spec.uses
             if (manifest := manifests.get(use.uses.text)) is not None
         )
+        services = tuple(_at_camera_rate(each, services) for each in services)
         services, wiring = _driven(services, wire(services, declared), declared)
         if takes_old_frames(wiring, deployment.messages):
             services = tuple(_with_default(each, "true", lambda it: it.parameter.name == EULER) for each in services)
@@ -208,6 +209,14 @@ def resolve(
         played = replayed(wiring, services, deployment.messages)
         found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
     return found
+
+
+def _at_camera_rate(service: ResolvedService, others: Iterable[ResolvedService]) -> ResolvedService:
+    """The same, where its rate is by default that of another service whose own is not written either."""
+    if (rate := service.arguments.get("freq")) and not rate.value and not rate.entry:
+        found = (each.arguments["freq"].value for each in others if each.use.uses.text == rate.parameter.shared)
+        return replace(service, arguments={**service.arguments, "freq": replace(rate, value=next(found, None))})
+    return service
 
 
 def _driven(

@@ -62,11 +62,6 @@ class QuantityError(ValueError):
         self.fix = fix
 
 
-def units_of(unit: str) -> list[str]:
-    """The units that convert to one; a share has "%" beside none."""
-    return [other for other in _FACTORS[_DIMENSION[unit]] if other != SHARE]
-
-
 def _a(noun: str) -> str:
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
 

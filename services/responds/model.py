@@ -164,14 +164,13 @@ class ResponseEvaluator(Evaluator):
 
     def decide(self, span: JudgedTime) -> Verdict:
         due, limits = self._frames.due, self._limits
-        over = due + limits.delay <= (self.now or self.zero) - self.zero
-        asked = np.flatnonzero((over | self._answered) & self._shown)
+        now = self.now or self.zero
+        asked = np.flatnonzero(((due + limits.delay <= now - self.zero) | self._answered) & self._shown)
+        came = int((self._shown & (due <= (self._ended or now) - self.zero)).sum())
         if not len(asked):
             raise UnjudgeableError(f"no frame came {span.within}, so there was nothing to answer")
-        if len(asked) < limits.frames:
-            raise UnjudgeableError(
-                f"only {len(asked)} frames came {span.within}, and {limits.frames} have to be answered"
-            )
+        if came < limits.frames:
+            raise UnjudgeableError(f"only {came} frames came {span.within}, and {limits.frames} have to be answered")
         judged = self._from_first(asked)
         answered = int(self._answered[judged].sum())
         checks = tuple(self.checks(answered, len(judged)))

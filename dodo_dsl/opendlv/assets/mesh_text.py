@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -221,12 +222,12 @@ def paints(path: Path, mesh: Mesh, folder: Path) -> list[Paint]:
 
 
 def _name(name: bytes) -> str:
-    return name.decode(errors="replace").replace("\\", "/").replace("\0", "")[:250]
+    return name[:250].decode(errors="ignore").replace("\\", "/").replace("\0", "")
 
 
 def _inside(folder: Path, file: Path, line: int, name: bytes) -> Path:
     """The file that another file names relative to itself."""
-    found = (file.parent / _name(name)).resolve()
+    found = Path(os.path.realpath(file.parent / _name(name)))  # which takes links that never end, too
     if not found.is_relative_to(folder.resolve()):
         hint = "copy it there: the map's folder goes with the test"
         raise MapError(file, f"'{_name(name)}' is not a file inside the map's folder", line=line, hint=hint)

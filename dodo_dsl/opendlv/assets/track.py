@@ -160,7 +160,8 @@ def _free_ground(track: Track, pose: VehiclePose, box: VehicleBox) -> tuple[shap
     """Where the centre may be, half the vehicle's width from walls: with a way around all of the map, and without."""
     known = [outline(pose, box), *track.walls.values(), *track.goal.values(), *(lines for _, lines in track.gates)]
     hull = shapely.convex_hull(shapely.union_all(known))
-    walls = shapely.union_all([*track.walls.values()]).buffer(min(box.length, box.width) / 2, quad_segs=2)
+    parts = shapely.get_parts([*track.walls.values()])
+    walls = shapely.union_all(shapely.buffer(parts, min(box.length, box.width) / 2, quad_segs=2))  # at once is slow
     around = shapely.box(*hull.bounds).buffer(box.length + box.width, quad_segs=1)
     return shapely.difference(around, walls), shapely.difference(hull, walls)
 

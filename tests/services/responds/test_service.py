@@ -187,6 +187,13 @@ def test_a_recording_with_fewer_frames_than_answers_are_asked_for_is_no_verdict(
         decided(it, 4)
 
 
+def test_frames_that_came_are_enough_also_if_none_is_answered() -> None:
+    with built("responds", *ANSWER[:2], "--freq=10", "--max-time=2", "--min-frames=20") as it:
+        it.begin(BEGIN)
+        it.update(BEGIN + 2 * S + 1)
+        assert it.verdict and it.verdict.reason.endswith("GroundSteeringRequest/0 came within 2.00 s")
+
+
 @pytest.mark.parametrize(("sent", "is_kept"), [(0.3, True), (0.29999998, True), (0.30000004, False), (0.31, False)])
 def test_a_value_is_what_it_was_before_it_became_a_single(sent: float, is_kept: bool) -> None:
     with built("responds", *ANSWER[:2], "--max=0.3", "--min-frames=1", "--freq=10", "--max-time=2") as it:

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.file_rules import check_input, check_references
+from dodo_dsl.check import Rule
+from dodo_dsl.check.file_rules import check_input, check_references, check_starts
 from tests.check.contexts import context, found
 
 GOAL = "evaluation: {track: {uses: collision, with: {goal: finnish}}}\n"
@@ -50,6 +51,20 @@ def test_a_timeout_shorter_than_an_evaluator_waits(timeout: str, rules: list[str
     problems = list(check_references(context(example, tmp_path)))
     assert [problem.rule for problem in problems] == rules
     assert all(problem.severity == "warning" for problem in problems)
+
+
+@pytest.mark.parametrize(
+    ("rule", "judge"),
+    [
+        (check_starts, "collision, with: {goal: finish, length: 36}"),
+        (check_input, "responds, with: {message: opendlv.proxy.GroundSteeringRequest, freq: 10 Hz, max-time: 40}"),
+    ],
+)
+def test_where_a_value_has_no_unit_nothing_else_is_told(rule: Rule, judge: str, tmp_path: Path) -> None:
+    camera = "environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, freq: 10 Hz}}}"
+    pose = "action: {pose: {uses: integrator, with: {x: 1 m, y: 1 m}}}"
+    text = f"clock: lockstep\n{camera}\n{pose}\nevaluation: {{judge: {{uses: {judge}}}}}\n"
+    assert found(rule, text, tmp_path) == []
 
 
 SIGNAL = """
@@ -108,6 +123,23 @@ def test_limits_that_the_input_cannot_meet(
                 "input-limit",
                 True,
             )
+
+
+@pytest.mark.parametrize(("least", "problem"), [(16, []), (17, ["'judge' " + SHORT.replace("10", "17").format(16)])])
+def test_an_answer_counts_when_it_comes(least: int, problem: list[str], tmp_path: Path) -> None:
+    text = SIGNAL.format(clock="lockstep", source=HOLD, limits="", begin=0, end=9)
+    text = text.replace("target: ../t.csv, max-mean: 1", f"freq: 10 Hz, max-time: 1.5 s, min-frames: {least}")
+    text = text.replace("continuous-signal", "responds")
+    assert [each.message for each in check_input(context(text, tmp_path))] == problem
+
+
+@pytest.mark.parametrize(("written", "rate"), [(", freq: 20 Hz", "20"), ("", "10")])
+def test_frames_have_the_rate_of_the_camera_also_if_that_is_not_written(
+    written: str, rate: str, tmp_path: Path
+) -> None:
+    text = SIGNAL.format(clock="lockstep", source=HOLD, limits="", begin=0, end=9).replace(", freq: 10 Hz", written)
+    judge = next(each for each in context(text, tmp_path).services if each.use.name == "judge")
+    assert judge.texts["freq"] == rate
 
 
 def test_where_the_input_ends_by_itself_it_is_judged_for_the_tests_timeout(tmp_path: Path) -> None:

@@ -92,6 +92,8 @@ def test_the_colour_of_the_map_counts_before_materials(write_map, folder):
     [
         ("", LIBRARY, r"cube.obj:15: material 'red' has no colour, and the map gives the model none"),
         ("mtllib none.mtl\n", LIBRARY, r"cube.obj:1: there is no file 'none.mtl'"),
+        (f"mtllib {'ü' * 250}\n", LIBRARY, r"cube.obj:1: there is no file 'ü{125}'"),
+        ("mtllib loop.mtl\n", LIBRARY, r"cube.obj:1: there is no file 'loop.mtl'"),
         ("mtllib ../my.mtl\n", LIBRARY, r"cube.obj:1: '../my.mtl' is not a file inside the map's folder"),
         ("mtllib /etc/passwd\n", LIBRARY, r"cube.obj:1: '/etc/passwd' is not a file inside"),
         ("mtllib my set.mtl\n", LIBRARY.replace("some\\", "..\\"), r"my set.mtl:6: '../a b.png' is not a file inside"),
@@ -103,6 +105,7 @@ def test_the_colour_of_the_map_counts_before_materials(write_map, folder):
 def test_materials_that_are_none_are_told_by_the_check_and_the_camera(library, materials, said, folder):
     (folder / "cube.obj").write_text(painted(library))
     (folder / "my set.mtl").write_text(materials)
+    (folder / "loop.mtl").symlink_to("loop.mtl")
     (problem,) = formats.problems("map", folder, {}, {})
     with pytest.raises(MapError, match=said) as caught:
         load_scene(folder)
