@@ -48,7 +48,7 @@ def spec(dice: random.Random, name: str) -> dict[str, object]:
     camera = {"uses": "virtual-camera", "with": {"map-path": "../maps/straight", "freq": freq}}
     pose = {
         "uses": "integrator",
-        "with": {"freq": "100 Hz", "x": f"{dice.uniform(-9, 9):.3f} cm", "yaw": f"{dice.random()} rad"},
+        "with": {"freq": "100 Hz", "x": f"{dice.uniform(-4, 4):.3f} cm", "yaw": f"{dice.random()} rad"},
     }
     text = dice.choice(TEXTS)
     body: dict[str, object] = {

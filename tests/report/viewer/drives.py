@@ -54,8 +54,8 @@ def shipped(slug: str) -> Plan:
     """The Plan of a test of the registry."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
-        made = compiler.plan(compiler.load([ROOT / "tests_registry" / slug]), Path("generated"))
-    return made.compiled.suite.plans[0]
+        made = compiler.plan(compiler.load([ROOT / "tests_registry" / slug.partition("--")[0]]), Path("generated"))
+    return next(plan for plan in made.compiled.suite.plans if plan.slug == slug)
 
 
 def write(report: Path, drives: Iterable[MadeDrive]) -> list[Outcome]:
