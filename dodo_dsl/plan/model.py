@@ -201,7 +201,7 @@ class Plan:
     @property
     def lacks_rig(self) -> bool:
         """Whether the deployment has no rig of its kind, and does not say that such a rig is emulated."""
-        return self.emulated and KIND_TAGS.get(self.rig) == self.tag
+        return self.emulated and self.tag in KIND_TAGS.get(self.rig, ())
 
     @property
     def variables(self) -> dict[str, str]:

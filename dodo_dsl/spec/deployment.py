@@ -345,7 +345,7 @@ def _tags(found: Rig) -> Iterator[Diagnostic]:
     """Tags that would send a rig's jobs to a runner that is none of its kind's."""
     node = found.node.get("tags")
     for item in node.items if isinstance(node, Sequence) else ():
-        if isinstance(item, Scalar) and item.text in found.more_tags and item.text in rig.RESERVED_TAGS:
+        if isinstance(item, Scalar) and item.text in rig.RESERVED_TAGS - {*rig.KIND_TAGS[found.kind]}:
             message = f"'{item.text}' is the tag of other runners, those of rig '{found.name}' have '{found.tag}'"
             yield Diagnostic(item.span, "rig-tag", message, "remove it, or choose the rig's own tag")
 

@@ -31,11 +31,11 @@ LIMIT_UNITS = {
 RPICAM = "rpicam"
 """The source of a camera of a Raspberry Pi."""
 CAMERA_SOURCE = "camera.source"
-KIND_TAGS = {kind: f"hil-{kind}" for kind in ("static", "dynamic", CIRCLE)}
-"""The tags of GitLab runners by the kinds of their rigs."""
+KIND_TAGS = {"static": ("hil-static",), "dynamic": ("hil-dynamic",), CIRCLE: ("hil-dynamic", "hil-circle")}
+"""The tags of GitLab runners by the kinds of their rigs; the second keeps laps from a rig that winds up its cable."""
 SIMULATION_TAG = "sil"
 """The tag of runners without a rig."""
-RESERVED_TAGS = frozenset({SIMULATION_TAG, *KIND_TAGS.values()})
+RESERVED_TAGS = frozenset({SIMULATION_TAG}.union(*KIND_TAGS.values()))
 PORT = "serial"
 """The key of a rig's port. A service whose manifest takes a parameter from it moves the rig."""
 _SIZE = ("camera.width", "camera.height")
@@ -69,14 +69,15 @@ class Rig:
     def tag(self) -> str:
         """The tag of its GitLab runner; a rig that ``dodo.yml`` emulates runs wherever simulations do."""
         declared = self.is_emulated and self.node.span.file != EMULATED_FILE
-        return SIMULATION_TAG if declared else KIND_TAGS[self.kind]
+        return SIMULATION_TAG if declared else KIND_TAGS[self.kind][0]
 
     @property
     def more_tags(self) -> tuple[str, ...]:
         """Further tags of its runner, which distinguish it from other rigs of its kind."""
         node = None if self.is_emulated else self.node.get("tags")
         texts = [item.text for item in node.items if isinstance(item, Scalar)] if isinstance(node, Sequence) else []
-        return tuple(dict.fromkeys(text for text in texts if text != self.tag))
+        own = () if self.tag == SIMULATION_TAG else KIND_TAGS[self.kind][1:]
+        return tuple(dict.fromkeys((*own, *(text for text in texts if text != self.tag))))
 
     @property
     def isolation(self) -> str:

@@ -50,13 +50,9 @@ def test_its_runner_may_have_more_tags_than_that_of_its_kind() -> None:
 
 def test_a_rig_that_turns_without_end_alone_gives_its_kind_to_the_gantry() -> None:
     endless = emulated(EMULATED_CIRCLE)
-    assert (endless.name, endless.kind, endless.tag, endless.is_emulated) == (
-        EMULATED_CIRCLE,
-        CIRCLE,
-        "hil-circle",
-        True,
-    )
-    assert Rig("round", CIRCLE, 122, mapping("kind: circle\n")).tag == "hil-circle"
+    assert (endless.name, endless.kind, endless.is_emulated) == (EMULATED_CIRCLE, CIRCLE, True)
+    for it in (endless, Rig("round", CIRCLE, 122, mapping("kind: circle\n"))):
+        assert (it.tag, it.more_tags) == ("hil-dynamic", ("hil-circle",))
     entry = endless.entry(CIRCLE)
     assert entry is not None and isinstance(entry.value, Scalar) and entry.value.value == CIRCLE
     assert emulated().entry(CIRCLE) is None and KIWI.entry(CIRCLE) is None
