@@ -365,11 +365,12 @@ def _volumes(written: Written) -> Iterator[Diagnostic]:
 
 
 def _unmounted(written: Written) -> Iterator[Diagnostic]:
-    """A warning of a volume that a process lacks; it has the test's ``/tmp`` and devices."""
+    """A warning of a volume that a process lacks; it has its own folder, the test's ``/tmp`` and devices."""
     of_machine = (host_access.is_shared_memory, host_access.is_hardware, host_access.is_machine)
     for item, volume in enumerate(written.plain.get("volumes") or () if KEYS[1] in written.plain else ()):
         found = host_access.mount(volume)
-        if not (found.below("/tmp") or found.source == found.target or any(check(found) for check in of_machine)):
+        own = found.source in (found.target, ".", "./")
+        if not (own or found.below("/tmp") or any(check(found) for check in of_machine)):
             span = place(written.node, ("volumes", item), written.key)
             what = f"the process of '{written.name}' has no '{found.target}', as volumes are mounted in containers only"
             hint = (

@@ -150,6 +150,7 @@ def test_what_is_on_both_buses_joins_them() -> None:
     [
         ("/tmp:/tmp, /dev/shm:/dev/shm, /dev/video0:/dev/video0, /sys:/sys:ro, /tmp/.X11-unix:/tmp/.X11-unix", ""),
         ("/tmp:/tmp, './config:/opt/config:ro', data:/data", "/opt/config"),
+        ("'.:/app'", ""),
         ("{type: bind, source: ./models, target: /models}", "/models"),
     ],
 )

@@ -250,7 +250,9 @@ def _materials(file: Path, folder: Path) -> Iterator[tuple[bytes, Paint | None]]
             yield name, _inside(folder, file, line, b" ".join(texture))
         elif key == b"kd" and not is_texture:
             try:
-                red, green, blue = (min(max(0.0, float(word)), 1.0) for word in words[1:4])
+                red, green, blue = (
+                    min(max(0.0, float(word)), 1.0) for word in words[1:4] * (3 if len(words) == 2 else 1)
+                )
             except ValueError:
                 what = f"'{_text(words)}' is not a colour, expected Kd and three numbers from 0 to 1"
                 raise MapError(file, what, line=line, hint="for example 'Kd 1 0.85 0'") from None

@@ -47,7 +47,7 @@ def test_whatever_modellers_write_is_the_same_cube(text, tmp_path):
     assert len(triangles) == 12 and {point for side in sides[0] for point in side} == {p for s in sides[1] for p in s}
 
 
-LIBRARY = "newmtl red\r\nKd 1 0 0\r\n\nnewmtl tex\nKd 0.8 0.8 0.8\nmap_Kd -s 1 1 1 some\\a b.png\n"
+LIBRARY = "newmtl red\r\nKd 1 0 0\r\n\nnewmtl tex\nKd 0.8\nmap_Kd -s 1 1 1 some\\a b.png\n"
 
 
 def painted(library: str = "mtllib my set.mtl\n") -> str:
