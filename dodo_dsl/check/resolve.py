@@ -240,9 +240,9 @@ def _with_default(service: ResolvedService, text: str, is_meant: Callable[[Argum
 
 def takes_old_frames(wiring: Wiring, own: tuple[Path, ...]) -> bool:
     """Whether the application takes Frame, and means that of message set 0.9."""
-    old = (each for each in odvd.load(STANDARD_0_9) if each.name == FRAME)
-    takes = any(end.port.name == FRAME for end in wiring.application_consumes)
-    return takes and all(map(known_messages(own)[FRAME].fits, old))
+    if not own or all(end.port.name != FRAME for end in wiring.application_consumes):
+        return False
+    return all(map(known_messages(own)[FRAME].fits, (d for d in odvd.load(STANDARD_0_9) if d.name == FRAME)))
 
 
 def _arguments(test: ResolvedTest | None, layer: str, name: str) -> Mapping[str, Argument] | None:
