@@ -236,7 +236,8 @@ class Loop:
                     return
                 if self.members is not None:
                     began, arrived = self._began, self.service.arrived
-                    self.members.check_numbers(envelope, arrived - began if began and arrived else None)
+                    elapsed = arrived - began if began and arrived else None
+                    self.members.check_numbers(envelope, message, elapsed)
                 handler(message, envelope.sample_time)
 
     def _tell_strangers(self) -> None:

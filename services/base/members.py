@@ -11,7 +11,6 @@ import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -108,16 +107,14 @@ class SenderTable:
             return False
         return said.service == service and (said.host, said.port) == source
 
-    def check_numbers(self, envelope: Envelope, takers: Sequence[str], elapsed: int | None) -> None:
+    def check_numbers(self, message: Message, stamp: int, takers: Sequence[str], elapsed: int | None) -> None:
         """Report a number of the application's that is not finite, for services, ``elapsed`` us after the start."""
-        with suppress(MessageError):  # they say so
-            message = self.messages.decode(envelope.data_type, envelope.payload)
-            name = f"{message.DESCRIPTOR.full_name}/{envelope.sender_stamp}"
-            if name not in self._reported and (number := _infinite_number(message)):
-                self._reported.add(name)
-                when = "before the test began" if elapsed is None else f"after {elapsed / MICROSECONDS:.2f} s"
-                to = " and ".join(f"'{taker}'" for taker in takers)
-                self.report(f"the application sent {name} to {to} {when}: {number}, not a finite number")
+        name = f"{message.DESCRIPTOR.full_name}/{stamp}"
+        if name not in self._reported and (number := _infinite_number(message)):
+            self._reported.add(name)
+            when = "before the test began" if elapsed is None else f"after {elapsed / MICROSECONDS:.2f} s"
+            to = " and ".join(f"'{taker}'" for taker in takers)
+            self.report(f"the application sent {name} to {to} {when}: {number}, not a finite number")
 
     def report(self, reason: str) -> None:
         """Report to the runner why the test fails."""
@@ -275,11 +272,11 @@ class Members:
         self._table.report(producers.reason)  # printed, and of a service of the test
         return False
 
-    def check_numbers(self, envelope: Envelope, elapsed: int | None) -> None:
+    def check_numbers(self, envelope: Envelope, message: Message, elapsed: int | None) -> None:
         """Report the message that the session received last if the application sent it, and a number is not finite."""
         producers = self._table.producers(envelope)
         if self._session.source not in self._known if producers is None else LINES in producers.services:
-            self._table.check_numbers(envelope, [self._name], elapsed)
+            self._table.check_numbers(message, envelope.sender_stamp, [self._name], elapsed)
 
     def send(self, envelope: Envelope) -> bytes:
         """Send a message of the world to the test's services alone, and return its frame.

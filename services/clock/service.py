@@ -5,10 +5,12 @@ import logging
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
@@ -120,7 +122,9 @@ class ClockService(Service):
         """Take a message of the application."""
         takers = self._stepper.takers(envelope.data_type)
         if takers and any(each.matches(envelope) for each in self._answers.filters):
-            self._senders.check_numbers(envelope, takers, self._stepper.now - EPOCH)
+            with suppress(MessageError):  # its takers say so
+                message = self._session.messages.decode(envelope.data_type, envelope.payload)
+                self._senders.check_numbers(message, envelope.sender_stamp, takers, self._stepper.now - EPOCH)
         self._answers.take(envelope)
 
     def _over(self) -> bool:
