@@ -106,24 +106,22 @@ def load_painted(path: Path, folder: Path) -> tuple[Array, Indices, Array]:
     mesh = mesh_text.read(path)
     vertices, triangles, faces = _loaded(path, mesh)
     paints = mesh_text.paints(path, mesh, folder)
-    tiles = {paint: Texture(load_picture(paint), 0).tiles for paint in set(paints) if isinstance(paint, Path)}
+    files = {paint for paint, _ in paints if isinstance(paint, Path)}
+    tiles = {file: Texture(load_picture(file), 0).tiles for file in files}
     pictures = {file: next(each for each in tiles[file] if max(each.shape) <= _PIXELS)[:, :, :3] for file in tiles}
     colours = [
-        _shown(pictures[paint], mesh, face) if isinstance(paint, Path) else np.array(paint[::-1]) * 255.0
-        for paint, face in zip(paints, mesh.faces, strict=True)
+        _shown(pictures[paint], spots) if isinstance(paint, Path) else np.array(paint[::-1]) * 255.0
+        for paint, spots in paints
     ]
     return vertices, triangles, np.array(colours)[faces]
 
 
-def _shown(picture: Image, mesh: mesh_text.Mesh, face: mesh_text.Face) -> Array:
-    """The mean colour of what a face shows of its texture; of all of it without texture coordinates that fit."""
-    try:
-        spots = np.array([mesh.spots[each] for each in face.spots], np.float64).reshape(len(face.corners), 2)
-        spots -= np.floor(spots.min(axis=0))
-        (left, low), (right, high) = spots.min(axis=0), np.minimum(spots.max(axis=0), 1.0)
+def _shown(picture: Image, spots: mesh_text.Spots) -> Array:
+    """The mean colour of what a face shows of its texture; of all of it without texture coordinates."""
+    if spots:
+        within = np.array(spots) - np.floor(np.min(spots, axis=0))
+        (left, low), (right, high) = within.min(axis=0), np.minimum(within.max(axis=0), 1.0)
         rows, columns = picture.shape[:2]
         top, first = min(int((1 - high) * rows), rows - 1), min(int(left * columns), columns - 1)
         picture = picture[top : max(int((1 - low) * rows), top + 1), first : max(int(right * columns), first + 1)]
-    except (ValueError, IndexError):
-        pass
     return np.asarray(picture.mean(axis=(0, 1)), np.float64)

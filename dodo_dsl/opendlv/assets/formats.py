@@ -66,7 +66,7 @@ def _map(path: Path, _settings: Settings, _ids: Ids) -> Iterator[InputError]:
             yield from pointer
             if not pointer:
                 mesh = mesh_text.read(file)
-                paints += mesh_text.paints(file, mesh, read.path.parent) if is_plain else ()
+                paints += [p for p, _ in mesh_text.paints(file, mesh, read.path.parent)] if is_plain else ()
         except MapError as error:
             yield error
     for paint in dict.fromkeys((*paints, *(overlay.file for overlay in read.overlays))):

@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -207,8 +208,12 @@ _OPTION = re.compile(rb"-[a-z]+|on|off|[-+]?[0-9.]+|[rgbmlz]|sphere|cube_[a-z]+"
 """What may stand before the file of a texture."""
 
 
-def paints(path: Path, mesh: Mesh, folder: Path) -> list[Paint]:
-    """What each face is painted with by its material, of files in the map's ``folder``; raises MapError."""
+Spots = list[tuple[float, float]]
+"""Texture coordinates u, v of a face's corners, v upwards; none unless each corner has them."""
+
+
+def paints(path: Path, mesh: Mesh, folder: Path) -> list[tuple[Paint, Spots]]:
+    """What each face is painted with by its material, of files in the map's ``folder``, and where; raises MapError."""
     known: dict[bytes, Paint | None] = {}
     for line, names in mesh.libraries:
         for name in [names] if (path.parent / _name(names)).is_file() else names.split():
@@ -218,7 +223,21 @@ def paints(path: Path, mesh: Mesh, folder: Path) -> list[Paint]:
         if known.get(face.material) is None:
             what = f"material '{_text([face.material])}' has no colour" if face.material else "the face has no material"
             raise MapError(path, f"{what}, and the map gives the model none", line=face.line, hint=hint)
-    return [paint for face in mesh.faces if (paint := known[face.material]) is not None]
+    painted = ((face, known[face.material]) for face in mesh.faces)
+    return [(p, _spots(path, mesh, face) if isinstance(p, Path) else []) for face, p in painted if p is not None]
+
+
+def _spots(path: Path, mesh: Mesh, face: Face) -> Spots:
+    if len(face.spots) < len(face.corners):
+        return []
+    try:
+        found = [(float(u), float(v)) for u, v, *_ in ((*mesh.spots[each], b"0") for each in face.spots)]
+    except (ValueError, IndexError):
+        found = [(math.nan, math.nan)]
+    if not all(map(math.isfinite, itertools.chain(*found))):
+        what = "a corner's texture coordinate is not in the file, expected a line 'vt' with two numbers"
+        raise MapError(path, what, line=face.line, hint="save the whole mesh again")
+    return found
 
 
 def _name(name: bytes) -> str:
@@ -232,7 +251,7 @@ def _inside(folder: Path, file: Path, line: int, name: bytes) -> Path:
         hint = "copy it there: the map's folder goes with the test"
         raise MapError(file, f"'{_name(name)}' is not a file inside the map's folder", line=line, hint=hint)
     if not found.is_file():
-        raise MapError(file, f"there is no file '{_name(name)}'", line=line, hint="put it into the map's folder")
+        raise MapError(file, f"'{_name(name)}' does not exist", line=line, hint="put it into the map's folder")
     return found
 
 
