@@ -180,11 +180,16 @@ def _within(context: RuleContext, service: ResolvedService, seconds: str, entry:
         yield Diagnostic(entry.value.span, "short-timeout", message, hint, "warning")
 
 
+_OF_TRACK = {"length", "width", "goal", "walls", "gates", "min-margin"}
+
+
 def check_starts(context: RuleContext) -> Iterator[Diagnostic]:
     for judge in context.services:
         given = {name: each.value for name, each in judge.arguments.items() if each.value}
         flags = tuple((name, judge.arguments[name].parameter.type, str(v.path or v.text)) for name, v in given.items())
-        for mover in context.services if "walls" in judge.arguments else ():
+        needed = [each for each in judge.arguments.values() if each.entry or each.parameter.required]
+        is_track = judge.arguments.keys() >= _OF_TRACK and all(each.value for each in needed)
+        for mover in context.services if is_track else ():
             pose, origin = ([mover.texts.get(f"{of}{name}") for name in ("x", "y", "yaw")] for of in ("", "origin-"))
             is_it = f"{STATE}/{{frame-id}}" in mover.messages.inputs and not {*origin} - {"0", None}
             if not is_it or None in pose or mover.texts.get("frame-id") != judge.texts.get("frame-id"):
@@ -205,7 +210,7 @@ def fault_of_start(flags: tuple[tuple[str, str, str], ...], x: float, y: float, 
     try:
         course, box = track.track(values), track.VehicleBox(values["length"], values["width"])
         return track.fault_of_start(course, track.VehiclePose(x, y, math.radians(yaw)), box)
-    except (TypeError, ValueError):
+    except ValueError:
         return None
 
 
