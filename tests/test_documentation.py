@@ -114,7 +114,7 @@ def test_ones_own_test_is_never_left_out(newcomer: Path) -> None:
 
 
 def test_the_test_of_a_recording_with_a_table_in_seconds_checks(newcomer: Path) -> None:
-    """As the page shows it, and as it is told without the test's sample times."""
+    """The page's test has no problem; without the sample times of the test, it has one."""
     text = block("dil-by-hand", (ROOT / "docs/how-to/recordings.md").read_text())
     for folder in ("dil-by-hand", "recordings", "targets"):
         (newcomer / "tests" / folder).mkdir()

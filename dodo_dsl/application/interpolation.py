@@ -268,7 +268,7 @@ def _statements(text: str, raw: bool) -> Iterator[tuple[str, str | None]]:
         match = (_RAW_NAME if raw else _NAMED).match(text, place)
         name = match["name"].rstrip("\r" if raw else None) if match else ""
         if not match or not name or any(character.isspace() for character in name):
-            raise DotenvProblem(text, place, "there is no name of a variable", "write NAME=value, one in a line")
+            raise DotenvProblem(text, place, "a variable has no name", "write NAME=value, one on each line")
         if not match["sign"] and not raw:
             raise DotenvProblem(text, place, f"'{name}' has no value, and no line break behind it", f"write {name}=")
         value, place = None, match.end()
