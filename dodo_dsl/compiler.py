@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dodo_dsl import package_data
-from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.application.mounts import unseen_problems
+from dodo_dsl.application.model import Access, ApplicationSource
 from dodo_dsl.application.read import read_application
+from dodo_dsl.application.unseen import unseen_problems
 from dodo_dsl.check import check
 from dodo_dsl.check import problems as check_problems
 from dodo_dsl.check.context import known_messages

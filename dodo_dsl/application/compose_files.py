@@ -1,36 +1,57 @@
 """The files of an application, each read once, with their problems."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application.access.host_paths import HostPaths, repository
-from dodo_dsl.application.access.secret_variables import holds_secret, is_steering
-from dodo_dsl.application.interpolation import dotenv
+from dodo_dsl.application.host_paths import HostPaths, repository
+from dodo_dsl.application.interpolation import dotenv, filled, literal, slip_in
+from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Node, Reader, Scalar, read
+from dodo_dsl.source import Entry, Node, Reader, Scalar, read
 
+TEST_FILLED = ("command", "entrypoint", "environment", "healthcheck")
+"""The keys of a service whose variables a test may set, so that they are filled in for each test."""
+_FILLED = ("services", "volumes", "networks", "secrets", "configs", "include")
+"""The top-level keys below which compose fills in variables."""
+_LATE = ("PATH",)
+_IMAGES = "DODO_IMAGE_"
+"""How variables begin by which a pipeline sets images."""
 MAX_FILES = 64
 MAX_NODES = 50_000
 MAX_TEXT = 8_192
 _MAX_ENV = 1 << 20
 
 
-class ComposeFiles:
-    """Documents by path, ``variables`` of their ``.env`` files and ``problems``; ``secrets`` has files by variable.
+def is_late(name: str, others: Collection[str]) -> bool:
+    """Whether a variable has its value only when a test runs, as ``others`` have."""
+    return name in others or name in _LATE or name.startswith(_IMAGES)
 
-    ``roots`` are the folders of the repository, which holds all of them.
+
+class ComposeFiles:
+    """Documents by path with their variables filled in, and ``problems``; ``roots`` hold all of them.
+
+    ``known`` are the variables of their ``.env`` files, and ``secrets`` those that no compiled test holds, with their
+    files; ``passed`` are of DoDo's own environment. ``written`` are the texts with variables by their places.
     """
 
-    def __init__(self, reader: Reader = read, roots: tuple[Path, ...] = ()) -> None:
+    def __init__(self, reader: Reader = read, roots: tuple[Path, ...] = (), passed: Collection[str] = ()) -> None:
         self._reader = reader
         self._roots = roots
+        self.passed = passed
         self.problems: list[Diagnostic] = []
-        self.variables: dict[str, str] = {}
+        self.known: dict[str, str] = {"PWD": "."}
         self.secrets: dict[str, Path] = {}
+        self.written: dict[Span, str] = {}
+        self._of: dict[str, Path] = {}
         self._documents: dict[Path, source.Mapping | None] = {}
         self._nodes = 0
+
+    def is_late(self, name: str) -> bool:
+        """Whether a variable has its value only when a test runs."""
+        return is_late(name, (*self.passed, *self.secrets))
 
     @property
     def full(self) -> bool:
@@ -64,8 +85,46 @@ class ComposeFiles:
                 found = [*found, Diagnostic(node.span, "wrong-type", message)]
             self.problems.extend(found)
             fits = isinstance(node, source.Mapping) and self.grow(node, Span(str(file)))
-            self._documents[file] = node if isinstance(node, source.Mapping) and fits else None
+            self._documents[file] = self._filled(node) if isinstance(node, source.Mapping) and fits else None
         return self._documents[file]
+
+    def _filled(self, document: source.Mapping) -> source.Mapping:
+        """The document with variables filled in, but for keys of services that each test fills in, and for own keys."""
+        entries = {
+            key: Entry(e.key, self._of_services(e.value) if key == "services" else self._of_node(e.value))
+            if key in _FILLED
+            else e
+            for key, e in document.entries.items()
+        }
+        return replace(document, entries=entries)
+
+    def _of_services(self, node: Node) -> Node:
+        if not isinstance(node, source.Mapping):
+            return node
+        return replace(node, entries={k: Entry(e.key, self._of_service(e.value)) for k, e in node.entries.items()})
+
+    def _of_service(self, node: Node) -> Node:
+        if not isinstance(node, source.Mapping):
+            return self._of_node(node)
+        entries = {
+            key: Entry(e.key, self._of_node(e.value, is_filled=key not in TEST_FILLED and key[:2] != "x-"))
+            for key, e in node.entries.items()
+        }
+        return replace(node, entries=entries)
+
+    def _of_node(self, node: Node, *, is_filled: bool = True) -> Node:
+        if isinstance(node, source.Mapping):
+            entries = {k: Entry(e.key, self._of_node(e.value, is_filled=is_filled)) for k, e in node.entries.items()}
+            return replace(node, entries=entries)
+        if isinstance(node, source.Sequence):
+            return replace(node, items=tuple(self._of_node(item, is_filled=is_filled) for item in node.items))
+        if not isinstance(node.value, str) or "$" not in node.value:
+            return node
+        if slip := slip_in(node.value):
+            self.problems.append(Diagnostic(node.span, "application-file", *slip))
+        self.written[node.span] = node.value
+        text = filled(node.value, self.known, self.is_late) if is_filled else node.value
+        return replace(node, value=text, text=text)
 
     def other(self, word: Scalar, folder: Path) -> Path | None:
         """The file that another one in ``folder`` names; None, with a problem, when it is not one of the repository."""
@@ -98,15 +157,23 @@ class ComposeFiles:
         """Adds the variables of an ``.env`` file, if there is one."""
         self.problems.extend(dotenv_problems(file) if file else ())
         for name, value in variables_of(file).items() if file else ():
-            if value is None:
+            if value is None or self.is_late(name):
                 continue
-            if file and holds_secret(name, value) and not is_steering(name):
-                self.secrets.setdefault(name, file)
-            if self.variables.setdefault(name, value) != value:
+            text = literal(filled(value, self.known, self.is_late))
+            if file and (text is None or holds_secret(name, text)):
+                self.secrets.update({} if is_steering(name) else {name: file})
+            elif text is not None and self.known.get(name, text) != text:
                 message = (
                     f"variable '{name}' has another value in '{file.name if file else ''}' than in an earlier file"
                 )
                 self.problem(span, message, "a test has one .env file, so give the variable one value")
+            elif file and text is not None:
+                self.known[name], self._of[name] = text, file
+
+    def keep_secret(self, name: str) -> None:
+        """Makes a variable of the files one that no compiled test holds."""
+        if name in self._of:
+            self.secrets[name] = self._of[name]
 
 
 def variables_of(file: Path, *, raw: bool = False) -> Mapping[str, str | None]:

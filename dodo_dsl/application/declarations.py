@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application.host_access import references
-from dodo_dsl.application.model import KEYS, ApplicationSource, plain
+from dodo_dsl.application.model import KEYS, ApplicationSource, plain, references
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix, shown_path
 from dodo_dsl.source import Entry, Mapping, Node
 from dodo_dsl.spec.deployment import Declarations

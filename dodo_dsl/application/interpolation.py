@@ -1,12 +1,10 @@
 """Variables in compose files, ``${NAME:-default}``: found, and filled in as compose does; and ``.env`` files."""
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from dodo_dsl.application.access import secret_variables
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dodo_dsl.source import Node
@@ -81,13 +79,17 @@ class RequiredVariable(EnvironmentProblem):
         super().__init__(f"variable {name} is not set: {self.why}")
 
 
-def interpolate(text: str, known: Mapping[str, str], *, unset: bool = True) -> str:
-    """``$NAME``, ``${NAME}``, ``${NAME:-default}``, ``${NAME:?error}``, ``${NAME:+other}`` and ``$$`` as in compose.
+def _never(_name: str) -> bool:
+    return False
 
-    Defaults may hold variables in turn. Without ``unset``, a variable that is neither known nor has a default raises
-    EnvironmentProblem instead of being empty.
+
+def filled(text: str, known: Mapping[str, str], late: Callable[[str], bool] = _never) -> str:
+    """The text as a compiled file has it: with variables filled in, but for ``late`` ones, and ``$$`` for a dollar.
+
+    ``$NAME``, ``${NAME}``, ``${NAME:-default}``, ``${NAME:?error}`` and ``${NAME:+other}`` are as in compose; defaults
+    may hold variables. Those that are not ``known`` are empty; one that is required stays, to be reported.
     """
-    return _replaced(text, lambda match: _filled(match, known, unset))
+    return _replaced(text, lambda match: _value_of(match, known, late)) if "$" in text else text
 
 
 def _replaced(text: str, change: Callable[[re.Match[str]], str]) -> str:
@@ -101,76 +103,39 @@ def _replaced(text: str, change: Callable[[re.Match[str]], str]) -> str:
     return "".join([*parts, text[place:]])
 
 
-def _filled(match: re.Match[str], known: Mapping[str, str], unset: bool) -> str:
-    if match["escaped"]:
-        return "$"
-    name = match["bare"] or match["name"]
-    found, word = known.get(name), match["word"] or ""
-    present = bool(found) if match["colon"] else found is not None
+def _value_of(match: re.Match[str], known: Mapping[str, str], late: Callable[[str], bool]) -> str:
+    name, word = match["bare"] or match["name"] or "", match["word"]
+    if match["escaped"] or late(name):
+        start, end = match.start(), match.start("word")
+        return match[0] if word is None else f"{match.string[start:end]}{filled(word, known, late)}}}"
+    value = known.get(name)
+    present = bool(value) if match["colon"] else value is not None
     if match["operator"] == "+":
-        return interpolate(word, known, unset=unset) if present else ""
-    if present:
-        return found or ""
-    if match["operator"] == "?":
-        raise RequiredVariable(name, word)
-    if match["operator"] == "-":
-        return interpolate(word, known, unset=unset)
-    if found is None and not unset:
-        raise EnvironmentProblem(f"variable {name} is not set")
-    return found or ""
+        return filled(word, known, late) if present else ""
+    if present or not match["operator"]:
+        return (value or "").replace("$", "$$")
+    return match[0] if match["operator"] == "?" else filled(word, known, late)
 
 
-def with_values(text: str, values: Mapping[str, str]) -> str:
-    """The text with the variables of ``values`` filled in, and all others left for compose."""
-    return _replaced(text, lambda match: _with_value(match, values))
-
-
-def _with_value(match: re.Match[str], values: Mapping[str, str]) -> str:
-    value, word = values.get(match["bare"] or match["name"] or ""), match["word"]
-    if value is None:
-        inner = match.span("word")
-        return (
-            match[0] if word is None else f"${match.string[match.start() + 1 : inner[0]]}{with_values(word, values)}}}"
-        )
-    present = bool(value) or not match["colon"]
-    if match["operator"] == "+":
-        return with_values(word, values) if present else ""
-    if present:
-        return value.replace("$", "$$")
-    return match[0] if match["operator"] == "?" else with_values(word, values)
-
-
-def known_variables(
-    own: Mapping[str, str], outside: Mapping[str, str], folder: str, passed: Collection[str] = ()
-) -> dict[str, str]:
-    """The variables that compose would fill in: those ``outside`` first, then those of the application's ``.env``."""
-    found: dict[str, str] = {}
-    seen = {**secret_variables.allowed(outside, passed), "PWD": folder}
-    for name, value in own.items():
-        found[name] = interpolated(value, {**found, **seen})
-    return {**found, **seen}
-
-
-def interpolated(written: Any, known: Mapping[str, str]) -> Any:
-    """A plain value with the variables of its texts filled in.
-
-    A text stays as it is where one of them is neither known nor has a default.
-    """
-    if isinstance(written, dict):
-        return {key: interpolated(below, known) for key, below in written.items()}
-    if isinstance(written, list):
-        return [interpolated(item, known) for item in written]
-    if not isinstance(written, str) or "$" not in written:
-        return written
+def literal(text: str) -> str | None:
+    """A filled text as compose reads it; None if it still has a variable."""
+    if "$" not in text:
+        return text
     try:
-        return interpolate(written, known, unset=False)
-    except EnvironmentProblem:
-        return written
+        return interpolate(text)
+    except RequiredVariable:
+        return None
 
 
-def interpolated_node(written: "Node", known: Mapping[str, str]) -> "Node":
-    """The same for a node; every part keeps its place."""
-    return changed_node(written, lambda word: interpolated(word, known))
+def interpolate(text: str, known: Mapping[str, str] | None = None) -> str:
+    """The text as compose reads it, with variables filled in if they are ``known``; raises RequiredVariable."""
+
+    def read(match: re.Match[str]) -> str:
+        if match["escaped"]:
+            return "$"
+        raise RequiredVariable(match["bare"] or match["name"], match["word"] or "")
+
+    return _replaced(text if known is None else filled(text, known), read)
 
 
 def changed_node(written: "Node", change: Callable[[str], str]) -> "Node":
@@ -238,12 +203,6 @@ def dotenv(text: str, *, raw: bool = False) -> tuple[list[tuple[str, str | None]
     return found, None
 
 
-def own_dotenv(folder: Path, known: Mapping[str, str]) -> dict[str, str]:
-    """The variables of the ``.env`` in a folder as compose would read it; a symbolic link is not followed."""
-    path = folder / ".env"
-    return {} if path.is_symlink() else dotenv_file(path, known)
-
-
 def dotenv_file(
     path: Path, known: Mapping[str, str], before: Mapping[str, str] | None = None, *, raw: bool = False
 ) -> dict[str, str]:
@@ -301,9 +260,3 @@ def _unescaped(match: re.Match[str]) -> str:
     if octal is None:
         return _ESCAPES.get(match[0][1], match[0][1])
     return chr(int(octal, 8)) if re.fullmatch("[0-3][0-7]{2}", octal) else f"\\{octal}"
-
-
-def dotenv_line(name: str, value: str) -> str:
-    """``NAME="value"`` as ``dotenv`` reads it."""
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
-    return f'{name}="{escaped}"'

@@ -79,10 +79,10 @@ def _included(
     if isinstance(place, Scalar) and not files.holds(place, folder):
         return document
     project = Path(os.path.normpath(folder / place.text)) if isinstance(place, Scalar) else found[0].parent
-    part = _all(files, found, project, chain)
     own = [files.other(word, folder) for word in scalars(words.get("env_file"))] or [project / ".env"]
     for file in own:
         files.gather(file, names[0].span)
+    part = _all(files, found, project, chain)
     return document if part is None else _joined(files, document, part, project, folder)
 
 

@@ -11,10 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application.access.host_paths import HostPaths, repository
-from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.compose_files import variables_of
-from dodo_dsl.application.host_access import is_true
+from dodo_dsl.application.compose_files import is_late, variables_of
+from dodo_dsl.application.host_paths import HostPaths, repository
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
@@ -24,10 +22,32 @@ SANDBOX = "sandbox"
 FILES = "dodo-files"
 """The service that copies the files of the repository to which an application may write."""
 KEYS = ("x-dodo", "x-dodo-process")
+OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
+"""The variable by which programs that draw with Qt need no display."""
+NAMESPACES = ("network_mode", "ipc", "pid")
+_FALSE = ("false", "f", "0", "no", "n", "off", "")
 
 _ABOUT_NO_MESSAGES = {"tune", "cid", "display", "timed"}
 
 Word = tuple[str, Span]
+
+
+@dataclass(frozen=True)
+class Access:
+    """What a test's application may use of its host.
+
+    ``roots`` are folders whose files are the application's own, besides those of its repository, ``paths`` others that
+    it may mount, ``passed`` variables of DoDo's own environment. ``outside`` says whether it may reach other networks,
+    ``devices`` and ``privileged`` what its rig allows. ``ports`` are those of the deployment's rigs: it gets none.
+    """
+
+    roots: tuple[str, ...] = ()
+    paths: tuple[str, ...] = ()
+    passed: tuple[str, ...] = ()
+    outside: bool = False
+    devices: bool = False
+    privileged: bool = False
+    ports: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,8 +99,8 @@ class EnvFile:
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo, or if that says nothing of messages.
-    ``file_variables`` are those that its ``env_files`` set.
+    ``declared`` is None without x-dodo, or if that says nothing of messages. ``file_variables`` are those that its
+    ``env_files`` set. Variables are filled in but for those in ``raw``, the values of TEST_FILLED as they are written.
     """
 
     name: str
@@ -89,6 +109,7 @@ class ComposeService:
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
     file_variables: Mapping[str, str | None] = field(default_factory=dict)
+    raw: Mapping[str, Node] = field(default_factory=dict)
 
     @property
     def cid_variables(self) -> tuple[str, ...]:
@@ -119,10 +140,10 @@ class ApplicationSource:
 
     ``services`` are those that start, by name; ``rest`` has every other top-level key but those ``left_out``. Paths
     are relative to ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the
-    services by their ``container_name``, ``variables`` those of the files' ``.env``, and ``secrets`` the files that set
-    the secret ones among them. ``known`` are all variables whose values are known, ``access`` is what the deployment
-    allows, ``limits`` are the highest that the services may set. ``named`` are the files as ``dodo.yml`` names them,
-    ``without`` the services that it leaves out. ``cids`` are declared to be built in, all the same one.
+    services by their ``container_name``, and ``secrets`` the files that set variables which no compiled test holds.
+    ``known`` are all variables whose values are known, ``access`` is what the deployment allows, ``limits`` are the
+    highest that the services may set. ``named`` are the files as ``dodo.yml`` names them, ``without`` the services that
+    it leaves out. ``cids`` are declared to be built in, all the same one. ``top`` has all top-level keys.
     """
 
     path: Path
@@ -130,12 +151,11 @@ class ApplicationSource:
     rest: Mapping[str, Node]
     dropped: Mapping[str, str] = field(default_factory=dict)
     containers: Mapping[str, str] = field(default_factory=dict)
-    variables: Mapping[str, str] = field(default_factory=dict)
     secrets: Mapping[str, Path] = field(default_factory=dict)
     known: Mapping[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
-    left_out: tuple[str, ...] = ()
+    top: Mapping[str, source.Entry] = field(default_factory=dict)
     named: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     cids: tuple[Scalar, ...] = ()
@@ -143,7 +163,7 @@ class ApplicationSource:
     @functools.cached_property
     def demanding(self) -> tuple[tuple[str, str, Scalar], ...]:
         """The values that may require a variable (``${NAME:?why}``), each with its service, if any, and its key."""
-        own = [(n, key, e.value) for n, s in self.services.items() for key, e in s.node.entries.items()]
+        own = [(n, key, s.raw.get(key, e.value)) for n, s in self.services.items() for key, e in s.node.entries.items()]
         found = [*own, *(("", key, node) for key, node in self.rest.items())]
         return tuple(
             (name, key, part)
@@ -151,6 +171,10 @@ class ApplicationSource:
             for part in source.walk(node)
             if isinstance(part, Scalar) and isinstance(part.value, str) and "?" in part.value and "${" in part.value
         )
+
+    def is_late(self, name: str) -> bool:
+        """Whether a variable has its value only when a test runs: one that is passed, or a secret."""
+        return is_late(name, (*self.access.passed, *self.secrets))
 
     @property
     def cid(self) -> int | None:
@@ -183,6 +207,43 @@ class ApplicationSource:
     def declared(self) -> Mapping[str, Declared | None]:
         """The declarations of each service, by its name."""
         return {name: service.declared for name, service in self.services.items()}
+
+
+def is_true(value: object) -> bool:
+    """Whether compose reads a value as true."""
+    return value is True or (isinstance(value, str) and value.strip().lower() not in _FALSE)
+
+
+def reference(value: object) -> tuple[str, str]:
+    """``service:x`` and ``container:x`` as kind and name; two empty strings for other values."""
+    kind, sign, name = str(value or "").partition(":")
+    return (kind, name) if sign and kind in ("service", "container") else ("", "")
+
+
+def borrowed(entry: object) -> tuple[str, str, str]:
+    """An entry of ``volumes_from`` as kind, name and options."""
+    kind, name = reference(entry)
+    name, sign, options = (name if kind else str(entry)).partition(":")
+    return kind or "service", name, sign + options
+
+
+def references(service: dict[str, Any], containers: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """The services that a service needs, each with its key; containers of the application count as its services."""
+    for key in NAMESPACES:
+        kind, name = reference(service.get(key))
+        if kind == "service" or name in containers:
+            yield key, containers.get(name, name) if kind == "container" else name
+    for entry in service.get("volumes_from") or ():
+        kind, name, _ = borrowed(entry)
+        if kind == "service" or name in containers:
+            yield "volumes_from", containers.get(name, name) if kind == "container" else name
+    for link in service.get("links") or ():
+        yield "links", str(link).partition(":")[0]
+    waits = service.get("depends_on") or {}
+    for name in waits:
+        options = waits[name] if isinstance(waits, dict) else {}
+        if not isinstance(options, dict) or options.get("required") is not False:
+            yield "depends_on", str(name)
 
 
 def plain(node: Node) -> Any:
@@ -281,5 +342,5 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
 
 def file_variables(files: Iterable[EnvFile], folder: Path) -> dict[str, str | None]:
     """The variables that files next to the compose file set."""
-    own = (file for file in files if not file.path.startswith(("/", "~", "$")))
+    own = (file for file in files if not file.path.startswith(("/", "~")))
     return {name: v for file in own for name, v in variables_of(folder / file.path, raw=file.raw).items()}

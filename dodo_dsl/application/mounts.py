@@ -1,245 +1,309 @@
-"""What the engine mounts of the host for an application: nested, missing, too large to be copied, or of tests.
+"""What a test's containers mount: files of the repository to be read, copies of its folders, the test's own volumes.
 
-In a folder to which a service may write, it could put a link in the place of another mount, which the engine follows.
-No application sees the repository's tests, their output and ``.git``.
+Whatever is neither of these is refused, or is a rig's hardware.
 """
 
-import functools
 import os
-import stat
-from collections.abc import Collection, Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.application import host_access
-from dodo_dsl.application.access.host_paths import HostPaths, real
-from dodo_dsl.application.access.model import AccessFinding, Steps, diagnostic, place
-from dodo_dsl.application.access.value_findings import is_remote
-from dodo_dsl.application.interpolation import interpolated_node
-from dodo_dsl.application.model import ApplicationSource, plain
-from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.application.host_paths import MEMORY, TMP, is_port, is_token
+from dodo_dsl.application.limits import size, tmpfs_options
+from dodo_dsl.application.model import is_true
+from dodo_dsl.application.part import NO_PORT, WITHOUT_HARDWARE, Part
+from dodo_dsl.diagnostics import Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Mapping, Node, Scalar
-from dodo_dsl.spec.deployment import Deployment
-from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
-WAY_OUT = "mount it read-only (:ro), name it under 'paths' in dodo.yml, or raise '{key}' in 'sandbox' there"
-_MB = 10**6
+if TYPE_CHECKING:
+    from dodo_dsl.application.construction import Construction
+    from dodo_dsl.application.container import Container
+
+OWN_VOLUMES = ("tmp", "report", "dodo-time")
+"""The names of DoDo's own volumes in a test; an application's volumes of these names get others."""
+COPY = "files-"
+"""How the volumes of copies begin, each with a number."""
+_OF_COPY = re.compile(rf"{COPY}\d+")
+_DRIVE = re.compile(r"[A-Za-z]:[/\\]")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_KINDS = ("bind", "volume", "tmpfs", "image")
+_PRIVATE = ("private", "rprivate")
+_IN_AND_OUT = ("shared", "rshared", "slave", "rslave")
+_OPTIONS = "use a tmpfs (type: tmpfs), or a folder of the repository (o: bind)"
+_FIELDS = {
+    "": "type source target read_only consistency bind volume tmpfs image",
+    "bind": "propagation create_host_path selinux recursive",
+    "volume": "nocopy labels subpath",
+    "tmpfs": "size mode",
+    "image": "subpath",
+}
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A path of the host that the engine mounts; ``steps`` lead to it in ``node``; ``writer`` may be empty.
+class Mount:
+    """An entry of ``volumes``, whose ``source`` is a path, a volume's name, or empty; ``span`` is the source's place.
 
-    ``is_required`` means that the engine does not make what is missing.
+    ``more`` are the options of a volume, of an image or of a file system in memory.
     """
 
-    node: Node
-    span: Span
-    steps: Steps
+    kind: str
     source: str
-    writer: str = ""
+    target: str
+    span: Span
+    read_only: bool = False
     is_required: bool = False
+    selinux: str = ""
+    nocopy: bool = False
+    more: tuple[tuple[str, Any], ...] = ()
+
+    def written(self) -> str | dict[str, Any]:
+        """As compose reads it; ``source`` is as the compiled file has it."""
+        words = [*(["ro"] if self.read_only else []), *(["nocopy"] if self.nocopy else [])]
+        words += [self.selinux] if self.selinux else []
+        is_short = ":" not in f"{self.source}{self.target}" and not self.is_required and not self.more
+        if is_short and self.kind in ("bind", "volume"):
+            return ":".join(filter(None, (self.source, self.target, ",".join(words))))
+        about = dict(self.more) | ({"nocopy": True} if self.nocopy else {})
+        if self.kind == "bind":
+            about = {"create_host_path": not self.is_required} | ({"selinux": self.selinux} if self.selinux else {})
+        made: dict[str, Any] = {"type": self.kind, "source": self.source, "target": self.target}
+        made |= {"read_only": True} if self.read_only else {}
+        return {key: value for key, value in {**made, self.kind: about}.items() if value not in ("", {})}
 
 
-def nested_mounts(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Mounts, bound volumes, secrets and configs that lie in a folder to which a service may write."""
-    paths, every = application.paths, list(shown_paths(application))
-    sources = [(shown.source, shown.writer) for shown in every if not paths.is_open(shown.source)]
-    for shown in every:
-        if problem := within_another(shown.source, sources, paths):
-            yield diagnostic(AccessFinding(shown.steps, *problem), shown.node, shown.span)
+def own_name(name: str) -> str:
+    """The name of an application's volume in the test's project, where DoDo has its own volumes."""
+    return f"application-{name}" if name in OWN_VOLUMES or _OF_COPY.fullmatch(name) else name
 
 
-def within_another(source: str, mounts: Sequence[tuple[str, str]], paths: HostPaths) -> tuple[str, str] | None:
-    """Why a path cannot be mounted with the others, each with the service that writes to it or empty, and a hint."""
-    if paths.is_open(source):
+def is_path(text: str) -> bool:
+    """Whether a volume's source is a path; other words name a volume."""
+    return text.startswith((".", "/", "~"))
+
+
+def mounts(of: "Container", node: Node) -> list[str | dict[str, Any]]:
+    """The mounts of a service, each once."""
+    made: dict[tuple[str, str], str | dict[str, Any]] = {}
+    for item in of.items(node):
+        mount = _long(of, item) if isinstance(item, Mapping) else _short(of, item)
+        mount = _carried(of, mount) if mount else None
+        if mount:
+            made[mount.source, mount.target] = mount.written()
+    return list(made.values())
+
+
+def _short(of: "Container", item: Node) -> Mount | None:
+    text = of.literal(item)
+    if text is None:
         return None
-    for other, writer in mounts:
-        outer = Path(paths.names(other)[-1])
-        if writer and paths.is_writable(other) and any(outer in place.parents for place in _places(source, paths)):
-            message = f"'{source}' lies in '{outer}', where '{writer}' could put a link in its place"
-            return message, f"mount '{outer}' in both, or read-only (:ro)"
+    if _DRIVE.match(text):
+        message = f"compose takes '{text[:2]}' of '{text}' for a drive of Windows, and mounts no volume"
+        of.bad(item.span, message, "give the volume a longer name")
+        return None
+    source, target, options, *_ = [*text.split(":", 2), "", ""] if ":" in text else ["", text, ""]
+    words = options.split(",")
+    if found := [word for word in words if word in _IN_AND_OUT]:
+        _comes_back(of, item.span, found[0])
+        return None
+    return Mount(
+        "bind" if is_path(source) else "volume", _clean(source), _clean(target), item.span,
+        [word for word in words if word in ("ro", "rw")][-1:] == ["ro"],
+        selinux=next((word for word in words if word in ("z", "Z")), ""), nocopy="nocopy" in words,
+    )  # fmt: skip
+
+
+def _comes_back(of: "Container", span: Span, word: str) -> None:
+    of.refuse(span, f"propagation '{word}' lets mounts in and out of the container", "remove it")
+
+
+def _clean(path: str) -> str:
+    return os.path.normpath(f"/{path.lstrip('/')}") if path.startswith("/") else path
+
+
+def _long(of: "Container", item: Mapping) -> Mount | None:
+    about = {key: of.fields(item.get(key), f"'{key}' of a mount", known) for key, known in _FIELDS.items() if key}
+    own = of.fields(item, "a mount", _FIELDS[""])
+    values = {key: of.literal(node) for key, node in own.items() if isinstance(node, Scalar)}
+    kind, source, span = values.get("type") or "volume", values.get("source") or "", item.span
+    if isinstance(node := own.get("source"), Scalar):
+        span = node.span
+    if kind not in _KINDS:
+        of.refuse(own["type"].span, f"mounts of type '{kind}' cannot be isolated", "use a folder or a volume")
+        return None
+    told = {f"{key}.{name}": of.literal(node) or "" for key, nodes in about.items() for name, node in nodes.items()}
+    propagation, recursive = told.get("bind.propagation", ""), told.get("bind.recursive", "")
+    if propagation and propagation not in _PRIVATE:
+        _comes_back(of, about["bind"]["propagation"].span, propagation)
+        return None
+    if recursive not in ("", "enabled", "disabled", "readonly"):
+        message = (
+            f"'recursive: {recursive}' lets the service write to what is mounted below a folder that it only reads"
+        )
+        of.refuse(about["bind"]["recursive"].span, message, "remove it, or write readonly")
+        return None
+    kind = "bind" if kind == "volume" and is_path(source) else kind
+    more: dict[str, Any] = {}
+    if kind == "tmpfs":
+        most = of.limits.memory
+        more = {"size": most} | ({"mode": int(told["tmpfs.mode"], 0)} if told.get("tmpfs.mode") else {})
+        if 0 < size(told.get("tmpfs.size", "")) <= most:
+            more["size"] = int(size(told["tmpfs.size"]))
+        elif "tmpfs.size" in told:
+            of.cut(about["tmpfs"]["size"].span, "volumes.tmpfs.size", "memory")
+    elif told.get(f"{kind}.subpath"):
+        more = {"subpath": told[f"{kind}.subpath"]}
+    return Mount(
+        kind, _clean(source), _clean(values.get("target") or ""), span, is_true(values.get("read_only") or ""),
+        kind == "bind" and told.get("bind.create_host_path", "true").lower() == "false",
+        told.get("bind.selinux", ""), is_true(told.get("volume.nocopy", "")), tuple(more.items()),
+    )  # fmt: skip
+
+
+def _carried(of: "Container", mount: Mount) -> Mount | None:
+    """The mount as the test has it; None where it has none."""
+    if mount.kind == "bind":
+        return _bound(of, mount)
+    if mount.kind != "volume" or not mount.source:
+        return mount
+    known = of.project.volumes
+    if mount.source not in known:
+        hint = did_you_mean(mount.source, known)
+        hint = hint if hint.startswith("did") else f"declare it at the end of the file: 'volumes: {{{mount.source}: }}'"
+        message = f"'{of.name}' mounts the volume '{mount.source}', which the top-level 'volumes' do not declare"
+        near = only_fix(mount.source, known)
+        of.bad(mount.span, message, hint, fix=Fix(f"{near.old}:", f"{near.new}:") if near and near.old else near)
+        return None
+    if known[mount.source].is_external and not mount.read_only:
+        hint = "mount it read-only (:ro), or remove 'external', so that compose creates it"
+        of.refuse(mount.span, f"volume '{mount.source}' is external, so tests would share it", hint)
+        return None
+    of.project.show(known[mount.source].device, known[mount.source].span, "" if mount.read_only else of.name)
+    return replace(mount, source=own_name(mount.source))
+
+
+def _bound(of: "Container", mount: Mount) -> Mount | None:
+    paths, source, setting = of.project.paths, mount.source, of.project.setting
+    if "\0" in source:
+        of.refuse(mount.span, *paths.mount_problem(source))
+    elif source == MEMORY or source.startswith(f"{MEMORY}/"):
+        return None if setting.own_network else mount
+    elif source == TMP or is_token(source, mount.target):
+        target = mount.target if source == TMP else TMP
+        if setting.own_network:
+            return replace(mount, kind="volume", source="tmp", target=target, nocopy=True, is_required=False)
+        return replace(mount, source=TMP, target=target)
+    elif is_port(paths.whole(source), of.project.ports):
+        of.hardware(mount.span, f"'{source}' of '{of.name}' {NO_PORT}", "give the application another device")
+    elif paths.is_of_machine(source) and source.startswith(("/", "~")):
+        of.refuse(mount.span, f"'{source}' gives access to the host's disks or memory", "remove it")
+    elif paths.is_hardware(source, read_only=mount.read_only):
+        if setting.hil:
+            return mount
+        of.hardware(mount.span, f"'{source}' of '{of.name}' {WITHOUT_HARDWARE}")
+    elif found := paths.mount_problem(source)[0] and paths.mount_problem(source):
+        of.refuse(mount.span, *found)
+    else:
+        return _of_repository(of, mount)
     return None
 
 
-def shown_paths(application: ApplicationSource) -> Iterator[Shown]:
-    """What the services mount of the host, and what their volumes, secrets and configs show of it."""
-    services = {s.name: plain(interpolated_node(s.node, application.known)) for s in application.services.values()}
-    every = [*_of_services(application, services), *_of_rest(application, services)]
-    yield from (shown for shown in every if shown.source)
+def _of_repository(of: "Container", mount: Mount) -> Mount | None:
+    project, source = of.project, mount.source
+    if mount.is_required and not os.path.lexists(project.paths.whole(source)):
+        message = f"there is no file or folder '{source}', and 'create_host_path: false' requires it"
+        of.bad(mount.span, message, "create it, or remove 'create_host_path'; paths are relative to this file")
+        return None
+    project.show(source, mount.span, "" if mount.read_only else of.name)
+    if not mount.read_only and (name := project.copy_of(source)):
+        return replace(mount, kind="volume", source=name, nocopy=True, is_required=False, selinux="")
+    read_only = mount.read_only or not project.paths.is_writable(source)
+    return replace(mount, source=project.rebased(source), read_only=read_only)
 
 
-def _of_services(application: ApplicationSource, services: dict[str, dict[str, Any]]) -> Iterator[Shown]:
-    for name, item, volume in _volumes(services):
-        seen, service = host_access.mount(volume), application.services[name]
-        if host_access.is_bind(volume, seen.source) and not host_access.is_token(seen):
-            writer = "" if seen.read_only else name
-            bind = volume.get("bind") if isinstance(volume, dict) else None
-            is_required = isinstance(bind, dict) and bind.get("create_host_path") is False
-            yield Shown(service.node, service.span, ("volumes", item), seen.source, writer, is_required)
+@dataclass(frozen=True)
+class Volume:
+    """A top-level volume: ``made`` as the test has it, ``device`` the folder of the host that it shows, if it does."""
+
+    made: dict[str, Any]
+    span: Span
+    device: str = ""
+    is_external: bool = False
 
 
-def _of_rest(application: ApplicationSource, services: dict[str, dict[str, Any]]) -> Iterator[Shown]:
-    writers = {m.source: n for n, _, v in _volumes(services) if not (m := host_access.mount(v)).read_only}
-    for key in ("volumes", "secrets", "configs"):
-        node = application.rest.get(key)
-        if not isinstance(node, Mapping):
-            continue
-        for name, about in plain(interpolated_node(node, application.known)).items():
-            if host_access.is_bound(about) or "$" in "".join(host_access.volume_options(about)):
-                writer = "" if host_access.is_read_only(about) else writers.get(name, "")
-                device = str(about["driver_opts"].get("device") or "")
-                yield Shown(node, node.span, (name, "driver_opts", "device"), device, writer)
-            elif isinstance(about, dict) and isinstance(about.get("file"), str):
-                yield Shown(node, node.span, (name, "file"), about["file"])
+def volume(project: "Construction", name: str, node: Node, span: Span) -> Volume:
+    """A top-level volume of an application, each test having its own."""
+    of = project.about(f"the volume '{name}'", span)
+    about = of.fields(node, f"the volume '{name}'", "driver driver_opts external name", "labels")
+    driver = of.literal(about["driver"]) if "driver" in about else "local"
+    if driver not in ("local", "", None):
+        message = f"the driver '{driver}' of the volume '{name}' reaches beyond the test"
+        of.refuse(about["driver"].span, message, "remove it, so that the engine makes its own volume")
+    external = about.get("external")
+    if isinstance(external, Mapping) or (isinstance(external, Scalar) and is_true(external.value)):
+        word = external.get("name") if isinstance(external, Mapping) else about.get("name")
+        called = (of.literal(word) if word else name) or name
+        if called.startswith("dodo-") or not _NAME.fullmatch(called):
+            of.refuse((word or node).span, f"'{called}' is not a name that a volume of the application may have", "")
+        return Volume({"external": True, "name": called}, span, is_external=True)
+    options = about.get("driver_opts")
+    made, device = _options(of, name, options) if options else ({}, "")
+    return Volume(made, options.span if options else span, device)
 
 
-def _volumes(services: dict[str, dict[str, Any]]) -> Iterator[tuple[str, int, Any]]:
-    """Every entry of ``volumes``, with its service and its number."""
-    for name, service in services.items():
-        written = service.get("volumes")
-        for item, volume in enumerate(written if isinstance(written, list) else ()):
-            yield name, item, volume
+def _options(of: Part, name: str, node: Node) -> tuple[dict[str, Any], str]:
+    """A tmpfs, or a folder that may be mounted; with other options the engine mounts disks and shares of networks."""
+    if not isinstance(node, Mapping):
+        of.refuse(node.span, f"'driver_opts' of the volume '{name}' is not a mapping", _OPTIONS)
+        return {}, ""
+    fields = of.fields(node, f"'driver_opts' of the volume '{name}'", "type o device")
+    kind, flags, device = (of.literal(fields[key]) or "" if key in fields else "" for key in ("type", "o", "device"))
+    words = [word.strip() for word in flags.split(",") if word.strip()]
+    span = next((fields[key].span for key in ("type", "o", "device") if key in fields), node.span)
+    if {"bind", "rbind"} & set(words):
+        return _folder(of, name, device, words, fields.get("device", node).span)
+    options, is_cut, unknown = tmpfs_options(flags, of.limits)
+    if kind != "tmpfs" or unknown:
+        if options or kind or device:
+            what = unknown if kind == "tmpfs" else kind or flags or device
+            of.refuse(span, f"the volume '{name}' mounts '{what}', which reaches beyond the test", _OPTIONS)
+        return {}, ""
+    if is_cut:
+        of.cut(span, f"{name}.driver_opts.o", "memory")
+    return {"driver_opts": {"type": "tmpfs", "device": "tmpfs", "o": options}}, ""
 
 
-def _places(source: str, paths: HostPaths) -> Iterator[Path]:
-    """Where the path is, and each of its parts, any of which may be a link."""
-    yield from map(Path, paths.names(source))
-    whole = Path(paths.whole(source))
-    yield from (Path(real(place.parent)) / place.name for place in (whole, *whole.parents))
+def _folder(of: Part, name: str, device: str, words: list[str], span: Span) -> tuple[dict[str, Any], str]:
+    paths = of.project.paths
+    unknown = set(words) - {"bind", "rbind", "rw", "ro", "nosuid", "nodev", "noexec"}
+    if unknown or paths.is_hardware(device) or paths.is_of_machine(device):
+        what = f"the option '{min(unknown)}'" if unknown else f"'{device}' of the host"
+        of.refuse(span, f"the volume '{name}' has {what}", _OPTIONS)
+        return {}, ""
+    if (found := paths.mount_problem(device))[0]:
+        of.refuse(span, *found)
+        return {}, ""
+    is_read = [word for word in words if word in ("ro", "rw")][-1:] == ["ro"]
+    if not is_read and of.project.copy_of(device, own_name(name)):
+        return {}, device
+    access = [] if paths.is_writable(device) and not is_read else ["ro"]
+    options = [word for word in words if word not in ("ro", "rw")] + access
+    return {"driver_opts": {"type": "none", "device": of.project.rebased(device), "o": ",".join(options)}}, device
 
 
-def missing_folders(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Mounts of what is missing and must not be created; other missing folders are empty ones of the test."""
-    for shown in _of_repository(application):
-        if shown.is_required and not os.path.lexists(application.paths.whole(shown.source)):
-            message = f"there is no file or folder '{shown.source}', and 'create_host_path: false' requires it"
-            yield _problem(shown, message, "create it, or remove 'create_host_path'; paths are relative to this file")
+def nested(project: "Construction") -> Iterator[tuple[Span, str, str]]:
+    """Mounts in a folder to which a service may write, where it could put a link in their place: place, message, hint.
 
-
-def large_folders(application: ApplicationSource, hidden: Collection[Path]) -> Iterator[Diagnostic]:
-    """The folder with which a test's copies are beyond their limits; of the ``hidden`` ones there are none."""
-    limits, files, size = application.limits, 0, 0
-    unseen = frozenset(str(path) for path in (*hidden, *(root / ".git" for root in application.paths.roots)))
-    for folder, shown in _copied(application).items():
-        own_files, own_size = measured(folder, unseen, limits.copied_files, Path(folder).stat().st_mtime_ns)
-        files, size = files + own_files, size + own_size
-        if problem := too_much(shown.source, (own_files, files), (own_size, size), limits):
-            yield replace(_problem(shown, *problem), severity="warning")
-            return
-
-
-def too_much(
-    source: str, files: tuple[int, int], size: tuple[int, int], limits: SandboxLimits
-) -> tuple[str, str] | None:
-    """Why a folder is not copied, and what to do; of ``files`` and bytes, its own and with those copied before."""
-    if files[1] > limits.copied_files:
-        own = f"more than {limits.copied_files}" if files[0] > limits.copied_files else str(files[0])
-        message = f"'{source}' holds {own} files, and the copies of a test may hold {limits.copied_files}"
-        return message, WAY_OUT.format(key="copied-files")
-    if size[1] > limits.copies:
-        message = f"'{source}' holds {size[0] // _MB} MB, and the copies of a test may hold {limits.copies // _MB} MB"
-        return message, WAY_OUT.format(key="copies")
-    return None
-
-
-def _problem(shown: Shown, message: str, hint: str) -> Diagnostic:
-    return Diagnostic(place(shown.node, shown.steps, shown.span), "application-file", message, hint)
-
-
-def _of_repository(application: ApplicationSource) -> Iterator[Shown]:
-    """The mounts of services that show a path of the repository."""
-    paths = application.paths
-    for shown in shown_paths(application):
-        is_mount = shown.steps[0] == "volumes" and not paths.is_open(shown.source)
-        if is_mount and paths.is_own(shown.source) and paths.is_of_repository(shown.source):
-            yield shown
-
-
-def _copied(application: ApplicationSource) -> dict[str, Shown]:
-    """The mounts that tests copy, by the real path of their folder."""
-    paths: HostPaths = application.paths
-    found: dict[str, Shown] = {}
-    for shown in _of_repository(application):
-        folder = paths.names(shown.source)[-1]
-        if shown.writer and not paths.is_writable(shown.source) and Path(folder).is_dir():
-            found.setdefault(folder, shown)
-    return found
-
-
-@functools.lru_cache(maxsize=64)
-def measured(folder: str, hidden: frozenset[str], most_files: int, _changed_ns: int) -> tuple[int, int]:
-    """Files and folders below one, and their sizes in bytes; no more of them are counted than one beyond the most."""
-    files, size, left = 0, 0, [folder]
-    while left and files <= most_files:
-        try:
-            with os.scandir(left.pop()) as entries:
-                for entry in entries:
-                    about = entry.stat(follow_symlinks=False)
-                    files, size = files + 1, size + about.st_size
-                    if stat.S_ISDIR(about.st_mode) and entry.path not in hidden:
-                        left.append(entry.path)
-        except OSError:
-            continue
-    return files, size
-
-
-_OUTPUT = ("generated", "dodo-report")
-
-
-def unseen_folders(application: ApplicationSource, deployment: Deployment) -> list[Path]:
-    """What no application sees: folders with tests and own services, ``.git``, compiled tests and reports by default.
-
-    A registry that is the application's own folder, or above it, is none of them.
+    Only what ``dodo.yml`` names can be written to; all else are copies.
     """
-    own = application.folder.resolve()
-    found = {Path(os.path.realpath(folder)) for folder in (*deployment.registry, *deployment.services)}
-    roots = {Path(os.path.realpath(root)) for root in (*application.paths.roots, deployment.root, own)}
-    made = {root / name for root in roots for name in (".git", *_OUTPUT)}
-    return sorted({path for path in found if not own.is_relative_to(path)} | made)
-
-
-def below(application: ApplicationSource, deployment: Deployment) -> tuple[str, ...]:
-    """Folders with tests, maps and truths within the application's own folder, relative to it."""
-    own = application.folder.resolve()
-    found = {folder.resolve() for folder in (*deployment.registry, *deployment.services)}
-    return tuple(sorted(path.relative_to(own).as_posix() for path in found if path != own and path.is_relative_to(own)))
-
-
-def read_by_tests(application: ApplicationSource, deployment: Deployment, files: Iterable[Path]) -> list[str]:
-    """The files, as far as they lie in a registry that holds the application's folder, relative to that."""
-    own = application.folder.resolve()
-    around = [folder for folder in map(Path.resolve, deployment.registry) if own.is_relative_to(folder)]
-    inside = {path for path in files if any(map(path.is_relative_to, around))} if around else ()
-    return sorted(Path(os.path.relpath(path, own)).as_posix() for path in inside)
-
-
-def unseen_problems(application: ApplicationSource, deployment: Deployment) -> Iterator[Diagnostic]:
-    """Mounts, configs, secrets, files of variables and builds' contexts in a folder that no application sees."""
-    hidden = unseen_folders(application, deployment)
-    for source, span in _asked_for(application):
-        if application.paths.is_open(source) or application.paths.is_writable(source):
-            continue
-        names = map(Path, application.paths.names(source))
-        if holder := next((h for name in names for h in hidden if name.is_relative_to(h)), None):
-            what = f"'{holder.name}', {_reason(holder)}"
-            message = f"'{source}' lies in {what}, which no application sees"
-            yield Diagnostic(span, "application-isolation", message, "keep what it needs in another folder")
-
-
-def _reason(holder: Path) -> str:
-    reasons = {".git": "where Git keeps its own", "generated": "the compiled tests", "dodo-report": "the report"}
-    return reasons.get(holder.name, "a folder of tests or of DoDo's services")
-
-
-def _asked_for(application: ApplicationSource) -> Iterator[tuple[str, Span]]:
-    for shown in shown_paths(application):
-        yield shown.source, place(shown.node, shown.steps, shown.span)
-    for service in application.services.values():
-        yield from ((file.path, file.span) for file in service.env_files)
-        build = service.node.get("build")
-        context = build.get("context") if isinstance(build, Mapping) else build
-        text = context.value if isinstance(context, Scalar) else None
-        if context and isinstance(text, str) and not is_remote(text, application.paths):
-            yield text, context.span
+    paths = project.paths
+    open_ = [(Path(paths.names(s)[-1]), w) for s, _, w in project.shown if w and paths.is_writable(s)]
+    for source, span, _ in project.shown if open_ else ():
+        whole = Path(paths.whole(source))
+        places = [Path(os.path.realpath(place.parent)) / place.name for place in (whole, *whole.parents)]
+        for outer, writer in open_:
+            if any(outer in place.parents for place in [*places, *map(Path, paths.names(source))]):
+                message = f"'{source}' lies in '{outer}', where '{writer}' could put a link in its place"
+                yield span, message, f"mount '{outer}' in both, or read-only (:ro)"
+                break

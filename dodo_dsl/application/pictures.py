@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import zip_longest
 
 from dodo_dsl.application import slips
-from dodo_dsl.application.interpolation import interpolated
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 
 FORMATS = {"argb": 4.0, "bgr": 3.0, "rgb": 3.0, "i420": 1.5}
@@ -27,16 +26,15 @@ class AskedPictures:
     height: int = 0
 
 
-def pictures_of(application: ApplicationSource, variables: Mapping[str, str] | None = None) -> list[AskedPictures]:
-    """Of each service that asks for a memory; ``variables`` are those that a test sets."""
-    known = {**application.known, **(variables or {})}
-    found = (_of(service, known) for service in application.services.values())
+def pictures_of(application: ApplicationSource) -> list[AskedPictures]:
+    """Of each service that asks for a memory."""
+    found = (_of(service) for service in application.services.values())
     return [each for each in found if each.formats]
 
 
-def _of(service: ComposeService, known: Mapping[str, str]) -> AskedPictures:
+def _of(service: ComposeService) -> AskedPictures:
     formats, sizes = dict[str, str](), {"width": 0, "height": 0}
-    for flag, format_, value in _flags([interpolated(word, dict(known)) for word, _ in slips.words(service)]):
+    for flag, format_, value in _flags([word for word, _ in slips.words(service)]):
         if flag == "name" and "$" not in value:
             name = value.removeprefix("/")
             ending = name.rpartition(".")[2]

@@ -2,28 +2,32 @@
 
 import itertools
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
 from dodo_dsl.application import declarations as declared
-from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.access import secret_problems
-from dodo_dsl.application.access.findings import shared_findings
-from dodo_dsl.application.access.host_paths import INSIDE, link_out, repository
-from dodo_dsl.application.access.model import Access, Look, diagnostic
+from dodo_dsl.application import secret_problems
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
-from dodo_dsl.application.compose_files import ComposeFiles, dotenv_problems
-from dodo_dsl.application.interpolation import interpolated, interpolated_node, known_variables, names
+from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles, dotenv_problems
+from dodo_dsl.application.host_paths import INSIDE, link_out, repository
+from dodo_dsl.application.interpolation import changed_node, filled
 from dodo_dsl.application.load import as_item, load, unread
-from dodo_dsl.application.model import ApplicationSource, ComposeService, declared_cid, env_files, file_variables, plain
+from dodo_dsl.application.model import (
+    Access,
+    ApplicationSource,
+    ComposeService,
+    declared_cid,
+    env_files,
+    file_variables,
+    plain,
+)
 from dodo_dsl.application.model import declared as declaration_of
-from dodo_dsl.application.slips import variable_problems
 from dodo_dsl.application.variables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Reader
+from dodo_dsl.source import Entry, Node, Reader, Scalar
 from dodo_dsl.spec.deployment import Declarations
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.validation import validate
@@ -47,7 +51,7 @@ def read_application(
     paths = [path] if isinstance(path, Path) else list(path)
     declarations = declared.holding(declarations, paths)
     roots = (*repository(paths[0].resolve().parent), *map(Path, access.roots))
-    files = ComposeFiles(reader, roots)
+    files = ComposeFiles(reader, roots, access.passed)
     found = files.problems
     found.extend(_links(paths))
     if found:
@@ -65,7 +69,6 @@ def read_application(
             )
     if document is not None and not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
         found.extend(validate(document, "application"))
-        found.extend(variable_problems(document))
     if document is None or not isinstance(services, source.Mapping) or has_errors(found):
         return None, found
     application = _application(paths[0].resolve(), document, services, files, access, limits)
@@ -73,19 +76,21 @@ def read_application(
     named = tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths)
     application = replace(application, dropped={**application.dropped, **gone}, named=named, without=tuple(gone))
     found.extend(unread(paths, root))
-    found.extend(_shared(document, application))
     found.extend(declared.depending(application, gone))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))
-    nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
-    refused = {problem.span for problem in found}
-    withheld = secret_problems.withheld(nodes, files.variables, access.passed, os.environ)
-    found.extend(problem for problem in withheld if problem.span not in refused)
-    found.extend(secret_problems.written([document]))
-    for file, raw in _own_files(application):
-        found.extend((*dotenv_problems(file, raw=raw), *secret_problems.in_file(file, raw)))
-    found.extend(secret_problems.left_out(files.secrets))
+    found.extend(_secrets(application, document, files))
     return (None if has_errors(found) else application), found
+
+
+def _secrets(application: ApplicationSource, document: source.Mapping, files: ComposeFiles) -> Iterator[Diagnostic]:
+    """Warnings of what looks like a secret, in the compose files and beside them."""
+    nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
+    yield from secret_problems.withheld(nodes, files.written, {*files.known, *files.secrets, *files.passed}, os.environ)
+    yield from secret_problems.written([document])
+    for file, raw in _own_files(application):
+        yield from (*dotenv_problems(file, raw=raw), *secret_problems.in_file(file, raw))
+    yield from secret_problems.left_out(files.secrets)
 
 
 def as_written(path: Path) -> ApplicationSource | None:
@@ -115,60 +120,60 @@ def _application(
     access: Access,
     limits: SandboxLimits,
 ) -> ApplicationSource:
-    variables = files.variables
     dropped = {name: why for name, entry in services.entries.items() if (why := _why_dropped(plain(entry.value)))}
+    rest = {k: e.value for k, e in document.entries.items() if k not in _OURS and not k.startswith("x-")}
+    for variable in _variables_of_secrets(rest.get("secrets")):
+        files.keep_secret(variable)
     kept = {
         name: service
         for name, entry in services.entries.items()
-        if name not in dropped and (service := _service(name, entry, path.parent)) is not None
+        if name not in dropped and (service := _service(name, entry, path.parent, files)) is not None
     }
-    rest = {k: e.value for k, e in document.entries.items() if k not in _OURS and not k.startswith("x-")}
-    left_out = tuple(key for key in document.entries if key != "services" and key not in rest)
     return ApplicationSource(
         path=path,
         services=kept,
         rest=rest,
         dropped=dropped,
         containers={str(c): n for n, s in kept.items() if (c := plain(s.node).get("container_name"))},
-        variables={**variables, **dict.fromkeys(_used_cid_variables(s.node for s in kept.values()), "")},
         secrets=files.secrets,
-        known=known_variables(variables, os.environ, str(path.parent), access.passed),
+        known={name: value for name, value in files.known.items() if name not in files.secrets},
         access=access,
         limits=limits,
-        left_out=left_out,
+        top=document.entries,
         cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
     )
 
 
-def _shared(document: source.Mapping, application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Problems of everything except the services."""
-    raw = plain(interpolated_node(document, application.known))
-    look = Look(application.paths, limits=application.limits, passed=application.access.passed)
-    for finding in shared_findings(raw, look):
-        yield diagnostic(finding, document, document.span)
+def _variables_of_secrets(node: Node | None) -> Iterator[str]:
+    for entry in node.entries.values() if isinstance(node, source.Mapping) else ():
+        word = entry.value.get("environment") if isinstance(entry.value, source.Mapping) else None
+        if isinstance(word, Scalar):
+            yield word.text
 
 
 def _own_files(application: ApplicationSource) -> list[tuple[Path, bool]]:
     """The files of ``env_file`` that the application may read, each once, and whether they are raw."""
-    words = {(file.path, file.raw) for service in application.services.values() for file in service.env_files}
-    texts = sorted((interpolated(word, application.known), raw) for word, raw in words)
-    own = ((text, raw) for text, raw in texts if "$" not in text and application.paths.is_own(text))
-    return list(dict.fromkeys((Path(application.paths.whole(text)), raw) for text, raw in own))
+    words = sorted({(file.path, file.raw) for service in application.services.values() for file in service.env_files})
+    return [(Path(application.paths.whole(text)), raw) for text, raw in words if application.paths.is_own(text)]
 
 
-def _service(name: str, entry: Entry, folder: Path) -> ComposeService | None:
+def _service(name: str, entry: Entry, folder: Path, files: ComposeFiles) -> ComposeService | None:
     node = entry.value
     if not isinstance(node, source.Mapping):
         return None
-    files = tuple(env_files(node))
-    return ComposeService(name, node, entry.key, declaration_of(node), files, file_variables(files, folder))
+    raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
+    entries = {
+        key: Entry(each.key, _as_written(each.value, files)) if key in raw else each
+        for key, each in node.entries.items()
+    }
+    node = replace(node, entries=entries)
+    own = tuple(env_files(node))
+    return ComposeService(name, node, entry.key, declaration_of(node), own, file_variables(own, folder), raw)
 
 
-def _used_cid_variables(services: Iterable[source.Mapping]) -> list[str]:
-    """The CID variables that the services interpolate."""
-    texts = (node.text for service in services for node in source.walk(service) if isinstance(node, source.Scalar))
-    used = {name for text in texts for name in names(text)}
-    return [variable for variable in opendlv_flags.CID_VARIABLES if variable in used]
+def _as_written(node: Node, files: ComposeFiles) -> Node:
+    """A value without what a test sets."""
+    return changed_node(node, lambda text: filled(text, files.known, files.is_late))
 
 
 def _why_dropped(service: dict[str, Any]) -> str:

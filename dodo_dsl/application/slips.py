@@ -9,7 +9,6 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.interpolation import slip_in
 from dodo_dsl.application.model import ComposeService, text
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
 from dodo_dsl.source import Node, Scalar
@@ -25,8 +24,6 @@ COMMANDS = ("x-dodo-process", "entrypoint", "command")
 Word = tuple[str, Scalar]
 INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 _SCRIPTS = {".py": "python", ".sh": "sh", ".js": "node", ".pl": "perl", ".rb": "ruby"}
-_FILLED = ("services", "volumes", "networks", "secrets", "configs")
-"""The top-level keys below which compose fills in variables."""
 
 
 def words(service: ComposeService) -> Iterator[Word]:
@@ -151,12 +148,3 @@ def _missing_script(interpreter: str, words: list[Scalar], folder: Path) -> Iter
 
 def _cannot_start(word: Scalar, message: str, hint: str) -> Diagnostic:
     return Diagnostic(word.span, "application-file", message, hint, "warning")
-
-
-def variable_problems(document: source.Mapping) -> Iterator[Diagnostic]:
-    """Errors at the values of a compose file."""
-    for key in _FILLED:
-        node = document.get(key)
-        for part in source.walk(node) if node else ():
-            if isinstance(part, Scalar) and isinstance(part.value, str) and (slip := slip_in(part.value)):
-                yield Diagnostic(part.span, "application-file", *slip)

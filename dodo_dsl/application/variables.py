@@ -4,17 +4,17 @@ A test sets ``application: {env: {SPEED: 0.5}}``. The application has parameters
 ``x-dodo: {tune: {KP: {from: 0.2, to: 3, default: 1}}}``.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
 
 from dodo_dsl import source
-from dodo_dsl.application.access.secret_variables import is_steering
-from dodo_dsl.application.interpolation import changed_node, names, with_values
+from dodo_dsl.application.interpolation import changed_node, filled, literal, names
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
+from dodo_dsl.application.secret_variables import is_steering
 from dodo_dsl.diagnostics import Diagnostic, closest
-from dodo_dsl.source import Entry, Node, Scalar
+from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.vary import Range
 
 _LIBRARIES = ("CLUON_SHAREDMEMORY_POSIX", "VIRTUAL_ENV")
@@ -36,53 +36,56 @@ def owner(name: str) -> str:
 def split_by(application: ApplicationSource, name: str, value: str) -> str:
     """The service whose command, a string, a value would tear apart with a quotation mark or similar; else empty."""
     for service in application.services.values():
-        commands = (service.node.get(key) for key in _COMMANDS)
+        commands = (service.raw.get(key) for key in _COMMANDS)
         if _SPLIT & set(value) and any(isinstance(c, Scalar) and name in names(c.text) for c in commands):
             return service.name
     return ""
 
 
 def with_variables(application: ApplicationSource, values: Mapping[str, str]) -> ApplicationSource:
-    """The application with variables set in each service's environment, and filled in there and in its commands."""
+    """The application with the variables of a test in the commands of its services."""
     if not values:
         return application
-    services = {name: _service(service, values) for name, service in application.services.items()}
+    known = {**application.known, **values}
+    services = {name: _with_values(each, known, application.is_late) for name, each in application.services.items()}
     return replace(application, services=services)
 
 
-def _service(service: ComposeService, values: Mapping[str, str]) -> ComposeService:
+def _with_values(service: ComposeService, known: Mapping[str, str], is_late: Callable[[str], bool]) -> ComposeService:
     entries = dict(service.node.entries)
-    for key in _COMMANDS:
-        if key in entries:
-            entries[key] = Entry(entries[key].key, _filled(entries[key].value, values))
-    written = entries.get("environment")
-    place = written.key if written else service.span
-    entries["environment"] = Entry(place, _environment(written.value if written else None, values, service))
+    for key, node in service.raw.items():
+        value = changed_node(node, lambda text: filled(text, known, is_late))
+        entries[key] = Entry(entries[key].key, value)
     return replace(service, node=replace(service.node, entries=entries))
 
 
-def _environment(written: Node | None, values: Mapping[str, str], service: ComposeService) -> Node:
-    """The service's environment, in its own form, with the values in place of its own ones."""
-    literal = {name: value.replace("$", "$$") for name, value in values.items()}
-    if isinstance(written, source.Sequence):
-        kept = [_filled(i, values) for i in written.items if not (isinstance(i, Scalar) and _name(i) in values)]
-        return replace(written, items=(*kept, *(_scalar(service, f"{n}={value}") for n, value in literal.items())))
-    old = written.entries if isinstance(written, source.Mapping) else {}
-    entries = {name: Entry(entry.key, _filled(entry.value, values)) for name, entry in old.items()}
-    new = {name: Entry(service.span, _scalar(service, value)) for name, value in literal.items()}
-    return source.Mapping(service.span, {**entries, **new})
+def variables_of(
+    service: ComposeService, values: Mapping[str, str], is_late: Callable[[str], bool], given: Iterable[str] = ()
+) -> dict[str, str | None]:
+    """The environment of a service as compose reads it, with ``values``; None for one that is passed when a test runs.
+
+    It has what its files of variables name of the environment, and those that are ``given`` by the test.
+    """
+    made: dict[str, str | None] = {}
+    known = {**_literals(service.file_variables), **values}
+    for name, value in service.file_variables.items():
+        if value is None and not is_late(name):
+            made[name] = values.get(name, "").replace("$", "$$")
+        elif value is not None and literal(value) is None:
+            made[name] = filled(value, known, is_late)
+    raw = service.raw.get("environment")
+    for name, value in environment(plain(raw) if raw is not None else None).items():
+        if value is not None:
+            made[name] = filled(value, values, is_late)
+        elif is_late(name):
+            made[name] = None
+        elif name in values:
+            made[name] = values[name].replace("$", "$$")
+    return {**made, **{name: values[name].replace("$", "$$") for name in given}}
 
 
-def _name(item: Scalar) -> str:
-    return item.text.partition("=")[0]
-
-
-def _scalar(service: ComposeService, text: str) -> Scalar:
-    return Scalar(service.span, text, text)
-
-
-def _filled(node: Node, values: Mapping[str, str]) -> Node:
-    return changed_node(node, lambda text: with_values(text, values))
+def _literals(variables: Mapping[str, str | None]) -> dict[str, str]:
+    return {name: found for name, value in variables.items() if value is not None and (found := literal(value))}
 
 
 _KEYS = ("from", "to", "default")
@@ -127,7 +130,7 @@ def _variables(application: ApplicationSource) -> set[str]:
     found: set[str] = set()
     for service in application.services.values():
         found.update(environment(plain(service.node).get("environment")))
-        texts = (part.text for part in source.walk(service.node) if isinstance(part, Scalar))
+        texts = (part.text for node in service.raw.values() for part in source.walk(node) if isinstance(part, Scalar))
         found.update(*map(names, texts))
         found.update(service.file_variables)
     return found

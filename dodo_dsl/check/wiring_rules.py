@@ -15,14 +15,13 @@ value, as compose would then refuse the test.
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
-from dodo_dsl.application import opendlv_flags, slips
-from dodo_dsl.application.access import secret_problems
-from dodo_dsl.application.access.compose_keys import SERVICE, removed
-from dodo_dsl.application.interpolation import RequiredVariable, interpolate, interpolated
+from dodo_dsl.application import opendlv_flags, secret_problems, slips
+from dodo_dsl.application.container import is_carried
+from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.pictures import FORMATS, AskedPictures, pictures_of
-from dodo_dsl.application.variables import owner, split_by
+from dodo_dsl.application.variables import owner, split_by, with_variables
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
@@ -188,10 +187,10 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
     if not made or context.application is None or not context.spec.is_whole or not context.test.is_complete:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
-    known = {**context.application.known, **set_here}
-    for service in context.application.services.values():
-        yield from _slips(service, known, made)
-    asked = {service.name: _asked(service, known) for service in context.application.services.values()}
+    services = with_variables(context.application, set_here).services.values()
+    for service in services:
+        yield from _slips(service, made)
+    asked = {service.name: _asked(service) for service in services}
     players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
     shown = {end.port.name for end in ends if end.service not in players}
     yield from _blank(asked, {end.port.name: players[end.service] for end in ends if end.port.name not in shown})
@@ -217,7 +216,7 @@ def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
     if context.application is None or not context.spec.is_whole or not context.test.is_complete:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
-    for asked in pictures_of(context.application, set_here):
+    for asked in pictures_of(with_variables(context.application, set_here)):
         for service in context.services:
             keys = {service.texts.get(key, "").removeprefix("/"): key for key in service.arguments if key in _NAMES}
             if names := [name for name in asked.formats if name and name in keys]:
@@ -262,7 +261,7 @@ def _formats(service: ResolvedService, asked: AskedPictures, name: str, key: str
 def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:
     """The services of an application that ask for one of these memories."""
     services = application.services.values()
-    return [each.name for each in services if not set(names).isdisjoint(_asked(each, dict(application.known)))]
+    return [each.name for each in services if not set(names).isdisjoint(_asked(each))]
 
 
 def _offer(context: RuleContext, name: str) -> str:
@@ -282,19 +281,19 @@ def _missing(service: str, name: str, span: Span, made: set[str], offer: str) ->
     return Diagnostic(span, "application-memory", message, hint, "warning")
 
 
-def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> Iterator[Diagnostic]:
+def _slips(service: ComposeService, made: set[str]) -> Iterator[Diagnostic]:
     """Flags that are almost ``--name=``, with a memory of the test."""
     for word, item in slips.words(service):
-        flag = slips.meant(interpolated(word, known), "--name")
+        flag = slips.meant(word, "--name")
         if flag.partition("=")[2].removeprefix("/") in made:
             message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
             yield Diagnostic(item.span, "application-memory", message, f"did you mean '{flag}'?", "warning")
 
 
-def _asked(service: ComposeService, known: dict[str, str]) -> Asked:
+def _asked(service: ComposeService) -> Asked:
     found: Asked = {}
     for word, item in slips.words(service):
-        names = opendlv_flags.memories([interpolated(word, known)])
+        names = opendlv_flags.memories([word])
         found.update((name, item.span) for name in names if "$" not in name)
     return found
 
@@ -304,11 +303,6 @@ _FOR_ALL = ("command", "environment", "env_file")
 """Keys whose variables processes need, too."""
 _GIVEN = ("command", "entrypoint", "environment")
 """Keys whose variables a test may set."""
-_UNSURE = (
-    "cap_add", "depends_on", "deploy", "device_cgroup_rules", "devices", "ipc", "logging", "name", "network_mode",
-    "networks", "pid", "privileged", "security_opt", "volumes_from",
-)  # fmt: skip
-"""Keys of which a test's copy may not have what is written."""
 
 
 def check_variables(context: RuleContext) -> Iterator[Diagnostic]:
@@ -338,7 +332,7 @@ def _required(context: RuleContext, application: ApplicationSource) -> Iterator[
     }
     maybe = {**dict.fromkeys((*CID_VARIABLES, *application.access.passed), "?"), **application.known}
     for service, key, part in application.demanding:
-        if key.startswith("x-") or key in _UNSURE or (service and key in removed(SERVICE)):
+        if service and not is_carried(key):
             continue
         if key == "image" and image_variable(service) in application.known:
             continue

@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from dodo_dsl import atomic, compiler, package_data
-from dodo_dsl.application import compose_paths, mounts
+from dodo_dsl.application import compose_paths, unseen
+from dodo_dsl.application.construction import checked_builds
+from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.cli import image_pull, selection
@@ -22,7 +24,6 @@ from dodo_dsl.diagnostics import format_text, has_errors, shown_path
 from dodo_dsl.images import build_context, docker_command, sbom
 from dodo_dsl.images import names as images_names
 from dodo_dsl.images.names import DODO, PLATFORM, Image, choose, known, of_platforms, tagged
-from dodo_dsl.plan.rewrite.checked_builds import checked_builds
 from dodo_dsl.run.application_files import files_of_tests
 from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
 from dodo_dsl.spec.deployment import Deployment, build_command
@@ -190,10 +191,10 @@ def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) ->
     stderr.write(format_text(problems))
     if source is None or has_errors(problems):
         return Exit.PROBLEMS
-    builds, problems = checked_builds(source)
-    stderr.write(format_text(problems))
-    if has_errors(problems):
-        return Exit.PROBLEMS
+    try:
+        builds = checked_builds(source)
+    except EnvironmentProblem as error:
+        raise UsageError(f"the application's builds: {error}") from error
     stdout.write(json.dumps(_own_contexts(builds, source, deployment, options.contexts, stderr), indent=2) + "\n")
     return Exit.OK
 
@@ -208,7 +209,7 @@ def _own_contexts(
         folder.mkdir(parents=True, exist_ok=True)
         own = Path(tempfile.mkdtemp(dir=folder))
         written = compose_paths.unescaped(builds)
-        hidden = mounts.unseen_folders(source, deployment)
+        hidden = unseen.unseen_folders(source, deployment)
         for root in source.paths.roots:
             found = files_of_tests(root.resolve(), source.folder.resolve(), hidden)
             hidden += found.paths

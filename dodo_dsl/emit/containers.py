@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dodo_dsl.application.mounts import WAY_OUT
 from dodo_dsl.plan.added_services import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Application, Flag, Plan, PlannedService
 from dodo_dsl.plan.test_files import SHARED
@@ -23,6 +22,7 @@ FILES_MOUNT: Mapping[str, Any] = {
 }
 """In the long form, as the folder above may have a colon in its name."""
 _TRIES_A_SECOND = 2
+WAY_OUT = "mount it read-only (:ro), name it under 'paths' in dodo.yml, or raise '{key}' in 'sandbox' there"
 
 
 READY_TRIES = math.ceil(_TRIES_A_SECOND * READY_S)

@@ -11,7 +11,6 @@ import jinja2
 import yaml
 
 from dodo_dsl import package_data
-from dodo_dsl.application.interpolation import dotenv_line
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, Variable, containers, copy_command
 from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
@@ -153,9 +152,7 @@ def _templates() -> jinja2.Environment:
         autoescape=False,  # noqa: S701  (YAML, every value goes through the filter yaml)
         keep_trailing_newline=True,
     )
-    environment.filters.update(
-        yaml=_yaml, plain=_plain, variables=_variables, application=_application, dotenv=dotenv_line
-    )
+    environment.filters.update(yaml=_yaml, plain=_plain, variables=_variables, application=_application)
     return environment
 
 

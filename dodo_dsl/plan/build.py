@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import package_data, source
-from dodo_dsl.application import mounts
+from dodo_dsl.application import unseen
+from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.application.mounts import large_folders
 from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.goals import resolved_goals
@@ -19,10 +19,8 @@ from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.plan import added_services, addresses
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
+from dodo_dsl.plan.application import plan_application, too_long
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
-from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.plan.rewrite.service_copy import Setting
-from dodo_dsl.plan.rewrite.volumes import too_long
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -70,7 +68,7 @@ def build(
         span = Span(str(deployment.file)) if deployment.file else ordered[-1].spec.span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
-    hidden = mounts.below(application, deployment)
+    hidden = unseen.below(application, deployment)
     shared = _Shared(
         manifests,
         deployment,
@@ -89,12 +87,10 @@ def build(
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
-    if more := mounts.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
+    if more := unseen.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
         plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
-    of_copies = large_folders(application, [*deployment.registry, *deployment.services])
     of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
     problems = [
-        *of_copies,
         *itertools.islice(of_volumes, 1),
         *itertools.chain.from_iterable(b.problems for b in builders),
     ]

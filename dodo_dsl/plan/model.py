@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.model import Access
 from dodo_dsl.spec import model as spec_model
 from dodo_dsl.spec.model import Goal, RecordedValue, ResourceLimits
 from dodo_dsl.spec.rig import EMULATED_RIGS, KIND_TAGS
@@ -22,8 +22,6 @@ FlagKind = Literal["text", "path", "memory", "memories", "report"]
 
 DISPLAY_SERVER = ("xvfb-run", "-a", "-s", "-screen 0 1920x1080x24 -nolisten tcp")
 """What starts a program with its own X server (xvfb-run(1))."""
-OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
-"""The variable by which programs that draw with Qt need no display."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +90,9 @@ class ApplicationService:
 class Application:
     """The application; ``folder`` is its compose file's folder, relative to the compiled test's.
 
-    ``variables`` are those of its ``.env``, as compose interpolates them. ``hidden`` are folders of tests within its
-    own, relative to it. ``secrets`` are other variables, each with the file that sets it, relative to the compiled
-    test's folder as the roots of ``access`` are. ``copies`` are volumes of the test, each with the folder of the
+    ``hidden`` are folders of tests within its own, relative to it. ``secrets`` are variables of its ``.env`` that are
+    filled in when it starts, each with the file that sets it, relative to the compiled test's folder as the roots of
+    ``access`` are. ``copies`` are volumes of the test, each with the folder of the
     repository that is copied into it before the application starts.
     """
 
@@ -102,7 +100,6 @@ class Application:
     services: tuple[ApplicationService, ...]
     compose: dict[str, Any] = field(default_factory=dict)
     changes: tuple[str, ...] = ()
-    variables: dict[str, str] = field(default_factory=dict)
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     hidden: tuple[str, ...] = ()
     secrets: dict[str, str] = field(default_factory=dict)

@@ -15,10 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.application.access.host_paths import HostPaths, repository
-from dodo_dsl.application.access.model import AccessFinding
-from dodo_dsl.application.access.secret_variables import is_steering
-from dodo_dsl.application.interpolation import dotenv_file, interpolate, own_dotenv
+from dodo_dsl.application.host_paths import HostPaths, repository
+from dodo_dsl.application.interpolation import dotenv_file
+from dodo_dsl.application.secret_variables import is_steering
 from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import NEXT_REPORT
@@ -32,7 +31,7 @@ def application_paths(application: Application, folder: Path) -> HostPaths:
     """Its repository and what the deployment allows; ``folder`` is the compiled test's."""
     own = (folder / application.folder).resolve()
     roots = (*repository(own), *((folder / root).resolve() for root in application.access.roots))
-    return HostPaths(own, roots, tuple(map(Path, application.access.paths)), literal=True)
+    return HostPaths(own, roots, tuple(map(Path, application.access.paths)))
 
 
 def secrets_of(application: Application, folder: Path, outside: Mapping[str, str]) -> dict[str, str]:
@@ -40,15 +39,6 @@ def secrets_of(application: Application, folder: Path, outside: Mapping[str, str
     files = {path: dotenv_file(folder / path, outside) for path in set(application.secrets.values())}
     given = {name: path for name, path in application.secrets.items() if not is_steering(name)}
     return {name: files[path][name] for name, path in given.items() if name in files[path]}
-
-
-def env_file_findings(application: Application, paths: HostPaths, known: Mapping[str, str]) -> Iterator[AccessFinding]:
-    """Files of ``env_file`` that are not the application's; raises EnvironmentProblem for a variable without value."""
-    variables = {**application.variables, **own_dotenv(paths.folder, known), **known}
-    for service in application.services:
-        for item, path in enumerate(service.env_files):
-            if problem := paths.file_problem(interpolate(path, variables)):
-                yield AccessFinding(("services", service.name, "env_file", item), problem)
 
 
 def hidden_paths(application: Application, folder: Path, report: Path) -> list[Path]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, Self
 
-from dodo_dsl.application.access import secret_variables
+from dodo_dsl.application import secret_variables
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import application_files

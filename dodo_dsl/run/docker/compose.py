@@ -11,24 +11,19 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import advice, atomic
-from dodo_dsl.application import compose_paths
-from dodo_dsl.application.access import secret_variables
-from dodo_dsl.application.access.findings import CompiledTest, compiled_findings
-from dodo_dsl.application.access.host_paths import HostPaths
-from dodo_dsl.application.access.model import AccessFinding, shown
+from dodo_dsl.application import compose_paths, secret_variables
+from dodo_dsl.application.host_paths import HostPaths, is_port, is_rule_for_port
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.application.model import FILES, SANDBOX, image_variable
+from dodo_dsl.application.model import FILES, image_variable
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run.application_files import (
     application_paths,
-    env_file_findings,
     files_of_tests,
     hidden_paths,
     secrets_of,
@@ -107,14 +102,14 @@ class Compose:
         self._secrets: dict[str, Any] = {}
         self._images: dict[str, str] = {}
         self._say = say
-        self._paths = replace(application_paths(plan.application, folder), tmp=plan.isolation == "host")
-        outside = secret_variables.allowed(os.environ, plan.application.access.passed)
-        self._outside = {**secrets_of(plan.application, folder, outside), **outside}
+        self._paths = application_paths(plan.application, folder)
+        self._outside: dict[str, str] = {}
 
     async def read(self) -> None:
-        """Fills ``services``; raises BackendError, also if the test has what no test may have."""
+        """Fills ``services``; raises BackendError."""
         try:
-            self._refuse(env_file_findings(self.plan.application, self._paths, self._outside))
+            outside = secret_variables.allowed(os.environ, self.plan.application.access.passed)
+            self._outside = {**secrets_of(self.plan.application, self.folder, outside), **outside}
         except EnvironmentProblem as error:
             raise BackendError(str(error)) from error
         if shutil.which("docker") is None:
@@ -125,8 +120,7 @@ class Compose:
         if code:
             raise BackendError(f"docker compose rejects the compiled test: {traced(self.plan, problem)}")
         config = compose_paths.unescaped(json.loads(out))
-        self._refuse(compiled_findings(config, self._test))
-        self._refuse(_unseen(config, hidden_paths(self.plan.application, self.folder, self.report)))
+        self._require_own(config)
         self._secrets = config.get("secrets") or {}
         self._take(config)
 
@@ -134,21 +128,33 @@ class Compose:
         """Keeps what the engine is asked for of the test as ``docker compose config`` shows it."""
         self.services, self._volumes = config["services"], config.get("volumes") or {}
 
-    @property
-    def _test(self) -> CompiledTest:
-        plan = self.plan
-        images = {service.image for service in plan.services} | {plan.sandbox_image}
-        names = {service.name for service in plan.services} | {SANDBOX}
-        own_network = plan.isolation == "network"
-        application = {service.name for service in plan.application.services}
-        access = replace(plan.application.access, ports=tuple(known_ports(plan)))
-        return CompiledTest(application, names, images, own_network, access, self._paths, plan.application.limits)
-
-    @staticmethod
-    def _refuse(findings: Iterable[AccessFinding]) -> None:
-        if found := list(findings):
-            others = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-            raise BackendError(f"the application may not have {shown(found[0].steps)}: {found[0].message}{others}")
+    def _require_own(self, config: dict[str, Any]) -> None:
+        """Raises BackendError if a path of the application leads elsewhere than when the test was compiled."""
+        hidden = [place for place in hidden_paths(self.plan.application, self.folder, self.report) if place.is_dir()]
+        for key in ("configs", "secrets"):
+            for name, about in (config.get(key) or {}).items():
+                file = about.get("file") if isinstance(about, dict) else None
+                if file and any(Path(os.path.realpath(file)).is_relative_to(place) for place in hidden):
+                    raise BackendError(
+                        f"the application may not have {key}.{name}.file: '{file}' lies where tests, their output or "
+                        ".git are kept"
+                    )
+        ports = tuple(known_ports(self.plan))
+        for service in self.plan.application.services:
+            made = config["services"].get(service.name, {})
+            devices = [str(each.get("source")) for each in made.get("devices") or ()]
+            mounted = [str(v.get("source")) for v in made.get("volumes") or () if v.get("type") == "bind"]
+            rules = made.get("device_cgroup_rules") or ()
+            if any(is_port(path, ports) for path in (*devices, *mounted)) or any(
+                is_rule_for_port(r, ports) for r in rules
+            ):
+                raise BackendError(
+                    f"service '{service.name}' may not have the port of a rig, which only its service opens"
+                )
+            for volume in made.get("volumes") or ():
+                if volume.get("type") == "bind" and (link := self._paths.link(volume["source"])):
+                    what = f"'{volume['source']}' of '{service.name}' is a symbolic link to '{link}'"
+                    raise BackendError(f"{what}, outside the repository")
 
     def has_healthcheck(self, name: str) -> bool:
         check = self.services.get(name, {}).get("healthcheck")
@@ -297,14 +303,3 @@ class Compose:
             atomic.write_bytes(log, out + err)
         errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
         return process.returncode or 0, out.decode("utf-8", "replace"), errors[-1].strip() if errors else ""
-
-
-def _unseen(config: dict[str, Any], hidden: Iterable[Path]) -> Iterator[AccessFinding]:
-    """Configs and secrets that are files of tests, their output or ``.git``; mounts of these are masked."""
-    places = [place for place in hidden if place.is_dir()]
-    for key in ("configs", "secrets"):
-        for name, about in (config.get(key) or {}).items():
-            file = about.get("file") if isinstance(about, dict) else None
-            if file and any(Path(os.path.realpath(file)).is_relative_to(place) for place in places):
-                what = f"'{file}' lies where tests, their output or .git are kept"
-                yield AccessFinding((key, name, "file"), what)

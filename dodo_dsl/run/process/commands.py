@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.application.access import secret_variables
-from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate, own_dotenv
+from dodo_dsl.application import secret_variables
+from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate
+from dodo_dsl.application.model import OFFSCREEN
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import TIME, TIME_FOLDER
-from dodo_dsl.plan.model import DISPLAY_SERVER, OFFSCREEN, ApplicationService, Flag, Plan, PlannedService
-from dodo_dsl.run.application_files import application_paths
+from dodo_dsl.plan.model import DISPLAY_SERVER, ApplicationService, Flag, Plan, PlannedService
+from dodo_dsl.run.application_files import application_paths, secrets_of
 from dodo_dsl.run.application_time import ApplicationTime, folder_of
 from dodo_dsl.run.process.environment import (
     application_environment,
@@ -104,8 +105,7 @@ class Commands:
         inherited = application_environment(passed)
         outside = {**secret_variables.allowed(os.environ, passed), **inherited}
         cids = {name: str(self.slot.cid) for name in CID_VARIABLES}
-        variables = {**own_dotenv(folder, outside), **outside}
-        variables.update({name: cid for name, cid in cids.items() if name in self.plan.application.variables})
+        variables = {**secrets_of(self.plan.application, self.folder, outside), **outside, **cids}
         given = {
             name: variables[name] if value is None else interpolate(value, variables)
             for name, value in service.environment.items()
@@ -114,11 +114,10 @@ class Commands:
         own: dict[str, str] = {}
         paths = application_paths(self.plan.application, self.folder)
         for path in service.env_files:
-            file = interpolate(path, variables)
-            if problem := paths.file_problem(file):
+            if problem := paths.file_problem(path):
                 raise EnvironmentProblem(f"env_file of '{service.name}': {problem}")
             raw = path in service.raw_files
-            own.update(dotenv_file(folder / expanded(file), {**given, **variables}, own, raw=raw))
+            own.update(dotenv_file(folder / expanded(path), {**given, **variables}, own, raw=raw))
         own.update(given)
         own = {name: cids.get(name, with_cid_text(value, self.slot.cid)) for name, value in own.items()}
         pairs = ((word, interpolate(word, variables)) for word in service.command)

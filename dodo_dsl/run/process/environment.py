@@ -5,7 +5,7 @@ import sys
 from collections.abc import Collection
 from pathlib import Path
 
-from dodo_dsl.application.access import secret_variables
+from dodo_dsl.application import secret_variables
 from dodo_dsl.application.interpolation import EnvironmentProblem
 
 _FOR_APPLICATIONS = ("PATH", "HOME", "USER", "LANG", "TZ", "TERM")

@@ -6,28 +6,29 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application import interpolation
-from dodo_dsl.application.access import secret_variables
+from dodo_dsl.application import interpolation, secret_variables
 from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 
 _NAMED = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LISTS = ("environment", "args")
-_OF_FOLDER = ("PWD",)
+_OF_FOLDER = ("PWD", "PATH")
 """What compose sets itself."""
 
 
 def withheld(
-    nodes: Collection[Node], own: Collection[str], passed: Collection[str], outside: Mapping[str, str]
+    nodes: Collection[Node], texts: Mapping[Span, str], known: Collection[str], outside: Mapping[str, str]
 ) -> Iterator[Diagnostic]:
-    """Variables of DoDo's own environment, ``outside``, that the files name; ``own`` are the application's."""
-    seen: set[str] = set()
-    shared = secret_variables.allowed(outside, passed)
+    """Variables that the files name and that a test does not get, though they are in DoDo's environment ``outside``.
+
+    ``texts`` are the values with variables as they are written, by their places.
+    """
+    seen = {*known, *_OF_FOLDER}
     for node in nodes:
-        for name, span in _named(node, ""):
+        for name, span in _named(node, "", texts):
             is_secret = secret_variables.holds_secret(name, outside.get(name, ""))
-            if not (is_secret or name in outside) or name in {*seen, *own, *passed, *shared, *_OF_FOLDER}:
+            if not (is_secret or name in outside) or name in seen or name.startswith("DODO_IMAGE_"):
                 continue
             seen.add(name)
             why = "looks like a secret" if is_secret else "is of DoDo's own environment"
@@ -60,7 +61,7 @@ def _open(span: Span, kind: str) -> Diagnostic:
     return Diagnostic(span, "application-secret", message, hint, "warning")
 
 
-def _named(node: Node, key: str) -> Iterator[tuple[str, Span]]:
+def _named(node: Node, key: str, texts: Mapping[Span, str]) -> Iterator[tuple[str, Span]]:
     """The variables that a node takes from outside, each with its place; ``key`` is the node's own."""
     if isinstance(node, source.Mapping):
         for word, entry in node.entries.items():
@@ -68,14 +69,14 @@ def _named(node: Node, key: str) -> Iterator[tuple[str, Span]]:
             if key in _LISTS and is_empty:
                 yield word, entry.key
             if not word.startswith("x-"):
-                yield from _named(entry.value, word)
+                yield from _named(entry.value, word, texts)
     elif isinstance(node, source.Sequence):
         for item in node.items:
             if key in _LISTS and isinstance(item, Scalar) and _NAMED.fullmatch(item.text):
                 yield item.text, item.span
-            yield from _named(item, "")
+            yield from _named(item, "", texts)
     else:
-        yield from ((name, node.span) for name in sorted(interpolation.names(node.text)))
+        yield from ((name, node.span) for name in sorted(interpolation.names(texts.get(node.span, ""))))
         if key == "environment" and isinstance(node.value, str):
             yield node.text, node.span
 

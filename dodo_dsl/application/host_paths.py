@@ -1,6 +1,6 @@
 """Paths of the host in a compose file: files of the repository, what else an application may mount, and rigs' ports.
 
-A rig is moved by its own service, and no application gets its port.
+Only paths that are allowed here are carried into a test, so that there is no list of what is dangerous.
 """
 
 import contextlib
@@ -11,10 +11,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.application import host_access
-
 ASK = "keep it in the repository, or allow it with 'paths' in dodo.yml"
 NUL = "a path has a NUL character, so it cannot be a file"
+_WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml"
 INSIDE = "put the files themselves in its place"
 
 TO_READ = ("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone",
@@ -25,7 +24,19 @@ TO_READ = ("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/loca
 Not all of ``/sys``: the engine makes only the top of a mount read-only, and a container's root could write to the
 control groups of the host that are mounted below it.
 """
-_TMP, _MEMORY = "/tmp", "/dev/shm"
+TMP, MEMORY = "/tmp", "/dev/shm"
+_PLAIN_DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+_OF_MACHINE = re.compile(
+    r"/dev/(mem|kmem|port|kmsg|(s|h|v|xv)d[a-z]\d*|(nvme|mmcblk|loop|nbd|mtd|zram|ram|vhost|tpm|watchdog)[^/]*"
+    r"|(dm-|md|sr|sg|bsg/)[^/]*|(mapper|disk|block|char|cpu)(/.*)?|kvm|fuse|btrfs-control|snapshot|userfaultfd)"
+)
+"""Devices that are not robot hardware: disks, memory and the kernel's own."""
+_OF_DESKTOP = re.compile(
+    r"/(var/)?run/user/\d+/(pulse|pipewire|wayland)[^/]*(/native)?|/tmp/\.X11-unix(/.*)?|(.*/)?\.Xauthority"
+)
+_OF_KERNEL = ("/proc", "/sys/firmware", "/sys/fs", "/sys/hypervisor", "/sys/kernel")
+_WHOLE = ("/", "/run", "/var/run", "/var", "/var/lib/docker", "/sys")
+_SOCKET = re.compile(r"(docker|podman|containerd|crio)\.sock$")
 
 
 def repository(folder: Path) -> tuple[Path, ...]:
@@ -55,17 +66,11 @@ def _is_home(folder: Path) -> bool:
 
 @dataclass(frozen=True)
 class HostPaths:
-    """Judges paths that are relative to ``folder``; ``roots`` are the repository's, ``allowed`` what dodo.yml names.
-
-    ``tmp`` means that the host's ``/tmp`` and shared memory may be mounted, or are the test's own. A path with a
-    variable is judged when that is filled in: then paths are ``literal``, and a dollar sign is one.
-    """
+    """Judges paths that are relative to ``folder``; ``roots`` are the repository's, ``allowed`` what dodo.yml names."""
 
     folder: Path
     roots: tuple[Path, ...]
     allowed: tuple[Path, ...] = ()
-    tmp: bool = True
-    literal: bool = False
 
     def whole(self, text: str) -> str:
         """A path as the engine would see it, without ``..``; symbolic links stay."""
@@ -82,18 +87,12 @@ class HostPaths:
 
     def is_of_repository(self, text: str) -> bool:
         """Whether a path that is the application's own is a file of the repository, and so nobody's to write to."""
-        return any(_below(name, self._real_roots) for name in self.names(text))
+        roots = [name for root in self.roots for name in (str(root), real(root))]
+        return any(_below(name, roots) for name in self.names(text))
 
     def is_writable(self, text: str) -> bool:
-        """Whether an application may write to the path itself: to what dodo.yml names, and to ``/tmp``."""
-        whole = self.whole(text)
-        if self.tmp and (whole == _TMP or all(_below(name, [_MEMORY]) for name in self.names(text))):
-            return True
-        return whole in host_access.PLAIN_DEVICES or (self.is_own(text) and not self.is_of_repository(text))
-
-    def is_only_read(self, text: str) -> bool:
-        """Whether an application may read the path itself, and not write to it."""
-        return not self.is_writable(text) and (self.is_own(text) or self._is_to_read(text))
+        """Whether an application may write to the path itself, which ``dodo.yml`` names."""
+        return self.whole(text) in _PLAIN_DEVICES or (self.is_own(text) and not self.is_of_repository(text))
 
     def link(self, text: str) -> str:
         """Where symbolic links lead to that leave the repository and the allowed paths; empty without such a link."""
@@ -102,23 +101,19 @@ class HostPaths:
         places = [real(place) for place in self._places]
         return next((name for name in self.names(text)[1:] if not _below(name, places)), "")
 
-    def is_open(self, text: str) -> bool:
-        """Whether a path has a variable, so that it cannot be judged yet."""
-        return "$" in text and not self.literal
-
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
         if "\0" in text:
             return NUL
-        if self.is_open(text) or self.is_own(text):
-            return ""
-        return f"'{written or text}' {self._where(text)}"
+        return "" if self.is_own(text) else f"'{written or text}' {self._where(text)}"
 
     def mount_problem(self, text: str) -> tuple[str, str]:
         """Why a path may not be mounted, and what to do; empty when it may, if only to be read."""
         if "\0" in text:
             return NUL, "remove it"
-        if self.is_open(text) or self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
+        if any(name in _WHOLE or _below(name, _OF_KERNEL) or _SOCKET.search(name) for name in self.names(text)):
+            return f"{self._called(text)} belongs to the host, so tests would share it", _WITHOUT
+        if self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
             return "", ""
         if self.link(text):
             return f"'{text}' {self._where(text)}", INSIDE
@@ -126,25 +121,44 @@ class HostPaths:
             return f"'{text}' holds the whole repository and more", "mount the folders that the service needs"
         if not text.startswith(("/", "~")):
             return f"'{text}' {self._where(text)}", ASK
-        written = f"/{text.lstrip('/')}" if text.startswith("//") else text  # as of ${HOME}/x where that is /
-        return f"'{written}' belongs to the host, so tests would share it", ASK
+        return f"'{text}' belongs to the host, so tests would share it", ASK
 
     @property
     def _places(self) -> tuple[Path, ...]:
         return (*self.roots, *self.allowed)
 
-    @property
-    def _real_roots(self) -> list[str]:
-        return [name for root in self.roots for name in (str(root), real(root))]
-
     def _is_to_read(self, text: str) -> bool:
         places = (*TO_READ, *map(real, TO_READ))
         return all(_below(name, places) for name in self.names(text))
+
+    def _called(self, text: str) -> str:
+        link = self.link(text)
+        return f"'{text}', a symbolic link to '{link}'," if link else f"'{text}'"
 
     def _where(self, text: str) -> str:
         if link := self.link(text):
             return f"is a symbolic link to '{link}', outside the repository"
         return "is outside the repository"
+
+    def is_hardware(self, text: str, *, read_only: bool = False) -> bool:
+        """Whether an absolute path is a robot's device, its settings in the kernel, or a user's sound and screen."""
+        return text.startswith(("/", "~")) and all(_is_hardware(name, read_only) for name in self.names(text))
+
+    def is_of_machine(self, text: str) -> bool:
+        """Whether a device is one of the host's disks, its memory or its kernel, under whatever name."""
+        return any(_OF_MACHINE.fullmatch(name) for name in self.names(text))
+
+
+def is_token(source: str, target: str) -> bool:
+    """A mount of a file of ``/tmp`` at its own place, by which programs find shared memory; the test's own has it."""
+    return source.startswith(f"{TMP}/") and source == target and not _OF_DESKTOP.fullmatch(source)
+
+
+def _is_hardware(name: str, read_only: bool) -> bool:
+    if _below(name, [MEMORY]) or name in _PLAIN_DEVICES or name == "/sys" or _below(name, _OF_KERNEL):
+        return False
+    is_device = _below(name, ["/dev"]) or bool(_OF_DESKTOP.fullmatch(name))
+    return is_device or (_below(name, ["/sys"]) and not read_only)
 
 
 def _below(path: str, places: "Sequence[Path | str]") -> bool:
@@ -167,8 +181,6 @@ def real(path: str | Path) -> str:
         return str(path)
 
 
-WHY = "is left out of all tests: only the service that moves the rig opens its port"
-HINT = "give the application another device"
 _WAYS = ("/dev/serial", "/dev/bus/usb")
 """Folders where a port has its other names, and where its USB device can be spoken to directly."""
 _TERMINALS = frozenset((*range(4, 6), 166, 188, 189, 204, 205))
@@ -177,16 +189,13 @@ _RULE = re.compile(r"[ac] ([0-9]+|\*):([0-9]+|\*) [rwm]+")
 
 
 def is_port(device: str, ports: Iterable[str]) -> bool:
-    """Whether a device file is a rig's port, one of its names, or a path to it."""
-    files = list(_files(ports))
-    names = _names(device)
-    return bool(files) and any(name in files or _is_below(name, _WAYS) for name in names)
+    """Whether a path is a rig's port, one of its names, a way to it, or a folder that holds it.
 
-
-def holds_port(folder: str, ports: Iterable[str]) -> bool:
-    """The same, and of a folder whether it holds a port: an engine gives a container all devices in it."""
-    files = list(_files(ports))
-    return is_port(folder, files) or any(_is_below(file, _names(folder)) for file in files)
+    A rig is moved by its own service, and no application gets its port: an engine gives a container all in a folder.
+    """
+    files, names = list(_files(ports)), (os.path.normpath(device), real(device))
+    is_way = any(name in files or _below(name, _WAYS) for name in names)
+    return bool(files) and (is_way or any(_below(file, names) for file in files))
 
 
 def is_rule_for_port(rule: object, ports: Iterable[str]) -> bool:
@@ -199,25 +208,11 @@ def is_rule_for_port(rule: object, ports: Iterable[str]) -> bool:
     return major == "*" or int(major) in _TERMINALS or (int(major), minor) in set(_numbers(files))
 
 
-def source(device: object) -> str:
-    """The host's path in an entry of ``devices``, of its short or its long form."""
-    written = device.get("source") if isinstance(device, dict) else device
-    return host_access.mount(f"{written or ''}:").source
-
-
 def _files(ports: Iterable[str]) -> Iterator[str]:
     """All names of those ports that are device files."""
     for port in ports:
         if port.startswith("/"):
-            yield from _names(port)
-
-
-def _names(path: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((os.path.normpath(path), real(path))))
-
-
-def _is_below(path: str, folders: Iterable[str]) -> bool:
-    return any(path == folder or path.startswith(f"{folder.rstrip('/')}/") for folder in folders)
+            yield from dict.fromkeys((os.path.normpath(port), real(port)))
 
 
 def _numbers(files: Iterable[str]) -> Iterator[tuple[int, str]]:

@@ -1,0 +1,193 @@
+"""The application's part of a test, constructed from its compose files: services, volumes, secrets and configs.
+
+Only what a test carries gets into it, so that nothing has to be looked for in it afterwards. Problems are collected
+meanwhile, each at its place in the file: whoever checks an application constructs it.
+"""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.application import compose_paths
+from dodo_dsl.application.container import TOP_LEFT_OUT, Container
+from dodo_dsl.application.interpolation import interpolate
+from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.mounts import COPY, nested, own_name, volume
+from dodo_dsl.application.part import Part
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
+from dodo_dsl.source import Mapping, Node, Scalar
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
+
+_NAMED = ("volumes", "secrets", "configs")
+_OF_SERVICES = {"image", "build", "command", "x-dodo", "x-dodo-process"}
+_REFUSED = {
+    "models": "the engine's model runner is shared by all tests",
+    "jobs": "a test starts services and no schedules",
+}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a test's copy of the application depends on; ``folder`` is the compiled test's.
+
+    ``waits`` are the services of DoDo after which the application starts. Devices stay only with ``hil``, privileges
+    only with ``privileged_allowed`` as well. ``limits`` is what a service gets that sets none, and ``given`` are
+    variables that the test sets. With a ``time_seed``, the application's own time is the test's.
+    """
+
+    cid: int
+    isolation: str
+    folder: Path
+    waits: tuple[str, ...] = ()
+    hil: bool = False
+    privileged_allowed: bool = False
+    limits: SandboxLimits = field(default_factory=SandboxLimits)
+    given: tuple[tuple[str, str], ...] = ()
+    time_seed: int | None = None
+
+    @property
+    def own_network(self) -> bool:
+        return self.isolation == "network"
+
+    @property
+    def keeps_privileges(self) -> bool:
+        return self.hil and self.privileged_allowed
+
+
+class Construction:
+    """One test's application while it is made; ``copies`` are volumes, each with the folder that it has at the start.
+
+    ``shown`` are the paths of the host that it asks for, each with its place and the service that writes to it, if any.
+    """
+
+    def __init__(self, application: ApplicationSource, setting: Setting) -> None:
+        self.application, self.setting = application, setting
+        self.paths, self.ports = application.paths, application.access.ports
+        self.base = compose_paths.escaped(Path(os.path.relpath(application.folder, setting.folder)).as_posix())
+        self.problems: list[Diagnostic] = []
+        self.shown: list[tuple[str, Span, str]] = []
+        self.copies: dict[str, str] = {}
+        self._copied: dict[str, str] = {}
+        self.volumes = {name: volume(self, name, node, span) for name, node, span in self._named("volumes")}
+
+    def _named(self, key: str) -> Iterator[tuple[str, Node, Span]]:
+        node = self.application.rest.get(key)
+        for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
+            yield name, entry.value, entry.key
+
+    def about(self, name: str, span: Span) -> Part:
+        """What reports problems of something with a name."""
+        return Part(self, name, span)
+
+    def rebased(self, path: str) -> str:
+        """A path of the application as seen from the compiled test's folder, as compose reads it."""
+        return compose_paths.rebased(compose_paths.escaped(path), self.base)
+
+    def show(self, source: str, span: Span, writer: str = "") -> None:
+        if source:
+            self.shown.append((source, span, writer))
+
+    def copy_of(self, source: str, name: str = "") -> str:
+        """The volume with the test's copy of a folder of the repository; empty for files and other paths.
+
+        All services that mount the folder share its copy, so that none can lead the mount of another one elsewhere.
+        """
+        paths = self.paths
+        if not paths.is_own(source) or paths.is_writable(source):
+            return ""
+        place = paths.names(source)[-1]
+        if Path(place).is_file():
+            return ""
+        if name or place not in self._copied:
+            own = name or f"{COPY}{len(self._copied)}"
+            self._copied.setdefault(place, own)
+            self.copies[own] = self.rebased(source)
+            return own
+        return self._copied[place]
+
+    def service(self, service: ComposeService) -> dict[str, Any]:
+        """A service of the compose file as a container of the test."""
+        return Container(self, service).made()
+
+    def rest(self) -> dict[str, Any]:
+        """The top-level keys beside ``services``, for services that are made already."""
+        made = {key: self._files(key) for key in ("secrets", "configs")}
+        volumes = {own_name(name): about.made for name, about in self.volumes.items()}
+        volumes |= {name: {} for name in self.copies if name not in volumes}
+        return {key: value for key, value in {"volumes": volumes, **made}.items() if value}
+
+    def _files(self, key: str) -> dict[str, Any]:
+        return {name: self._file(key, name, node, span) for name, node, span in self._named(key)}
+
+    def _file(self, key: str, name: str, node: Node, span: Span) -> dict[str, Any]:
+        """A secret or config: of a file of the repository, of a variable that is passed, or a text."""
+        what = f"the {key[:-1]} '{name}'"
+        of = self.about(what, span)
+        fields = of.fields(
+            node, what, "file environment content", "labels name",
+            refused=dict.fromkeys(("driver", "driver_opts", "template_driver"), "a program would provide it")
+            | {"external": f"the engine's {key} are not the application's"},
+        )  # fmt: skip
+        if file := of.path(fields.get("file")):
+            return {"file": file}
+        if "content" in fields and isinstance(text := fields["content"], Scalar):
+            return {"content": text.text}
+        variable = of.literal(fields["environment"]) if "environment" in fields else None
+        if variable and self.application.is_late(variable):
+            return {"environment": variable}
+        if variable:
+            message = f"{what} is '{variable}', which belongs to DoDo's environment and not to the application"
+            hint = f"to allow it, write environment: [{variable}] in dodo.yml"
+            of.refuse(fields["environment"].span, message, hint)
+        return {}
+
+    def check(self) -> list[Diagnostic]:
+        """The problems of everything but the services, which are made already."""
+        self.rest()
+        self._top()
+        for span, message, hint in nested(self):
+            self.problems.append(Diagnostic(span, "application-isolation", message, hint))
+        return self.problems
+
+    def _top(self) -> None:
+        known = ("services", "include", *_NAMED, *TOP_LEFT_OUT, *_REFUSED)
+        of = self.about("the compose file", Span(str(self.application.path)))
+        for key, entry in self.application.top.items():
+            if key in _REFUSED:
+                of.refuse(entry.key, f"'{key}' cannot be isolated: {_REFUSED[key]}", "remove it")
+            elif key not in known and not key.startswith("x-"):
+                about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
+                is_service = bool(about & _OF_SERVICES)
+                hint = "indent it by 2: it looks like a service" if is_service else did_you_mean(key, known)
+                fix = None if is_service else only_fix(key, known)
+                of.bad(entry.key, f"unknown key '{key}' in the compose file", hint, rule="unknown-key", fix=fix)
+
+
+def checked_builds(application: ApplicationSource) -> dict[str, Any]:
+    """A compose file with the builds alone: whole paths, and no variables; raises RequiredVariable.
+
+    Variables whose values are not known are empty: each builder has others in the environment.
+    """
+    made = Construction(application, Setting(1, "network", application.folder, limits=application.limits))
+    services = {name: made.service(service) for name, service in application.services.items()}
+    builds = {name: _whole(made, each["build"]) for name, each in services.items() if "build" in each}
+    secrets = {name: _whole(made, about) for name, about in made.rest().get("secrets", {}).items()}
+    text = {"services": {name: {"build": build} for name, build in builds.items()}}
+    found: dict[str, Any] = compose_paths.mapped_texts(
+        text | ({"secrets": secrets} if secrets else {}), lambda t: compose_paths.escaped(interpolate(t, {}))
+    )
+    return found
+
+
+def _whole(made: Construction, about: dict[str, Any]) -> dict[str, Any]:
+    def path(text: str) -> str:
+        return (
+            compose_paths.escaped(made.paths.whole(text.replace("$$", "$"))) if compose_paths.is_local(text) else text
+        )
+
+    found = {key: path(value) if key in ("context", "file") else value for key, value in about.items()}
+    if others := about.get("additional_contexts"):
+        found["additional_contexts"] = {name: path(value) for name, value in others.items()}
+    return found

@@ -1,0 +1,364 @@
+"""A service of the application as a container of a test, constructed from the keys that a test carries.
+
+Each key has one function, which gives what the container has for it. All other keys are left out, and one warning names
+them; those without which something else would run are refused.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from dodo_dsl import source
+from dodo_dsl.application import hardware, image, limits, opendlv_flags
+from dodo_dsl.application.interpolation import changed_node, filled
+from dodo_dsl.application.model import (
+    FILES,
+    NAMESPACES,
+    OFFSCREEN,
+    SANDBOX,
+    ComposeService,
+    borrowed,
+    env_files,
+    plain,
+    reference,
+    text,
+)
+from dodo_dsl.application.mounts import mounts
+from dodo_dsl.application.part import ASK_KEY, Part, pairs
+from dodo_dsl.application.variables import variables_of
+from dodo_dsl.diagnostics import did_you_mean, listed, only_fix
+from dodo_dsl.source import Node, Scalar
+
+if TYPE_CHECKING:
+    from dodo_dsl.application.construction import Construction
+
+TOP_LEFT_OUT = ("name", "networks", "version")
+Key = Callable[["Container", Node], Any]
+
+
+def is_carried(key: str) -> bool:
+    """Whether a test carries a key of a service."""
+    return key in _CARRIED
+
+
+class Container(Part):
+    """The service while it is made."""
+
+    def __init__(self, project: "Construction", service: ComposeService) -> None:
+        super().__init__(project, service.name, service.span)
+        self.service = service
+        self.own: dict[str, Any] = {}
+        variables = dict(project.setting.given)
+        cids = dict.fromkeys(opendlv_flags.CID_VARIABLES, str(project.setting.cid))
+        self.known = {**project.application.known, **variables, **cids}
+
+    def made(self) -> dict[str, Any]:
+        """What the container has."""
+        for key, entry in self.service.node.entries.items():
+            if key in _CARRIED:
+                value = _CARRIED[key](self, entry.value) if not _is_null(entry.value) else None
+                self.own.update({} if value is None else {key: value})
+            elif key in _REFUSED:
+                if not _is_off(entry.value):
+                    self.refuse(entry.value.span, f"'{key}' of '{self.name}' {_REFUSED[key]}", _WITHOUT)
+            elif key in _LEFT_OUT:
+                self.left += [(key, entry.key)] if not _is_off(entry.value) else []
+            elif not key.startswith("x-") and key != "profiles":
+                known = (*_CARRIED, *_REFUSED, *_LEFT_OUT)
+                hint = did_you_mean(key, known) or ASK_KEY.format(key)
+                fix = only_fix(key, known, self.service.node.entries)
+                self.bad(entry.key, f"unknown key '{key}' in '{self.name}'", hint, rule="unknown-key", fix=fix)
+        for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
+            step(self)
+        if self.left:
+            keys = list(dict.fromkeys(key for key, _ in self.left))
+            are = "is" if len(keys) == 1 else "are"
+            message = f"{listed([f'{key!r}' for key in keys])} of '{self.name}' {are} left out: a test does not carry "
+            message += "this key" if len(keys) == 1 else "these keys"
+            self.bad(self.left[0][1], message, rule="application-key", severity="warning")
+        return self.own
+
+    def filled(self, node: Node) -> Node:
+        """A value with the variables of the test filled in."""
+        late = self.project.application.is_late
+        return changed_node(node, lambda word: filled(word, self.known, late))
+
+    def raw(self, key: str) -> Node | None:
+        return self.service.raw.get(key)
+
+    def number(self, node: Node, most: float, what: str, key: str, measure: Any = limits.number) -> Any:
+        """A limit of at most ``most``."""
+        written = self.literal(node)
+        value = most
+        if written is not None:
+            value, is_cut = limits.cut(written, most, measure)
+            if is_cut:
+                self.cut(node.span, what, key)
+            else:
+                value = int(measure(value)) if float(measure(value)).is_integer() else float(measure(value))
+        return value
+
+
+_WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"
+
+
+def _is_null(node: Node) -> bool:
+    return isinstance(node, Scalar) and node.value is None
+
+
+def _is_off(node: Node) -> bool:
+    return plain(node) in (None, False, "", "false", [], {})
+
+
+def _as_written(_: Container, node: Node) -> Any:
+    return plain(node)
+
+
+def _command(c: Container, key: str) -> Any:
+    node = c.raw(key)
+    value = plain(c.filled(node)) if node is not None else None
+    return with_cid(value, c.project.setting.cid) if value is not None else None
+
+
+def with_cid(command: Any, cid: int) -> Any:
+    """A command with its CID, a string staying a string, which compose splits."""
+    if isinstance(command, str):
+        return opendlv_flags.with_cid_text(command, cid)
+    return list(opendlv_flags.with_cid([text(word) for word in command], cid))
+
+
+def _healthcheck(c: Container, _: Node) -> Any:
+    node = c.raw("healthcheck")
+    made = plain(c.filled(node)) if node is not None else {}
+    known = "disable interval retries test timeout start_period start_interval"
+    c.fields(node, f"'healthcheck' of '{c.name}'", known)
+    if isinstance(made, dict) and made.get("test") is not None:
+        made["test"] = with_cid(made["test"], c.project.setting.cid)
+    return {key: value for key, value in made.items() if key in known.split() and value is not None}
+
+
+def _env_file(c: Container, node: Node) -> Any:
+    made: list[Any] = []
+    for file in env_files(c.service.node):
+        word = Scalar(file.span, file.path, file.path)
+        if path := c.path(word):
+            about = {"path": path, **({} if file.required else {"required": False})}
+            about |= {"format": "raw"} if file.raw else {}
+            made.append(about if len(about) > 1 else path)
+    return made
+
+
+def _own_environment(c: Container) -> None:
+    """Its variables, with the CID wherever one was, also in the place of one that ``env_file`` would set."""
+    application, setting = c.project.application, c.project.setting
+    found = variables_of(c.service, c.known, application.is_late, dict(setting.given))
+    made = {k: None if v is None else opendlv_flags.with_cid_text(v, setting.cid) for k, v in found.items()}
+    names = [n for n in opendlv_flags.CID_VARIABLES if n in made or n in c.service.file_variables]
+    made |= dict.fromkeys(names, str(setting.cid))
+    if "DISPLAY" in made and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):
+        made |= OFFSCREEN
+    if made:
+        c.own["environment"] = made
+
+
+def _namespace(c: Container, key: str, node: Node) -> Any:
+    """Another service's namespace; that of a container of the application is its service's."""
+    word = c.literal(node) or ""
+    kind, name = reference(word)
+    containers, services = c.project.application.containers, c.project.application.services
+    if kind == "container" and name not in containers:
+        message = f"'{key}' joins the container '{name}', which is not part of the application"
+        c.refuse(node.span, message, "make it a service of the application")
+    elif kind:
+        name = containers[name] if kind == "container" else name
+        return f"service:{name}" if name in services else None
+    elif key == "pid" and word == "host":
+        c.refuse(node.span, "'pid: host' gives access to the processes of all tests", "remove it")
+    elif key == "network_mode" and word == "none":
+        return word
+    return None
+
+
+def _volumes_from(c: Container, node: Node) -> Any:
+    containers, services = c.project.application.containers, c.project.application.services
+    made = []
+    for item in c.items(node):
+        kind, name, options = borrowed(c.literal(item))
+        if kind == "container" and name not in containers:
+            c.refuse(item.span, f"the container '{name}' is not part of the application", "make it a service of it")
+            continue
+        name = containers[name] if kind == "container" else name
+        made += [f"{name}{options}"] if name in services else []
+    return made or None
+
+
+def _networks(c: Container, node: Node) -> Any:
+    """The names that the service has in networks, which are the test's one."""
+    about = node.entries.values() if isinstance(node, source.Mapping) else ()
+    aliases = [plain(a) for e in about if isinstance(e.value, source.Mapping) and (a := e.value.get("aliases"))]
+    names = list(dict.fromkeys(str(name) for each in aliases for name in each or ()))
+    return {"default": {"aliases": names}} if names else None
+
+
+def _links(c: Container, node: Node) -> Any:
+    found = [plain(item) for item in c.items(node)]
+    return [link for link in found if str(link).partition(":")[0] in c.project.application.services] or None
+
+
+def _depends_on(c: Container, node: Node) -> Any:
+    about = plain(node)
+    started = {"condition": "service_started"}
+    own = {str(name): dict(started) for name in about} if isinstance(about, list) else about
+    kept = ("condition", "required")  # nothing of a test is restarted
+    return {
+        name: {key: value for key, value in (how or {}).items() if key in kept} or dict(started)
+        for name, how in own.items()
+        if name in c.project.application.services
+    }
+
+
+def _sysctls(c: Container, node: Node) -> Any:
+    found = dict(pairs(node))
+    is_own = c.project.setting.own_network
+    return {key: plain(value) for key, value in found.items() if is_own or not key.startswith("net.")} or None
+
+
+def _secrets(c: Container, node: Node) -> Any:
+    for item in c.items(node):
+        c.fields(item, f"a secret or config of '{c.name}'", "source target uid gid mode")
+    return plain(node)
+
+
+def _own_namespaces(c: Container) -> None:
+    """Network and IPC of the test, unless the service has those of another one, or none."""
+    own, setting = c.own, c.project.setting
+    mode = own.get("network_mode")
+    if setting.own_network:
+        own["ipc"] = f"service:{SANDBOX}"
+    else:
+        own["network_mode"] = mode or "host"
+        ipc = c.literal(node) if (node := c.service.node.get("ipc")) is not None else None
+        own.update({"ipc": ipc} if "ipc" not in own and ipc in ("host", "none", "private", "shareable") else {})
+    if mode or not setting.own_network:
+        own.pop("networks", None)
+    if own.get("network_mode") == "host":
+        own.pop("links", None)
+
+
+def _own_dependencies(c: Container) -> None:
+    """What starts before: also DoDo's services that must be ready first."""
+    setting = c.project.setting
+    started, healthy = {"condition": "service_started"}, {"condition": "service_healthy"}
+    waits: dict[str, Any] = {SANDBOX: dict(started)} if setting.own_network else {}
+    waits |= {name: dict(healthy) for name in setting.waits}
+    if any(_source(volume) in c.project.copies for volume in c.own.get("volumes") or ()):
+        waits = {FILES: dict(healthy), **waits}
+    after = {**(c.own.pop("depends_on", None) or {}), **waits}
+    c.own.update({"depends_on": after} if after else {})
+
+
+def _source(volume: Any) -> str:
+    return str(volume.get("source", "")) if isinstance(volume, dict) else str(volume).partition(":")[0]
+
+
+_CARRIED: dict[str, Key] = {
+    **dict.fromkeys(
+        [
+            "cap_drop",
+            "cpuset",
+            "dns",
+            "dns_opt",
+            "dns_search",
+            "domainname",
+            "expose",
+            "extra_hosts",
+            "group_add",
+            "hostname",
+            "init",
+            "platform",
+            "read_only",
+            "stdin_open",
+            "stop_grace_period",
+            "stop_signal",
+            "tty",
+            "umask",
+            "user",
+            "working_dir",
+        ],
+        _as_written,
+    ),
+    **limits.LIMITS,
+    "build": image.build,
+    "cap_add": hardware.capabilities,
+    "command": lambda c, _: _command(c, "command"),
+    "configs": _secrets,
+    "cpu_quota": limits.cpu_quota,
+    "cpu_period": lambda c, _: None,
+    "depends_on": _depends_on,
+    "deploy": limits.deploy,
+    "device_cgroup_rules": hardware.device_rules,
+    "devices": hardware.devices,
+    "entrypoint": lambda c, _: _command(c, "entrypoint"),
+    "env_file": _env_file,
+    "environment": lambda c, _: None,
+    "gpus": hardware.gpus,
+    "healthcheck": _healthcheck,
+    "image": image.image,
+    "links": _links,
+    "networks": _networks,
+    "privileged": hardware.privileged,
+    "runtime": hardware.runtime,
+    "secrets": _secrets,
+    "security_opt": hardware.security,
+    "sysctls": _sysctls,
+    "tmpfs": limits.tmpfs,
+    "ulimits": limits.ulimits,
+    "volumes": lambda c, n: mounts(c, n) or None,
+    "volumes_from": _volumes_from,
+    **{key: lambda c, n, key=key: _namespace(c, key, n) for key in NAMESPACES},  # type: ignore[misc]
+}
+"""What the container has for a key, by the key; None for nothing."""
+_REFUSED = {
+    "credential_spec": "is a file of a Windows host",
+    "external_links": "names containers outside the application",
+    "models": "uses the engine's model runner, which all tests share",
+    "provider": "starts a program on the host",
+    "use_api_socket": "gives access to the Docker engine",
+}
+_LEFT_OUT = frozenset(
+    [
+        "annotations",
+        "attach",
+        "blkio_config",
+        "cgroup",
+        "cgroup_parent",
+        "container_name",
+        "cpu_count",
+        "cpu_percent",
+        "cpu_rt_period",
+        "cpu_rt_runtime",
+        "cpu_shares",
+        "develop",
+        "isolation",
+        "label_file",
+        "labels",
+        "logging",
+        "mac_address",
+        "mem_reservation",
+        "mem_swappiness",
+        "memswap_limit",
+        "oom_kill_disable",
+        "oom_score_adj",
+        "ports",
+        "post_start",
+        "pre_start",
+        "pre_stop",
+        "pull_policy",
+        "pull_refresh_after",
+        "restart",
+        "scale",
+        "storage_opt",
+        "userns_mode",
+        "uts",
+    ]
+)
+"""Keys of the compose specification that a test has no use for."""

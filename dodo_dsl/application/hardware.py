@@ -1,0 +1,133 @@
+"""What a container may have of a machine: devices and privileges where a rig allows them, graphics processors."""
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from dodo_dsl import source
+from dodo_dsl.application.host_paths import is_port, is_rule_for_port
+from dodo_dsl.application.model import is_true, plain
+from dodo_dsl.application.part import NO_PORT, WITHOUT_HARDWARE
+from dodo_dsl.source import Node
+
+if TYPE_CHECKING:
+    from dodo_dsl.application.container import Container
+
+_CAPABILITIES = frozenset(
+    ("AUDIT_WRITE", "CHOWN", "DAC_OVERRIDE", "FOWNER", "FSETID", "IPC_LOCK", "KILL", "NET_BIND_SERVICE", "SETFCAP",
+     "SETGID", "SETPCAP", "SETUID", "SYS_CHROOT", "SYS_NICE", "SYS_PTRACE")
+)  # fmt: skip
+"""Capabilities that stay within a container; with others it reaches the host, or speaks for other containers."""
+_RUNTIMES = ("nvidia", "runc", "runsc")
+_OTHER = "give the application another device"
+_CDI = "is a description of the host, which can mount anything"
+_CHARACTERS = re.compile(r"c [0-9*]+:[0-9*]+ [rwm]+")
+
+
+def devices(c: "Container", node: Node) -> Any:
+    made = []
+    for item in c.items(node):
+        about = item.get("source") if isinstance(item, source.Mapping) else item
+        word = c.literal(about) if about is not None else None
+        if about is None or word is None:
+            continue
+        path, paths = word.partition(":")[0], c.project.paths
+        if link := paths.link(path):
+            message = f"device '{word}' is a symbolic link to '{link}', outside the repository"
+            c.refuse(about.span, message, "name the device itself")
+        elif "=" in path and not path.startswith("/"):
+            c.refuse(about.span, f"device '{word}' {_CDI}", "name a file below /dev")
+        elif paths.is_of_machine(path):
+            c.refuse(about.span, f"device '{word}' gives access to the host's disks or memory", "remove it")
+        elif is_port(paths.whole(path), c.project.ports):
+            c.hardware(about.span, f"device '{word}' of '{c.name}' {NO_PORT}", _OTHER)
+        elif c.project.setting.hil:
+            made.append(plain(item))
+        else:
+            c.hardware(about.span, f"device '{word}' of '{c.name}' {WITHOUT_HARDWARE}")
+    return made or None
+
+
+def device_rules(c: "Container", node: Node) -> Any:
+    made = []
+    for item in c.items(node):
+        word = c.literal(item)
+        if word is not None and is_rule_for_port(word, c.project.ports):
+            c.hardware(item.span, f"rule '{word}' of '{c.name}' {NO_PORT}", _OTHER)
+        elif word is not None and not _CHARACTERS.fullmatch(word):
+            message = f"the rule '{word}' gives access to the host's disks"
+            c.refuse(item.span, message, "name character devices, for example c 81:* rw")
+        elif word is not None and c.project.setting.hil:
+            made.append(word)
+        elif word is not None:
+            c.hardware(item.span, f"device '{word}' of '{c.name}' {WITHOUT_HARDWARE}")
+    return made or None
+
+
+def privileged(c: "Container", node: Node) -> Any:
+    word = c.literal(node)
+    if not word or not is_true(word):
+        return None
+    if c.project.setting.keeps_privileges:
+        return True
+    c.hardware(node.span, f"'privileged' of '{c.name}' {WITHOUT_HARDWARE}")
+    return None
+
+
+def capabilities(c: "Container", node: Node) -> Any:
+    made = []
+    for item in c.items(node):
+        word = c.literal(item)
+        if word is None:
+            continue
+        if word.upper().removeprefix("CAP_") in _CAPABILITIES or c.project.setting.keeps_privileges:
+            made.append(word)
+        else:
+            c.hardware(item.span, f"capability '{word}' of '{c.name}' {WITHOUT_HARDWARE}")
+    return made or None
+
+
+def security(c: "Container", node: Node) -> Any:
+    """Options that leave no more access than there is without them; a rig may allow others."""
+    made = []
+    for item in c.items(node):
+        word = c.literal(item)
+        if word is None:
+            continue
+        if re.split("[:=]", word)[0] == "no-new-privileges" or c.project.setting.keeps_privileges:
+            made.append(word)
+        else:
+            message = f"'{word}' of '{c.name}' is left out, the engine's own confinement stays"
+            c.bad(item.span, message, rule="application-isolation", severity="warning")
+    return made or None
+
+
+def runtime(c: "Container", node: Node) -> Any:
+    word = c.literal(node)
+    if word in (*_RUNTIMES, "", None):
+        return word or None
+    message = f"the runtime '{word}' may not isolate the container"
+    c.refuse(node.span, message, f"remove it, or use one of {', '.join(_RUNTIMES)}")
+    return None
+
+
+def gpus(c: "Container", node: Node) -> Any:
+    """Requests of graphics processors; other devices by their description (CDI) are refused."""
+    made = []
+    for item in c.items(node):
+        if not isinstance(item, source.Mapping):
+            return plain(item)
+        fields = c.fields(item, f"'gpus' of '{c.name}'", "driver count device_ids capabilities options")
+        driver = c.literal(fields["driver"]) if "driver" in fields else ""
+        ids = {c.literal(word): word for word in c.items(fields["device_ids"])} if "device_ids" in fields else {}
+        if (driver or "").lower() not in ("", "nvidia", "amd"):
+            c.refuse(
+                fields["driver"].span,
+                f"the driver '{driver}' of a device of '{c.name}' {_CDI}",
+                "use nvidia, or no driver",
+            )
+        elif found := [(word, each) for word, each in ids.items() if word and "=" in word]:
+            message = f"device '{found[0][0]}' of '{c.name}' {_CDI}"
+            c.refuse(found[0][1].span, message, "use numbers, or UUIDs of GPUs")
+        else:
+            made.append({key: plain(value) for key, value in fields.items()})
+    return made or None

@@ -1,0 +1,115 @@
+"""The image of a service, and how it is built."""
+
+from typing import TYPE_CHECKING, Any
+
+from dodo_dsl import source
+from dodo_dsl.application import limits
+from dodo_dsl.application.interpolation import literal
+from dodo_dsl.application.model import environment, image_variable, plain, text
+from dodo_dsl.application.part import pairs
+from dodo_dsl.source import Node
+
+if TYPE_CHECKING:
+    from dodo_dsl.application.container import Container
+
+_REMOTE = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
+_REGISTRIES = ("index.docker.io/", "docker.io/")
+_BASES = ("python", "library/python", "debian", "library/debian")
+"""What DoDo's images, and those of many others, are built on."""
+
+
+def image(c: "Container", node: Node) -> Any:
+    """The image of the file, unless a pipeline sets another one."""
+    image = text(plain(node))
+    written = literal(image)
+    if written is not None and (name := _repository(written)) != name.lower():
+        hint = f"write {written.replace(name, name.lower(), 1)}"
+        c.bad(node.span, f"the image '{written}' has capitals, which no engine takes in its name", hint)
+    return f"${{{image_variable(c.name)}:-{image}}}"
+
+
+def _repository(image: str) -> str:
+    """The part of an image's name that is in small letters: without registry, tag and digest."""
+    host, sign, rest = image.partition("@")[0].partition("/")
+    has_host = bool(sign) and ("." in host or ":" in host or host == "localhost")
+    name = rest if has_host else f"{host}{sign}{rest}"
+    return name.partition(":")[0]
+
+
+def short_name(image: str) -> str:
+    """An image's name without tag, digest and the registry that the engine takes by default."""
+    name = image.partition("@")[0]
+    head, sign, tag = name.rpartition(":")
+    name = head if sign and "/" not in tag else name
+    for registry in _REGISTRIES:
+        name = name.removeprefix(registry)
+    return name
+
+
+def build(c: "Container", node: Node) -> Any:
+    image = c.service.node.get("image")
+    name = short_name(text(plain(image))) if image is not None else ""
+    if name.startswith("dodo/") or name in _BASES:
+        which = "one of DoDo's own" if name.startswith("dodo/") else "one on which others are built"
+        c.refuse(node.span, f"the image '{name}' of '{c.name}' would replace {which}", "give the image another name")
+    if "image" not in c.service.node.entries:
+        c.own["image"] = f"${{{image_variable(c.name)}:-}}"
+    fields = c.fields(
+        node, f"the build of '{c.name}'",
+        "context dockerfile dockerfile_inline args target additional_contexts network platforms secrets no_cache pull"
+        " extra_hosts provenance sbom no_cache_filter shm_size ulimits",
+        "cache_from cache_to isolation labels privileged ssh tags entitlements",
+    ) if isinstance(node, source.Mapping) else {"context": node}  # fmt: skip
+    kept = ("dockerfile_inline", "target", "platforms", "secrets", "no_cache", "pull", "extra_hosts", "provenance")
+    made = {key: plain(fields[key]) for key in (*kept, "sbom", "no_cache_filter") if key in fields}
+    context = c.literal(fields["context"]) if "context" in fields else "."
+    if context is not None:
+        made = {"context": _context(c, fields.get("context"), context), **made}
+        if "dockerfile" in fields and (file := c.literal(fields["dockerfile"])):
+            if not context.startswith(_REMOTE):
+                c.path(fields["dockerfile"], base=context, written=file)
+            made["dockerfile"] = plain(fields["dockerfile"])
+    if "args" in fields:
+        made["args"] = _arguments(c, plain(fields["args"]))
+    if "additional_contexts" in fields:
+        made["additional_contexts"] = {
+            name: _context(c, where, word) for name, where in pairs(fields["additional_contexts"])
+            if (word := c.literal(where)) is not None
+        }  # fmt: skip
+    network = c.literal(fields["network"]) if "network" in fields else None
+    if network not in ("", "default", "none", None):
+        message = f"a build of '{c.name}' on the network '{network}' reaches services of the host"
+        c.refuse(fields["network"].span, message, "remove it")
+    elif network:
+        made["network"] = network
+    if "shm_size" in fields:
+        made["shm_size"] = c.number(fields["shm_size"], c.limits.memory, "build.shm_size", "memory", limits.size)
+    if "ulimits" in fields:
+        made["ulimits"] = limits.ulimits(c, fields["ulimits"])
+    return made
+
+
+def _context(c: "Container", node: Node | None, context: str) -> str:
+    """What is built: a folder of the repository, an image or a URL."""
+    paths = c.project.paths
+    is_here = any((place / context).exists() for place in (paths.folder, *paths.roots)) if "\0" not in context else True
+    if context.startswith(_REMOTE) and ".." not in context.split("/") and not is_here:
+        return context
+    span = node.span if node is not None else c.span
+    problem = f"'{context}' is of a kind that may be a file of the host" if "://" in context else ""
+    if problem := problem or paths.file_problem(context):
+        c.refuse(span, problem, "keep it in the repository, or allow it with 'paths' in dodo.yml")
+    c.project.show(context, span)
+    return c.project.rebased(context)
+
+
+def _arguments(c: "Container", written: Any) -> dict[str, str | None]:
+    """Arguments of a build; those without a value have that of the variable of their name, or are left out."""
+    application = c.project.application
+    made: dict[str, str | None] = {}
+    for name, value in environment(written).items():
+        if value is not None or application.is_late(name):
+            made[name] = value
+        elif name in application.known:
+            made[name] = application.known[name].replace("$", "$$")
+    return made

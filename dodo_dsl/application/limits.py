@@ -1,0 +1,183 @@
+"""Limits of a service: what it sets itself, cut to those of ``sandbox`` in ``dodo.yml``."""
+
+import copy
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from dodo_dsl import source
+from dodo_dsl.application.hardware import gpus
+from dodo_dsl.source import Node
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
+
+if TYPE_CHECKING:
+    from dodo_dsl.application.container import Container
+
+_DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
+"""Capabilities that engines give by default and no OpenDLV program needs: to send as another container, for example."""
+_SIZE = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?)\s*([kmgtp]?)(?:i?b)?\s*", re.IGNORECASE | re.ASCII)
+_SIZES_OF_TMPFS = ("size=", "nr_blocks=")
+_TMPFS_OPTIONS = re.compile(r"(size|mode|uid|gid|nr_inodes|nr_blocks)=[\w%]+|nosuid|nodev|noexec|exec|rw|ro|noatime")
+LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
+"""What is kept of a service's log: two files of 50 MB."""
+
+
+def size(value: object) -> float:
+    """Bytes of a size as compose reads it, ``8g``; infinite where it is none."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return value if value >= 0 else math.inf
+    found = _SIZE.fullmatch(str(value))
+    return float(found[1]) * 1024.0 ** " kmgtp".index(found[2].lower() or " ") if found else math.inf
+
+
+def number(value: object) -> float:
+    """A number as compose reads it; infinite where it is none, or below 0."""
+    try:
+        found = float(str(value))
+    except ValueError:
+        return math.inf
+    return found if found >= 0 else math.inf
+
+
+def cut(value: object, most: float, measure: "Any" = number) -> tuple[Any, bool]:
+    """A limit of at most ``most``, and whether it was cut; 0 and below are no limit."""
+    found = measure(value)
+    if 0 < found <= most:
+        return value, False
+    return most, math.isfinite(found) and found > most
+
+
+def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
+    """Options of a file system in memory, as mount(8) reads them, with a size; whether that was cut; an unknown one."""
+    words = [word.strip() for word in options.split(",") if word.strip()]
+    unknown = next((word for word in words if not _TMPFS_OPTIONS.fullmatch(word)), "")
+    sizes = [word for word in words if word.startswith(_SIZES_OF_TMPFS)]
+    if sizes and all(0 < size(word.removeprefix("size=")) <= limits.memory for word in sizes):
+        return ",".join(words), False, unknown
+    return ",".join([*(word for word in words if word not in sizes), f"size={limits.memory}"]), bool(sizes), unknown
+
+
+def _within(written: Mapping[str, Any], limits: SandboxLimits) -> tuple[dict[str, Any], list[str]]:
+    """Highest limits of a process with those of the test, no core dumps; and which were cut.
+
+    ``nproc`` counts the user's processes on the whole machine, so that ``pids_limit`` takes its place.
+    """
+    most = {"core": 0, "fsize": limits.file_size, "nofile": limits.files, "memlock": limits.memory, "msgqueue": 819_200}
+    made: dict[str, Any] = {name: most[name] for name in ("core", "fsize", "nofile")}
+    beyond = []
+    for name, value in written.items():
+        parts = dict(value) if isinstance(value, Mapping) else {"": value}
+        highest = most.get(name, math.inf)
+        below = {part: each if number(each) <= highest else most.get(name, each) for part, each in parts.items()}
+        beyond += [name] if below != parts else []
+        if name != "nproc":
+            made[name] = below if isinstance(value, Mapping) else below[""]
+    return made, beyond
+
+
+def deploy(c: "Container", node: Node) -> Any:
+    """Limits as those of the service, and reservations of graphics processors."""
+    what = f"'deploy' of '{c.name}'"
+    left = "endpoint_mode labels mode replicas rollback_config update_config placement restart_policy"
+    resources = c.fields(node, what, "resources", left).get("resources")
+    parts = c.fields(resources, f"'resources' of '{c.name}'", "limits reservations")
+    own = c.fields(parts.get("limits"), f"'limits' of '{c.name}'", "cpus memory pids")
+    for key, name in (("cpus", "cpus"), ("memory", "mem_limit"), ("pids", "pids_limit")):
+        if key in own:
+            c.own[name] = LIMITS[name](c, own[key])
+    reserved = c.fields(
+        parts.get("reservations"), f"'reservations' of '{c.name}'", "devices", "cpus memory generic_resources"
+    )
+    found = gpus(c, reserved["devices"]) if "devices" in reserved else None
+    return {"resources": {"reservations": {"devices": found}}} if found else None
+
+
+def cpus(c: "Container", node: Node) -> Any:
+    if c.limits.cpus is None:
+        return c.number(node, float("inf"), "cpus", "cpus")
+    return c.number(node, c.limits.cpus, "cpus", "cpus")
+
+
+def cpu_quota(c: "Container", node: Node) -> Any:
+    """Processors by the time that they have of a period, in us."""
+    period = c.service.node.get("cpu_period")
+    every = number(c.literal(period) if period is not None else None)
+    share = number(c.literal(node)) / (every if 0 < every < float("inf") else 100_000)
+    most = float("inf") if c.limits.cpus is None else c.limits.cpus
+    if 0 < share < float("inf"):
+        c.own.setdefault("cpus", min(share, most))
+        if share > most:
+            c.cut(node.span, "cpu_quota", "cpus")
+
+
+def tmpfs(c: "Container", node: Node) -> Any:
+    made = []
+    for item in c.items(node):
+        word = c.literal(item)
+        if not word:
+            continue
+        target, _, options = word.partition(":")
+        allowed, is_cut, unknown = tmpfs_options(options, c.limits)
+        if unknown:
+            message = f"a tmpfs of '{c.name}' has the unknown option '{unknown}'"
+            c.refuse(item.span, message, "name a size, mode, uid or gid")
+            continue
+        if is_cut:
+            c.cut(item.span, "tmpfs", "memory")
+        made.append(f"{target}:{allowed}")
+    return made or None
+
+
+def ulimits(c: "Container", node: Node) -> Any:
+    written: dict[str, Any] = {}
+    for name, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
+        if isinstance(entry.value, source.Mapping):
+            written[name] = {
+                part: c.literal(each.value) for part, each in entry.value.entries.items() if part in ("soft", "hard")
+            }
+        else:
+            written[name] = c.literal(entry.value)
+    numbers = {
+        name: {part: int(number(each)) for part, each in value.items() if number(each) < float("inf")}
+        if isinstance(value, dict)
+        else (int(number(value)) if number(value) < float("inf") else float("inf"))
+        for name, value in written.items()
+    }
+    made, beyond = _within(numbers, c.limits)
+    for name in beyond:
+        c.cut(_span_in(node, name, c), f"ulimits.{name}", _OF_SANDBOX.get(name, ""))
+    return {name: value for name, value in made.items() if value != float("inf")}
+
+
+_OF_SANDBOX = {"fsize": "file-size", "nofile": "files", "memlock": "memory"}
+
+
+def _span_in(node: Node, name: str, c: "Container") -> Any:
+    return node.entries[name].value.span if isinstance(node, source.Mapping) and name in node.entries else c.span
+
+
+def own_limits(c: "Container") -> None:
+    own, most = c.own, c.limits
+    for key, value in (("pids_limit", most.processes), ("mem_limit", most.memory), ("cpus", most.cpus)):
+        if own.get(key) in (None, float("inf")):
+            own.pop(key, None)
+            own.update({} if value is None else {key: value})
+    if "ulimits" not in own:
+        own["ulimits"] = _within({}, most)[0]
+    if not c.project.setting.keeps_privileges:
+        words = own.get("security_opt") or []
+        if not any(str(word).startswith("no-new-privileges") for word in words):
+            own["security_opt"] = [*words, "no-new-privileges:true"]
+        dropped = [str(word) for word in own.get("cap_drop") or ()]
+        taken = {word.upper().removeprefix("CAP_") for word in dropped}
+        own["cap_drop"] = [*dropped, *(name for name in _DROPPED if not taken & {name, "ALL"})]
+    own["logging"] = copy.deepcopy(LOGS)
+
+
+LIMITS: dict[str, Callable[["Container", Node], Any]] = {
+    "cpus": cpus,
+    "mem_limit": lambda c, n: c.number(n, c.limits.memory, "mem_limit", "memory", size),
+    "pids_limit": lambda c, n: c.number(n, c.limits.processes, "pids_limit", "processes"),
+    "shm_size": lambda c, n: c.number(n, c.limits.memory, "shm_size", "memory", size),
+}

@@ -1,0 +1,117 @@
+"""A part of a compose file while it is read: its fields and texts, and the problems at their places."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from dodo_dsl import source
+from dodo_dsl.application.interpolation import literal
+from dodo_dsl.application.model import text
+from dodo_dsl.diagnostics import Diagnostic, Fix, Severity, Span, did_you_mean, only_fix
+from dodo_dsl.source import Node, Scalar
+from dodo_dsl.spec.sandbox_limits import SandboxLimits
+
+if TYPE_CHECKING:
+    from dodo_dsl.application.construction import Construction
+
+NO_PORT = "is left out of all tests: only the service that moves the rig opens its port"
+WITHOUT_HARDWARE = "is left out of sil and dil tests, which have no hardware"
+ASK_KEY = "your own keys begin with x-, such as x-{}; docs/reference/compose-keys.md has compose's"
+
+
+class Part:
+    """A service, a volume, a secret or a config, by its ``name``; ``span`` is the place of its key."""
+
+    def __init__(self, project: "Construction", name: str, span: Span) -> None:
+        self.project, self.name, self.span = project, name, span
+        self.left: list[tuple[str, Span]] = []
+        """The keys that a test does not carry, each with its place."""
+
+    @property
+    def limits(self) -> SandboxLimits:
+        return self.project.setting.limits
+
+    def bad(
+        self,
+        span: Span,
+        message: str,
+        hint: str = "",
+        *,
+        rule: str = "application-file",
+        severity: Severity = "error",
+        fix: Fix | None = None,
+    ) -> None:
+        self.project.problems.append(Diagnostic(span, rule, message, hint, severity, fix=fix))
+
+    def refuse(self, span: Span, message: str, hint: str) -> None:
+        """Access to the host that tests would share."""
+        self.bad(span, message, hint, rule="application-isolation")
+
+    def hardware(self, span: Span, message: str, hint: str = "test it on a rig (level hil)") -> None:
+        """What only rigs have, and other tests leave out."""
+        self.bad(span, message, hint, rule="application-hardware", severity="warning")
+
+    def cut(self, span: Span, what: str, key: str) -> None:
+        """A limit beyond that of the test, which takes its place; ``key`` of ``sandbox`` sets it, if one does."""
+        hint = f"it is cut; '{key}' of 'sandbox' in dodo.yml sets the limit" if key else "it is cut"
+        whose = f"'{self.name}'" if "'" not in self.name else self.name
+        message = f"'{what}' of {whose} is beyond the test's limit"
+        self.bad(span, message, hint, rule="application-limit", severity="warning")
+
+    def literal(self, node: Node) -> str | None:
+        """A text that is known when the test is compiled; None for any other, with a problem."""
+        if not isinstance(node, Scalar) or node.value is None:
+            return None
+        found = literal(text(node.value))
+        if found is None and ":?" not in node.text and "?" not in node.text:
+            message = f"'{node.text}' has a variable whose value is not known when the test is compiled"
+            self.bad(node.span, message, "write the value here, or into the .env beside this file")
+        return found
+
+    def path(self, node: Node | None, *, base: str = "", written: str = "") -> str | None:
+        """A file or folder of the repository as seen from the compiled test; None for any other, with a problem."""
+        found = self.literal(node) if node is not None else None
+        if node is None or found is None:
+            return None
+        if problem := self.project.paths.file_problem(f"{base}/{found}" if base else found, written):
+            self.refuse(node.span, problem, "keep it in the repository, or allow it with 'paths' in dodo.yml")
+            return None
+        self.project.show(found, node.span)
+        return self.project.rebased(found)
+
+    def items(self, node: Node) -> Iterator[Node]:
+        """The items of a list, or the single value."""
+        yield from (i for i in (node.items if isinstance(node, source.Sequence) else (node,)) if _is_set(i))
+
+    def fields(
+        self, node: Node | None, what: str, known: str, left_out: str = "", *, refused: Mapping[str, str] | None = None
+    ) -> dict[str, Node]:
+        """The fields of a mapping that a test carries; problems of those that it cannot have, and of unknown ones."""
+        found: dict[str, Node] = {}
+        words, gone = known.split(), left_out.split()
+        for key, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
+            if key in words:
+                found.update({key: entry.value} if _is_set(entry.value) else {})
+            elif refused and key in refused:
+                if not (isinstance(entry.value, Scalar) and entry.value.value in (None, False, "")):
+                    self.refuse(entry.key, f"'{key}' of {what} cannot be isolated: {refused[key]}", "remove it")
+            elif key in gone:
+                self.left.append((key, entry.key))
+            elif not key.startswith("x-"):
+                every = (*words, *gone, *(refused or ()))
+                hint = did_you_mean(key, every) or ASK_KEY.format(key)
+                fix = only_fix(key, every, node.entries if isinstance(node, source.Mapping) else ())
+                self.bad(entry.key, f"unknown key '{key}' in {what}", hint, rule="unknown-key", fix=fix)
+        return found
+
+
+def _is_set(node: Node) -> bool:
+    return not (isinstance(node, Scalar) and node.value is None)
+
+
+def pairs(node: Node) -> list[tuple[str, Node]]:
+    """The values of a mapping, or of a list of ``name=value``."""
+    if isinstance(node, source.Mapping):
+        return [(name, entry.value) for name, entry in node.entries.items()]
+    items = [i for i in (node.items if isinstance(node, source.Sequence) else ()) if isinstance(i, Scalar)]
+    split = [(i, *i.text.partition("=")) for i in items]
+    return [(name, Scalar(item.span, value, value)) for item, name, _, value in split]

@@ -1,0 +1,161 @@
+"""``plan_application``: the application as a test runs it, in containers and as processes."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.interpolation import changed_node, filled
+from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
+from dodo_dsl.application.variables import variables_of
+from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
+from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
+
+_LONGEST = 255
+"""Characters of a volume's name on the engine: it is a folder's."""
+_MARK = "xxxxxx"
+"""Stands for what distinguishes projects of one test."""
+_LONG = 200
+
+
+def plan_application(application: ApplicationSource, setting: Setting) -> Application:
+    """The application as a test runs it."""
+    construction = Construction(application, setting)
+    services = {name: _container(construction, service) for name, service in application.services.items()}
+    changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
+    for name, made in services.items():
+        changes += _changes(application.services[name], made)
+    access = replace(
+        application.access,
+        roots=tuple(_relative(root, setting.folder) for root in application.other_roots),
+        devices=setting.hil,
+        privileged=setting.keeps_privileges,
+    )
+    return Application(
+        _relative(application.folder, setting.folder),
+        tuple(_process(service, application, setting) for service in application.services.values()),
+        {"services": services, **construction.rest()},
+        tuple(_with_common(changes, list(services))),
+        setting.limits,
+        secrets={name: _relative(file, setting.folder) for name, file in application.secrets.items()},
+        access=access,
+        copies=construction.copies,
+    )
+
+
+def _relative(path: Path, folder: Path) -> str:
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def too_long(slug: str, volumes: Iterable[str]) -> str:
+    """A volume whose name in the test's project is longer than the engine takes; empty without one."""
+    return next((name for name in volumes if len(f"dodo-{slug}-{_MARK}_{name}") > _LONGEST), "")
+
+
+def _container(construction: Construction, service: ComposeService) -> dict[str, Any]:
+    made, setting = construction.service(service), construction.setting
+    if service.declared and service.declared.lines:
+        made["tty"] = True  # programs print each line at once to a terminal
+    if setting.time_seed is not None and setting.own_network:
+        given = {name: value or "" for name, value in made.get("environment", {}).items()}
+        number = list(construction.application.services).index(service.name)
+        library = f"{TIME_MOUNT}/libdodo-time.so"
+        made["environment"] = {
+            **made.get("environment", {}),
+            **time_variables(given, number, setting.time_seed, library),
+        }
+        made["pid"] = f"service:{SANDBOX}"
+        mount = {"type": "volume", "source": TIME, "target": TIME_MOUNT, "read_only": True}
+        made["volumes"] = [*(made.get("volumes") or []), mount]
+    return made
+
+
+def _changes(service: ComposeService, made: Mapping[str, Any]) -> Iterator[str]:
+    """Which keys the container has otherwise than the compose file, for the first lines of its own one."""
+    written = {key: value for key, value in plain(service.node).items() if key not in KEYS}
+    for words, keys in (
+        ("changed", [key for key in written if key in made and made[key] != written[key]]),
+        ("added", [key for key in made if key not in written]),
+        ("left out", [key for key in written if key not in made and written[key] is not None]),
+    ):
+        line = f"{service.name}: {words}: {', '.join(sorted(keys))}"
+        line = "".join(c if c.isprintable() else "?" for c in line)
+        yield from [line if len(line) <= _LONG else f"{line[: _LONG - 3]}..."] if keys else []
+
+
+def _with_common(changes: Sequence[str], names: Sequence[str]) -> list[str]:
+    """The changes, where those that all of several services have are one each, after the others."""
+    texts = {
+        name: [line.removeprefix(f"{name}: ") for line in changes if line.startswith(f"{name}: ")] for name in names
+    }
+    common = (
+        [text for text in texts[names[0]] if all(text in other for other in texts.values())] if len(names) > 1 else []
+    )
+    repeated = {f"{name}: {text}" for name in names for text in common}
+    return [*(line for line in changes if line not in repeated), *(f"all services: {text}" for text in common)]
+
+
+def _process(service: ComposeService, application: ApplicationSource, setting: Setting) -> ApplicationService:
+    """The service as it starts without containers; its CID is filled in when it starts."""
+    raw, own, cid = plain(service.node), service.declared, setting.cid
+    known = {**application.known, **dict(setting.given)}
+
+    def is_late(name: str) -> bool:
+        return name in opendlv_flags.CID_VARIABLES or application.is_late(name)
+
+    written = (
+        plain(changed_node(service.raw["command"], lambda word: filled(word, known, is_late)))
+        if "command" in service.raw
+        else None
+    )
+    command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
+    found = variables_of(service, known, is_late, dict(setting.given))
+    variables = {k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in found.items()}
+    for name in opendlv_flags.CID_VARIABLES:
+        if name in variables or name in service.cid_variables:
+            variables[name] = str(cid)
+    process = raw.get("x-dodo-process")
+    command = opendlv_flags.arguments(list(map(str, process or ())), command)
+    words = (*(process or ()), *command)
+    after = _after(raw, application)
+    return ApplicationService(
+        name=service.name,
+        process=(*(DISPLAY_SERVER if service.has_display else ()), *map(str, process)) if process else None,
+        command=opendlv_flags.with_cid(command, cid),
+        environment=variables,
+        takes_cid=opendlv_flags.takes_cid((*words, *(v for v in variables.values() if v)), variables),
+        takes_memory=opendlv_flags.takes_memory(words),
+        env_files=tuple(file.path for file in service.env_files),
+        raw_files=tuple(file.path for file in service.env_files if file.raw),
+        inputs=_names(own.inputs) if own else (),
+        outputs=_names(own.outputs) if own else (),
+        after=after,
+        optional=_optional(raw, after),
+        lines=tuple(Line(line.match, line.message, line.sender) for line in own.lines) if own else (),
+    )
+
+
+def _after(service: dict[str, Any], application: ApplicationSource) -> dict[str, str]:
+    """The services that start before this one, each with its condition: also those whose namespaces it joins."""
+    needed = [name for _, name in references(service, application.containers)]
+    about = service.get("depends_on")
+    written = {str(n): _condition(how) for n, how in about.items()} if isinstance(about, dict) else {}
+    every = {**dict.fromkeys(needed, STARTED), **written}
+    return {name: condition for name, condition in every.items() if name in application.services}
+
+
+def _optional(service: dict[str, Any], after: Iterable[str]) -> tuple[str, ...]:
+    about = service.get("depends_on")
+    written = about if isinstance(about, dict) else {}
+    return tuple(n for n in after if isinstance(written.get(n), dict) and written[n].get("required") is False)
+
+
+def _condition(about: Any) -> str:
+    return str((about.get("condition") if isinstance(about, dict) else "") or STARTED)
+
+
+def _names(words: Iterable[Word]) -> tuple[str, ...]:
+    return tuple(name for name, _ in words)

@@ -1,1 +1,0 @@
-"""A test's own copy of the application's compose file."""
