@@ -23,7 +23,7 @@ from dodo_dsl.application.model import (
     text,
 )
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import ASK_KEY, Part, pairs
+from dodo_dsl.application.part import ASK_KEY, Part, pairs, spot
 from dodo_dsl.application.variables import variables_of
 from dodo_dsl.diagnostics import did_you_mean, listed, only_fix
 from dodo_dsl.source import Node, Scalar
@@ -59,7 +59,7 @@ class Container(Part):
                 self.own.update({} if value is None else {key: value})
             elif key in _REFUSED:
                 if not _is_off(entry.value):
-                    self.refuse(entry.value.span, f"'{key}' of '{self.name}' {_REFUSED[key]}", _WITHOUT)
+                    self.refuse(spot(entry), f"'{key}' of '{self.name}' {_REFUSED[key]}", _WITHOUT)
             elif key in _LEFT_OUT:
                 self.left += [(key, entry.key)] if not _is_off(entry.value) else []
             elif not key.startswith("x-") and key != "profiles":
@@ -92,7 +92,7 @@ class Container(Part):
         if written is not None:
             value, is_cut = limits.cut(written, most, measure)
             if is_cut:
-                self.cut(node.span, what, key)
+                self.cut(node.span, what, most, key)
             else:
                 value = int(measure(value)) if float(measure(value)).is_integer() else float(measure(value))
         return value

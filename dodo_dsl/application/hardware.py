@@ -28,7 +28,7 @@ def devices(c: "Container", node: Node) -> Any:
     for item in c.items(node):
         about = item.get("source") if isinstance(item, source.Mapping) else item
         word = c.literal(about) if about is not None else None
-        if about is None or word is None:
+        if about is None or not word:
             continue
         path, paths = word.partition(":")[0], c.project.paths
         if link := paths.link(path):
@@ -50,7 +50,7 @@ def devices(c: "Container", node: Node) -> Any:
 def device_rules(c: "Container", node: Node) -> Any:
     made = []
     for item in c.items(node):
-        word = c.literal(item)
+        word = c.literal(item) or None
         if word is not None and is_rule_for_port(word, c.project.ports):
             c.hardware(item.span, f"rule '{word}' of '{c.name}' {NO_PORT}", _OTHER)
         elif word is not None and not _CHARACTERS.fullmatch(word):
@@ -77,7 +77,7 @@ def capabilities(c: "Container", node: Node) -> Any:
     made = []
     for item in c.items(node):
         word = c.literal(item)
-        if word is None:
+        if not word:
             continue
         if word.upper().removeprefix("CAP_") in _CAPABILITIES or c.project.setting.keeps_privileges:
             made.append(word)
@@ -91,7 +91,7 @@ def security(c: "Container", node: Node) -> Any:
     made = []
     for item in c.items(node):
         word = c.literal(item)
-        if word is None:
+        if not word:
             continue
         if re.split("[:=]", word)[0] == "no-new-privileges" or c.project.setting.keeps_privileges:
             made.append(word)

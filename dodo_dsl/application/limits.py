@@ -3,7 +3,7 @@
 import copy
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 _DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
 """Capabilities that engines give by default and no OpenDLV program needs: to send as another container, for example."""
 _SIZE = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?)\s*([kmgtp]?)(?:i?b)?\s*", re.IGNORECASE | re.ASCII)
+_OF_SANDBOX = {"fsize": "file-size", "nofile": "files", "memlock": "memory"}
+_MESSAGE_QUEUES = 819_200
+"""The kernel's default, in bytes (RLIMIT_MSGQUEUE)."""
 _SIZES_OF_TMPFS = ("size=", "nr_blocks=")
 _TMPFS_OPTIONS = re.compile(r"(size|mode|uid|gid|nr_inodes|nr_blocks)=[\w%]+|nosuid|nodev|noexec|exec|rw|ro|noatime")
 LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
@@ -58,22 +61,31 @@ def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
     return ",".join([*(word for word in words if word not in sizes), f"size={limits.memory}"]), bool(sizes), unknown
 
 
-def _within(written: Mapping[str, Any], limits: SandboxLimits) -> tuple[dict[str, Any], list[str]]:
-    """Highest limits of a process with those of the test, no core dumps; and which were cut.
+def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
+    """Highest limits of a process, those of the test and no core dumps where it sets none.
 
     ``nproc`` counts the user's processes on the whole machine, so that ``pids_limit`` takes its place.
     """
-    most = {"core": 0, "fsize": limits.file_size, "nofile": limits.files, "memlock": limits.memory, "msgqueue": 819_200}
-    made: dict[str, Any] = {name: most[name] for name in ("core", "fsize", "nofile")}
-    beyond = []
-    for name, value in written.items():
-        parts = dict(value) if isinstance(value, Mapping) else {"": value}
-        highest = most.get(name, math.inf)
-        below = {part: each if number(each) <= highest else most.get(name, each) for part, each in parts.items()}
-        beyond += [name] if below != parts else []
-        if name != "nproc":
-            made[name] = below if isinstance(value, Mapping) else below[""]
-    return made, beyond
+    own = {"core": 0, "fsize": c.limits.file_size, "nofile": c.limits.files}
+    made: dict[str, Any] = dict(own)
+    for name, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
+        most = {**own, "memlock": c.limits.memory, "msgqueue": _MESSAGE_QUEUES}.get(name, math.inf)
+        if name == "nproc":
+            continue
+        if isinstance(entry.value, source.Mapping):
+            parts = {part: each.value for part, each in entry.value.entries.items() if part in ("soft", "hard")}
+            made[name] = {part: _ulimit(c, f"{name}.{part}", each, most) for part, each in parts.items()}
+        else:
+            made[name] = _ulimit(c, name, entry.value, most)
+    return made
+
+
+def _ulimit(c: "Container", name: str, node: Node, most: float) -> float | str | None:
+    written = c.literal(node)
+    if number(written) <= most:
+        return int(number(written)) if math.isfinite(number(written)) else written
+    c.cut(node.span, f"ulimits.{name}", most, _OF_SANDBOX.get(name.partition(".")[0], ""))
+    return int(most)
 
 
 def deploy(c: "Container", node: Node) -> Any:
@@ -108,7 +120,7 @@ def cpu_quota(c: "Container", node: Node) -> Any:
     if 0 < share < float("inf"):
         c.own.setdefault("cpus", min(share, most))
         if share > most:
-            c.cut(node.span, "cpu_quota", "cpus")
+            c.cut(node.span, "cpu_quota", most, "cpus")
 
 
 def tmpfs(c: "Container", node: Node) -> Any:
@@ -124,37 +136,9 @@ def tmpfs(c: "Container", node: Node) -> Any:
             c.refuse(item.span, message, "name a size, mode, uid or gid")
             continue
         if is_cut:
-            c.cut(item.span, "tmpfs", "memory")
+            c.cut(item.span, "tmpfs", c.limits.memory, "memory")
         made.append(f"{target}:{allowed}")
     return made or None
-
-
-def ulimits(c: "Container", node: Node) -> Any:
-    written: dict[str, Any] = {}
-    for name, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
-        if isinstance(entry.value, source.Mapping):
-            written[name] = {
-                part: c.literal(each.value) for part, each in entry.value.entries.items() if part in ("soft", "hard")
-            }
-        else:
-            written[name] = c.literal(entry.value)
-    numbers = {
-        name: {part: int(number(each)) for part, each in value.items() if number(each) < float("inf")}
-        if isinstance(value, dict)
-        else (int(number(value)) if number(value) < float("inf") else float("inf"))
-        for name, value in written.items()
-    }
-    made, beyond = _within(numbers, c.limits)
-    for name in beyond:
-        c.cut(_span_in(node, name, c), f"ulimits.{name}", _OF_SANDBOX.get(name, ""))
-    return {name: value for name, value in made.items() if value != float("inf")}
-
-
-_OF_SANDBOX = {"fsize": "file-size", "nofile": "files", "memlock": "memory"}
-
-
-def _span_in(node: Node, name: str, c: "Container") -> Any:
-    return node.entries[name].value.span if isinstance(node, source.Mapping) and name in node.entries else c.span
 
 
 def own_limits(c: "Container") -> None:
@@ -164,7 +148,7 @@ def own_limits(c: "Container") -> None:
             own.pop(key, None)
             own.update({} if value is None else {key: value})
     if "ulimits" not in own:
-        own["ulimits"] = _within({}, most)[0]
+        own["ulimits"] = ulimits(c)
     if not c.project.setting.keeps_privileges:
         words = own.get("security_opt") or []
         if not any(str(word).startswith("no-new-privileges") for word in words):

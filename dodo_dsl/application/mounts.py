@@ -57,6 +57,7 @@ class Mount:
     selinux: str = ""
     nocopy: bool = False
     more: tuple[tuple[str, Any], ...] = ()
+    is_short: bool = False
 
     def written(self) -> str | dict[str, Any]:
         """As compose reads it; ``source`` is as the compiled file has it."""
@@ -110,7 +111,7 @@ def _short(of: "Container", item: Node) -> Mount | None:
     return Mount(
         "bind" if is_path(source) else "volume", _clean(source), _clean(target), item.span,
         [word for word in words if word in ("ro", "rw")][-1:] == ["ro"],
-        selinux=next((word for word in words if word in ("z", "Z")), ""), nocopy="nocopy" in words,
+        selinux=next((word for word in words if word in ("z", "Z")), ""), nocopy="nocopy" in words, is_short=True,
     )  # fmt: skip
 
 
@@ -151,7 +152,7 @@ def _long(of: "Container", item: Mapping) -> Mount | None:
         if 0 < size(told.get("tmpfs.size", "")) <= most:
             more["size"] = int(size(told["tmpfs.size"]))
         elif "tmpfs.size" in told:
-            of.cut(about["tmpfs"]["size"].span, "volumes.tmpfs.size", "memory")
+            of.cut(about["tmpfs"]["size"].span, "volumes.tmpfs.size", most, "memory")
     elif told.get(f"{kind}.subpath"):
         more = {"subpath": told[f"{kind}.subpath"]}
     return Mount(
@@ -173,7 +174,7 @@ def _carried(of: "Container", mount: Mount) -> Mount | None:
         hint = hint if hint.startswith("did") else f"declare it at the end of the file: 'volumes: {{{mount.source}: }}'"
         message = f"'{of.name}' mounts the volume '{mount.source}', which the top-level 'volumes' do not declare"
         near = only_fix(mount.source, known)
-        of.bad(mount.span, message, hint, fix=Fix(f"{near.old}:", f"{near.new}:") if near and near.old else near)
+        of.bad(mount.span, message, hint, fix=Fix(f"{near.old}:/", f"{near.new}:/") if near and mount.is_short else near)
         return None
     if known[mount.source].is_external and not mount.read_only:
         hint = "mount it read-only (:ro), or remove 'external', so that compose creates it"
@@ -265,12 +266,12 @@ def _options(of: Part, name: str, node: Node) -> tuple[dict[str, Any], str]:
         return _folder(of, name, device, words, fields.get("device", node).span)
     options, is_cut, unknown = tmpfs_options(flags, of.limits)
     if kind != "tmpfs" or unknown:
-        if options or kind or device:
+        if flags or kind or device:
             what = unknown if kind == "tmpfs" else kind or flags or device
             of.refuse(span, f"the volume '{name}' mounts '{what}', which reaches beyond the test", _OPTIONS)
         return {}, ""
     if is_cut:
-        of.cut(span, f"{name}.driver_opts.o", "memory")
+        of.cut(fields["o"].span, f"{name}.driver_opts.o", of.limits.memory, "memory")
     return {"driver_opts": {"type": "tmpfs", "device": "tmpfs", "o": options}}, ""
 
 

@@ -50,11 +50,11 @@ class Part:
         """What only rigs have, and other tests leave out."""
         self.bad(span, message, hint, rule="application-hardware", severity="warning")
 
-    def cut(self, span: Span, what: str, key: str) -> None:
-        """A limit beyond that of the test, which takes its place; ``key`` of ``sandbox`` sets it, if one does."""
+    def cut(self, span: Span, what: str, most: float, key: str = "") -> None:
+        """A limit beyond ``most``, which takes its place; ``key`` of ``sandbox`` sets it, if one does."""
         hint = f"it is cut; '{key}' of 'sandbox' in dodo.yml sets the limit" if key else "it is cut"
         whose = f"'{self.name}'" if "'" not in self.name else self.name
-        message = f"'{what}' of {whose} is beyond the test's limit"
+        message = f"'{what}' of {whose} is beyond the test's limit of {_limit(most, key)}"
         self.bad(span, message, hint, rule="application-limit", severity="warning")
 
     def literal(self, node: Node) -> str | None:
@@ -93,7 +93,7 @@ class Part:
                 found.update({key: entry.value} if _is_set(entry.value) else {})
             elif refused and key in refused:
                 if not (isinstance(entry.value, Scalar) and entry.value.value in (None, False, "")):
-                    self.refuse(entry.key, f"'{key}' of {what} cannot be isolated: {refused[key]}", "remove it")
+                    self.refuse(spot(entry), f"'{key}' of {what} cannot be isolated: {refused[key]}", "remove it")
             elif key in gone:
                 self.left.append((key, entry.key))
             elif not key.startswith("x-"):
@@ -102,6 +102,20 @@ class Part:
                 fix = only_fix(key, every, node.entries if isinstance(node, source.Mapping) else ())
                 self.bad(entry.key, f"unknown key '{key}' in {what}", hint, rule="unknown-key", fix=fix)
         return found
+
+
+def _limit(most: float, key: str) -> str:
+    if key in ("memory", "file-size"):
+        return f"{most / 10**9:g} GB ({most:,.0f} bytes)"
+    return f"{most:,g}" if most < 10**6 else f"{most:,.0f}"
+
+
+def spot(entry: source.Entry) -> Span:
+    """The place of a value, or of the first of a list; of a mapping that of its key."""
+    node = entry.value
+    if isinstance(node, source.Sequence) and node.items:
+        return node.items[0].span
+    return node.span if isinstance(node, Scalar) and node.text else entry.key
 
 
 def _is_set(node: Node) -> bool:

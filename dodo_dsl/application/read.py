@@ -79,7 +79,8 @@ def read_application(
     found.extend(declared.depending(application, gone))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))
-    found.extend(_secrets(application, document, files))
+    refused = {problem.span for problem in found}
+    found.extend(problem for problem in _secrets(application, document, files) if problem.span not in refused)
     return (None if has_errors(found) else application), found
 
 

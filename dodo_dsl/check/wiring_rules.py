@@ -305,6 +305,10 @@ _GIVEN = ("command", "entrypoint", "environment")
 """Keys whose variables a test may set."""
 
 
+_HARDWARE = ("cap_add", "device_cgroup_rules", "devices", "privileged", "security_opt")
+"""Keys that only rigs carry."""
+
+
 def check_variables(context: RuleContext) -> Iterator[Diagnostic]:
     if context.application:
         yield from _required(context, context.application)
@@ -332,7 +336,8 @@ def _required(context: RuleContext, application: ApplicationSource) -> Iterator[
     }
     maybe = {**dict.fromkeys((*CID_VARIABLES, *application.access.passed), "?"), **application.known}
     for service, key, part in application.demanding:
-        if service and not is_carried(key):
+        is_rig = context.rig is not None and not context.rig.is_emulated
+        if service and (not is_carried(key) or (key in _HARDWARE and not is_rig)):
             continue
         if key == "image" and image_variable(service) in application.known:
             continue
