@@ -68,15 +68,15 @@ class Compiled:
         found = yaml.safe_load(self.files["application.compose.yml"])
         found.pop("x-shared", None)
         variables = _dotenv(self.files[".env"])
-        filled: dict[str, Any] = _filled(found, variables)
-        for service in filled["services"].values():
+        made: dict[str, Any] = filled(found, variables)
+        for service in made["services"].values():
             for part in (service, service.get("build")):
                 for key in ("environment", "args") if isinstance(part, dict) else ():
                     if key in part:
                         pairs = _uniform(key, part[key], self.folder).items()
                         known = {name: variables.get(name) if value is None else value for name, value in pairs}
                         part[key] = {name: value for name, value in known.items() if value is not None}
-        return filled
+        return made
 
     @functools.cached_property
     def services(self) -> dict[str, Any]:
@@ -112,12 +112,11 @@ def repository(folder: Path, files: Mapping[str, str] = {}) -> Path:
 
 
 def compiled(
-    root: Path, application: str | Mapping[str, Any] | None = None, way: str = "network", **deployment: Any
+    root: Path, document: str | Mapping[str, Any] | None = None, way: str = "network", **deployment: Any
 ) -> Compiled:
-    """A test of a repository with an application, and with what ``deployment`` says beside it in ``dodo.yml``."""
-    if application is not None:
-        text = application if isinstance(application, str) else written(application)
-        (root / FILE).write_text(text)
+    """A test of a repository with a compose file, and with what ``deployment`` says beside it in ``dodo.yml``."""
+    if document is not None:
+        (root / FILE).write_text(document if isinstance(document, str) else written(document))
     rigs = {"rigs": {"bench": _RIG}} if way == "hil" else {}
     (root / "dodo.yml").write_text(written({**_DEPLOYMENT, **rigs, **deployment}))
     forget_lines()
@@ -157,12 +156,12 @@ def _told(diagnostics: Sequence[Diagnostic], root: Path) -> Iterator[Told]:
 _VARIABLE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-def _filled(value: Any, variables: Mapping[str, str]) -> Any:
+def filled(value: Any, variables: Mapping[str, str]) -> Any:
     """A value with its variables filled in, as compose does it."""
     if isinstance(value, dict):
-        return {key: _filled(inner, variables) for key, inner in value.items()}
+        return {key: filled(inner, variables) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_filled(inner, variables) for inner in value]
+        return [filled(inner, variables) for inner in value]
     return _text(value, variables) if isinstance(value, str) else value
 
 
@@ -205,15 +204,19 @@ def _braced(inner: str, variables: Mapping[str, str]) -> str:
     return _text(word[1:], variables) if value is None and word.startswith("-") else value or ""
 
 
+_ESCAPES = {"n": "\n", "r": "\r", "\\": "\\", '"': '"'}
+
+
 def _dotenv(text: str) -> dict[str, str]:
-    """The variables of a compiled test's ``.env``."""
-    lines = (line for line in text.splitlines() if line and not line.startswith("#"))
-    pairs = (line.partition("=") for line in lines)
+    """The variables of a compiled test's ``.env``, which quotes values with escapes where it has to."""
     found: dict[str, str] = {}
-    for name, _, value in pairs:
-        quoted = value[:1] in "\"'" and value[:1]
-        plain = value.strip(quoted).replace("\\'", "'") if quoted else value
-        found[name] = plain if quoted == "'" else _text(plain, found)
+    for line in text.splitlines():
+        name, equals, value = line.partition("=")
+        if not equals or line.startswith("#"):
+            continue
+        if value.startswith('"'):
+            value = re.sub(r"\\(.)", lambda match: _ESCAPES[match[1]], value[1:-1])
+        found[name] = _text(value, found)
     return found
 
 
@@ -224,9 +227,11 @@ _LISTS = ("dns", "dns_search", "tmpfs", "env_file", "label_file")
 
 
 def size(value: Any) -> int:
-    """Bytes of a size as compose writes it: a number, perhaps with a unit of 1024."""
-    number, unit = re.fullmatch(r"\s*(-?[0-9.eE+]+?)\s*([kmgtb]?)(?:i?b)?\s*", str(value).lower()).groups()  # type: ignore[union-attr]
-    return int(float(number) * _UNITS[unit])
+    """Bytes of a size as compose writes it: a number, perhaps with a unit of 1024; raises ValueError for others."""
+    found = re.fullmatch(r"\s*(-?[0-9.eE+]+?)\s*([kmgtb]?)(?:i?b)?\s*", str(value).lower())
+    if found is None:
+        raise ValueError(value)
+    return int(float(found[1]) * _UNITS[found[2]])
 
 
 def uniform(service: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -238,7 +243,7 @@ def uniform(service: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _uniform(key: str, value: Any, folder: Path) -> Any:
-    if key in _SIZES:
+    if key in _SIZES and value is not None:
         return str(size(value))
     if key in ("command", "entrypoint") and isinstance(value, str):
         return shlex.split(value)
@@ -252,6 +257,10 @@ def _uniform(key: str, value: Any, folder: Path) -> Any:
         return {name: word if equals else None for name, equals, word in (str(i).partition("=") for i in value)}
     if key in ("depends_on", "networks") and isinstance(value, list):
         value = dict.fromkeys(value, {"condition": "service_started"} if key == "depends_on" else None)
+    if key == "depends_on":
+        value = {
+            name: {k: v for k, v in about.items() if (k, v) != ("required", True)} for name, about in value.items()
+        }
     if key == "extra_hosts":
         pairs = value.items() if isinstance(value, dict) else (re.split("[:=]", host, maxsplit=1) for host in value)
         return [f"{name}={address}" for name, address in pairs]
@@ -279,6 +288,8 @@ def _plain(value: Any, folder: Path) -> Any:
 def _build(build: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     made = {key: _uniform(key, value, folder) for key, value in build.items() if value is not None}
     others = {name: of_repository(path, folder) for name, path in (made.get("additional_contexts") or {}).items()}
+    if made.get("dockerfile") == "Dockerfile":
+        del made["dockerfile"]
     own = {"context": of_repository(made.get("context", "."), folder)}
     return {**made, **own, **({"additional_contexts": others} if others else {})}
 

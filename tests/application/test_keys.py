@@ -19,6 +19,7 @@ FILES = {
     "a.env": "A=1\n",
     "cid.env": "OD4SESSION_CID=111\n",
     "Dockerfile": "FROM scratch\n",
+    "Dockerfile.car": "FROM scratch\n",
     "data/x": "x",
     "written/x": "x",
     "other.yml": "services: {}\n",
@@ -250,7 +251,7 @@ def long_form(definition: str, key: str) -> set[str]:
         ("mount", long_form("container_spec", "volumes"), {"target", "read_only"}),
         *((level, keys(level), set()) for level in SHARED),
     ],
-    ids=str,
+    ids=["file", "service", "build", "mount", *SHARED],
 )
 def test_each_key_of_the_specification_has_a_row(level: str, expected: set[str], elsewhere: set[str]) -> None:
     """``extends`` is merged before: see merging.yml."""
