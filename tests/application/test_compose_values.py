@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.read import read_application
-from dodo_dsl.diagnostics import has_errors
+from tests.application.compiled import compiled, repository
 from tests.application.compose_values import RIGHT, RIGHT_FOR_UP, WRONG, WRONG_FOR_UP, compose_file
 from tests.emit.readers import compose
 
@@ -17,10 +16,8 @@ from tests.emit.readers import compose
     [(v, True) for v in (*RIGHT, *RIGHT_FOR_UP)] + [(v, False) for v in (*WRONG, *WRONG_FOR_UP)],
 )
 def test_dodo_judges(value: str, is_right: bool, tmp_path: Path) -> None:
-    file = tmp_path / "compose.yml"
-    file.write_text(compose_file(value))
-    _, problems = read_application(file)
-    assert has_errors(problems) != is_right, problems
+    test = compiled(repository(tmp_path, {"data/x": ""}), compose_file(value))
+    assert bool(test.errors) != is_right, test.told
 
 
 @pytest.mark.slow

@@ -1,85 +1,47 @@
-"""Attacks by compose files are refused, left out, or stopped at run time."""
+"""Attacks by compose files are refused, or what is compiled of them is harmless."""
 
 import asyncio
+import json
 import pwd
-from collections.abc import Iterable
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
-from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.read import read_application
-from dodo_dsl.diagnostics import Diagnostic, has_errors
-from dodo_dsl.emit.render import render_plan
-from dodo_dsl.plan.model import Application, Plan, PlannedService
-from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.plan.rewrite.service_copy import Setting
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.protocol import BackendError
+from tests.application.compiled import FILE, Compiled, compiled, filled, repository
 from tests.emit.readers import compose
+from tests.hostile.harmless import harm, is_harmless
 
 TABLE: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load((Path(__file__).parent / "compose_files.yml").read_text())
 SECRET = "s3cr3t"
-JUDGE = PlannedService("evaluation", "judge-of-test", "collision", "dodo/collision:1", (), (), True)
 
 
-def attacks(group: str, once_per: str = "") -> list[Any]:
-    """Those of a group; ``once_per`` is a key of which each value is tried once, and more often by ``make proof``."""
-    seen: set[str] = set()
-    found = []
-    for name, attack in TABLE[group].items():
-        marks = [pytest.mark.proof] if once_per and attack[once_per] in seen else []
-        seen.add(attack.get(once_per, ""))
-        found.append(pytest.param(attack, id=name, marks=marks))
-    return found
+def attacks(*groups: str) -> list[Any]:
+    return [pytest.param(attack, id=f"{name}, {group}") for group in groups for name, attack in TABLE[group].items()]
 
 
-def written(attack: dict[str, Any], folder: Path) -> Path:
-    """The attack as the compose file of a repository."""
-    repository = folder / "team"
-    repository.mkdir()
-    (repository / "dodo.yml").write_text("dodo: 1\n")
-    (repository / ".env").write_text(attack.get("env", ""))
+def attacked(attack: dict[str, Any], folder: Path, **deployment: Any) -> tuple[Compiled, Path]:
+    """The test of a repository with an attack, and the repository."""
+    root = repository(folder, {".env": attack.get("env", ""), **attack.get("files", {})})
     for name, target in attack.get("links", {}).items():
-        (repository / name).symlink_to(target)
-    for name, text in attack.get("files", {}).items():
-        (repository / name).parent.mkdir(exist_ok=True)
-        (repository / name).write_text(text)
+        (root / name).symlink_to(target)
     service = {"image": "team/driver", "command": "--cid=111", **attack.get("service", {})}
-    file = repository / "docker-compose.yml"
-    text = yaml.safe_dump({"services": {"driver": service}, **attack.get("file", {})})
-    file.write_text(text.replace("{repo}", str(repository)))
-    return file
+    text = json.dumps({"services": {"driver": service}, **attack.get("file", {})}).replace("{repo}", str(root))
+    return compiled(root, text, **deployment), root
 
 
-def found(
-    attack: dict[str, Any], folder: Path, passed: Iterable[str] = ()
-) -> tuple[Application | None, list[Diagnostic]]:
-    source, problems = read_application(written(attack, folder), Access(passed=tuple(passed)))
-    if source is None:
-        return None, problems
-    return plan_application(source, Setting(140, "network", folder / "generated" / "t", (JUDGE.name,))), problems
-
-
-def plan(application: Application) -> Plan:
-    common = ("", "sil", "closed-loop", 10.0, "realtime", "network", 1, 140, "10.213.0.0/28", "sil", "dodo/sandbox:1")
-    return Plan("t", "t", "t.dodo.yml", *common, (JUDGE,), application)
-
-
-@pytest.mark.parametrize("attack", attacks("refused"))
-def test_what_is_refused(attack: dict[str, Any], tmp_path: Path) -> None:
-    """Compose files that reach the host, or other tests, are refused with file, line and column."""
-    application, problems = found(attack, tmp_path)
-    assert application is None
-    errors = [problem for problem in problems if problem.severity == "error"]
-    assert {problem.rule for problem in errors} <= {"application-isolation", "unknown-key"}
-    for problem in errors:
-        assert Path(problem.span.file).name == "docker-compose.yml"
-        assert problem.span.line and problem.span.column
-        assert "links" not in attack or "symbolic link" in problem.message
-        assert problem.hint or problem.rule == "application-isolation"
+@pytest.mark.parametrize("attack", attacks("refused", "left out", "secrets", "removed", "cut"))
+def test_it_is_refused_or_harmless(attack: dict[str, Any], tmp_path: Path) -> None:
+    test, root = attacked(attack, tmp_path)
+    if test.errors:
+        assert {(told.file, bool(told.line and told.column)) for told in test.errors} == {(FILE, True)}
+        return
+    assert list(harm(test.document, root)) == []
+    assert [word for word in (SECRET, *attack.get("gone", ())) if word in "".join(test.files.values())] == []
 
 
 @pytest.mark.parametrize("home", ["/", ""])
@@ -90,72 +52,62 @@ def test_what_is_no_home(mount: str, home: str, tmp_path: Path, monkeypatch: pyt
     if home:
         monkeypatch.setenv("HOME", home)
     monkeypatch.setattr(pwd, "getpwuid", nobody)
-    application, problems = found({"service": {"volumes": [mount]}}, tmp_path)
-    assert application is None
-    assert [problem.rule for problem in problems] == ["application-isolation"]
+    test, _ = attacked({"service": {"volumes": [mount]}}, tmp_path)
+    assert test.errors
 
 
 def nobody(user: int) -> Any:
     raise KeyError(user)
 
 
-@pytest.mark.parametrize("attack", attacks("left out"))
-def test_what_is_left_out(attack: dict[str, Any], tmp_path: Path) -> None:
-    """Hardware and privileges are left out of simulations, with a warning."""
-    application, problems = found(attack, tmp_path)
-    assert not has_errors(problems)
-    assert {problem.severity for problem in problems} == {"warning"}
-    gone(attack, application)
-
-
-@pytest.mark.parametrize("attack", attacks("cut"))
-def test_what_is_cut(attack: dict[str, Any], tmp_path: Path) -> None:
-    """Limits beyond those of the test are cut to them, with a warning."""
-    application, problems = found(attack, tmp_path)
-    assert {(problem.severity, problem.rule) for problem in problems} == {("warning", "application-limit")}
-    gone(attack, application)
-
-
-@pytest.mark.parametrize("attack", attacks("removed"))
-def test_what_is_removed(attack: dict[str, Any], tmp_path: Path) -> None:
-    """What would set the host or other tests is removed from the test's copy."""
-    application, problems = found(attack, tmp_path)
-    assert problems == []
-    gone(attack, application)
-
-
-def gone(attack: dict[str, Any], application: Application | None) -> None:
-    assert application is not None
-    text = yaml.safe_dump(application.compose) + yaml.safe_dump(application.variables)
-    assert [word for word in attack["gone"] if word in text] == []
-    assert not [file.path for file in render_plan(plan(application)) if SECRET in file.text]
+def config(test: Compiled) -> subprocess.CompletedProcess[str]:
+    """What compose makes of a compiled test."""
+    words = [*compose(), "config", "--format", "json"]
+    return subprocess.run(words, cwd=test.write(), capture_output=True, text=True, check=False)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("attack", attacks("at run time", once_per="says"))
-def test_what_is_stopped_at_run_time(attack: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What only the engine would see is stopped before anything is created."""
+@pytest.mark.parametrize("attack", attacks("at run time"))
+def test_it_is_harmless_with_any_value(attack: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of what only the engine would see nothing is created: it is refused before, or was refused already."""
     compose()
     monkeypatch.delenv("X", raising=False)
-    application, problems = found(attack, tmp_path, attack["set"])
-    assert application is not None, problems
-    for file in render_plan(plan(application)):
-        path = tmp_path / "generated" / file.path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(file.text)
-    folder, report = tmp_path / "generated" / "t", tmp_path / "report"
+    test, root = attacked(attack, tmp_path, environment=list(attack["set"]))
+    if test.errors:
+        return
     for name, value in attack["set"].items():
-        monkeypatch.setenv(name, value.replace("{repo}", str(tmp_path / "team")))
-    with pytest.raises(BackendError, match="the application may not have ") as refused:
-        asyncio.run(Compose(plan(application), folder, report, "dodo-t", print).read())
-    assert str(refused.value).startswith(f"the application may not have {attack['says']}: "), refused.value
+        monkeypatch.setenv(name, value.replace("{repo}", str(root)))
+    shown = config(test)
+    names = [service.name for service in test.plan.application.services] if test.plan else []
+    if shown.returncode == 0 and is_harmless(application(json.loads(shown.stdout), names), root):
+        return
+    assert test.plan is not None
+    with pytest.raises(BackendError):
+        asyncio.run(Compose(test.plan, test.folder, tmp_path / "report", "dodo-t", print).read())
+
+
+def application(shown: dict[str, Any], names: list[str]) -> dict[str, Any]:
+    """What compose shows of the application alone."""
+    kept = {key: value for key, value in shown.items() if key in ("services", "volumes", "secrets", "configs")}
+    services = {name: service for name, service in shown["services"].items() if name in (*names, "dodo-files")}
+    return {**kept, "services": services}
 
 
 def test_without_the_attack_all_is_well(tmp_path: Path) -> None:
-    """Control: the same file without an attack is accepted."""
-    application, problems = found({}, tmp_path)
-    assert application is not None
-    assert problems == []
+    """Control: the same file without an attack is accepted, and what an attack asks for is harm."""
+    test, root = attacked({}, tmp_path)
+    assert test.told == ()
+    assert is_harmless(test.document, root)
+
+
+@pytest.mark.parametrize("attack", attacks("refused", "left out", "removed", "cut"))
+def test_what_an_attack_asks_for_is_harm(attack: dict[str, Any], tmp_path: Path) -> None:
+    """Control: the property sees what attacks would have if their words were taken as they are."""
+    test, root = attacked({}, tmp_path)
+    service = {**test.document["services"]["driver"], **attack.get("service", {})}
+    document = {**test.document, "services": {"driver": service}, **attack.get("file", {})}
+    if "links" not in attack and "env" not in attack:
+        assert not is_harmless(filled(document, {}), root)
 
 
 @pytest.mark.parametrize(
@@ -198,10 +150,8 @@ def test_folders_in_a_folder_that_is_allowed(
             own[key] = ["c"]
             document[key] = {"c": {"file": path.format(host)}}
         document["services"][f"s{number}"] = own
-    file = written({"file": document}, tmp_path)
-    source, problems = read_application(file, Access(paths=(str(tmp_path / "host"),)))
-    assert (source is None) == refused
-    assert ["could put a link in its place" in problem.message for problem in problems] == [True] * refused
+    test, _ = attacked({"file": document}, tmp_path, paths=[str(host)])
+    assert [told.rule for told in test.errors] == ["application-isolation"] * refused
 
 
 SECRETS = {
@@ -227,34 +177,26 @@ def test_secrets_of_the_host_stay_there(
         "healthcheck": {"test": ["CMD", "echo", *words]},
         "build": {"context": ".", "args": [*SECRETS], "dockerfile_inline": f"FROM scratch\n# {' '.join(words)}"},
     }
-    application, problems = found({"service": service}, tmp_path, passed)
-    assert application is not None
-    named = {problem.message.split("'")[1] for problem in problems if problem.rule == "application-secret"}
+    test, _ = attacked({"service": service}, tmp_path, environment=list(passed))
+    assert test.errors == [] and test.plan is not None
+    named = {told.text.split("'")[1] for told in test.told if told.rule == "application-secret"}
     assert named == {*SECRETS} - {*passed}
-    for file in render_plan(plan(application)):
-        path = tmp_path / "generated" / file.path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(file.text)
-    test = Compose(plan(application), tmp_path / "generated" / "t", tmp_path / "report", "dodo-t", print)
-    asyncio.run(test.read())
-    text = yaml.safe_dump(test.services)
+    made = Compose(test.plan, test.write(), tmp_path / "report", "dodo-t", print)
+    asyncio.run(made.read())
+    text = yaml.safe_dump(made.services)
     assert (SECRET in text) == bool(passed)
     assert "postgresql" not in text
 
 
 @pytest.mark.slow
 def test_without_the_attack_the_engine_gets_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Control: the engine gets the same file without an attack."""
+    """Control: the engine gets the secrets of the application's own file, and no file of the test has them."""
     compose()
     monkeypatch.setenv("CI_JOB_TOKEN", "pipeline")
     monkeypatch.setenv("API_KEY", "pipeline")
-    variables = {"A": "${API_KEY}", "B": "${CI_JOB_TOKEN:-none}", "CI_JOB_TOKEN": None}
-    application, _ = found({"service": {"environment": variables}, "env": f"API_KEY={SECRET}"}, tmp_path)
-    assert application is not None
-    for file in render_plan(plan(application)):
-        path = tmp_path / "generated" / file.path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(file.text)
-    test = Compose(plan(application), tmp_path / "generated" / "t", tmp_path / "report", "dodo-t", print)
-    asyncio.run(test.read())
-    assert test.services["driver"]["environment"] == {"A": SECRET, "B": "none", "CI_JOB_TOKEN": None}
+    variables = {"A": "${API_KEY}", "B": "${CI_JOB_TOKEN:-none}"}
+    test, _ = attacked({"service": {"environment": variables}, "env": f"API_KEY={SECRET}"}, tmp_path)
+    assert test.plan is not None
+    made = Compose(test.plan, test.write(), tmp_path / "report", "dodo-t", print)
+    asyncio.run(made.read())
+    assert made.services["driver"]["environment"] == {"A": SECRET, "B": "none"}
