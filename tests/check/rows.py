@@ -1,13 +1,15 @@
 """Rows: what differs from a sound folder, and the rule and place of everything that is found wrong there.
 
-Apart from its name, what is ``found`` and how it is run, a row names files. A spec and ``dodo.yml`` have the top-level
-keys that the row leaves out: a spec those of its ``base``, all of them without a value. All other files are whole.
+Apart from its name, what is ``found`` and how it is run, a row names files. Those that are there before, a spec as its
+``base`` is, get new text for old, as a mapping, or new top-level keys; without a value they stay. A text is the whole
+file if it begins with ``dodo: 1``, ``extends`` or no key. All other files are whole, too.
 A place without a file is in that of the place before, at first in the row's first file.
 """
 
 import json
+import re
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,8 @@ BASES = FOLDER / "bases"
 ROWS = FOLDER / "rows"
 REGISTRY = FOLDER / "registry"
 SPEC = ".dodo.yml"
+MERGED = ("dodo.yml", "service.yml")
+_KEY = re.compile(r"(?!dodo: 1|extends:)[a-z]")
 
 
 @dataclass(frozen=True)
@@ -34,18 +38,16 @@ class Row:
     base: str = "drive"
     encoding: str = "utf-8"
     slow: bool = False
+    links: dict[str, str] = field(default_factory=dict)
+    paths: tuple[str, ...] = ()
 
 
 def read(path: Path) -> list[Row]:
-    known = {"name", "found", "base", "encoding", "slow"}
+    known = {"name", "found", "base", "encoding", "slow", "links", "paths"}
     rows = yaml.safe_load(path.read_text())
     return [
         Row(**{k: row[k] for k in known & set(row)}, files={k: row[k] for k in row if k not in known}) for row in rows
     ]
-
-
-def parameters(path: Path) -> list[Any]:
-    return [pytest.param(row, id=row.name, marks=[pytest.mark.slow] if row.slow else []) for row in read(path)]
 
 
 def write(row: Row, folder: Path) -> None:
@@ -56,14 +58,14 @@ def write(row: Row, folder: Path) -> None:
     for path, given in row.files.items():
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
-        if isinstance(given, dict):
-            target.symlink_to(given["link"])
-        elif isinstance(given, bytes):
+        if isinstance(given, bytes):
             target.write_bytes(given)
         elif path.endswith("/"):
             target.mkdir(parents=True)
         else:
-            target.write_bytes(_whole(row, target, given).encode(row.encoding))
+            target.write_bytes(_text(row, target, given).encode(row.encoding))
+    for path, to in row.links.items():
+        (folder / path).symlink_to(to)
 
 
 def _base(row: Row, name: str) -> str:
@@ -71,17 +73,25 @@ def _base(row: Row, name: str) -> str:
     return (BASES / f"{row.base}{SPEC}").read_text().replace(f"name: {row.base}", f"name: {name}")
 
 
-def _whole(row: Row, target: Path, text: str | None) -> str:
-    if target.name.endswith(SPEC) and text != "":
-        return merged(_base(row, target.name.removesuffix(SPEC)), text or "")
-    return merged((REGISTRY / "dodo.yml").read_text(), text) if target.name == "dodo.yml" and text else text
+def _text(row: Row, target: Path, given: str | dict[str, str] | None) -> str:
+    """What a file gets; ``target`` is there if it is one of the registry's."""
+    name = target.name.removesuffix(SPEC)
+    is_spec = name != target.name
+    if isinstance(given, str) and not ((is_spec or (name in MERGED and target.is_file())) and _KEY.match(given)):
+        return given
+    before = _base(row, name) if is_spec else target.read_text()
+    if isinstance(given, str):
+        return merged(before, given)
+    changes = {old: str(new) for old, new in (given or {}).items()}
+    assert all(before.count(old) == 1 for old in changes), f"{target.name} has one of {list(changes)} not once"
+    return re.sub("|".join(map(re.escape, changes)) or "^", lambda found: changes.get(found[0], ""), before)
 
 
 def found(row: Row, folder: Path, patch: pytest.MonkeyPatch) -> list[str]:
     """What ``dodo compile --check`` finds in the row's files, as rows have it."""
     write(row, folder)
     patch.chdir(folder)
-    code, out, err = run("compile", "--check", "--quiet", "--format", "json")
+    code, out, err = run("compile", *row.paths, "--check", "--quiet", "--format", "json")
     assert not err
     places: dict[str, str] = {}
     files: dict[str, str] = {}
