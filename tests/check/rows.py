@@ -2,8 +2,9 @@
 
 Apart from its name, what is ``found`` and how it is run, a row names files. Those that are there before, a spec as its
 ``base`` is, get new text for old, as a mapping, or new top-level keys; without a value they stay. A text is the whole
-file if it begins with ``dodo: 1``, ``extends`` or no key. All other files are whole, too.
-A place without a file is in that of the place before, at first in the row's first file.
+file if it begins with ``dodo: 1``, ``extends`` or no key. All other files are whole, too; ``driver`` are more keys of
+the service in ``docker-compose.yml``. A place without a file is in that of the place before, at first in the row's
+first file.
 """
 
 import json
@@ -11,6 +12,7 @@ import re
 import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 import pytest
@@ -24,6 +26,7 @@ BASES = FOLDER / "bases"
 ROWS = FOLDER / "rows"
 REGISTRY = FOLDER / "registry"
 SPEC = ".dodo.yml"
+COMPOSE = "docker-compose.yml"
 MERGED = ("dodo.yml", "service.yml")
 _KEY = re.compile(r"(?!dodo: 1|extends:)[a-z]")
 
@@ -43,11 +46,14 @@ class Row:
 
 
 def read(path: Path) -> list[Row]:
-    known = {"name", "found", "base", "encoding", "slow", "links", "paths"}
-    rows = yaml.safe_load(path.read_text())
-    return [
-        Row(**{k: row[k] for k in known & set(row)}, files={k: row[k] for k in row if k not in known}) for row in rows
-    ]
+    return [_row(**row) for row in yaml.safe_load(path.read_text())]
+
+
+def _row(driver: str = "", **keys: Any) -> Row:
+    known = {"name", "found", "base", "encoding", "slow", "links", "paths"} & set(keys)
+    files = {COMPOSE: (REGISTRY / COMPOSE).read_text() + indent(driver, "    ")} if driver else {}
+    files |= {path: given for path, given in keys.items() if path not in known}
+    return Row(**{key: keys[key] for key in known}, files=files)
 
 
 def write(row: Row, folder: Path) -> None:
