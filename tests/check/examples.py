@@ -50,10 +50,15 @@ def files(example: str) -> dict[str, str]:
 
 def with_keys_of(path: str, text: str) -> str:
     """The file with the example's top-level keys in place of its own."""
+    return merged(FILES[path], text)
+
+
+def merged(base: str, text: str) -> str:
+    """A base with a text's top-level keys in place of its own."""
     if text.startswith("dodo: 1"):
         return text
     shown = {line.partition(":")[0] for line in text.splitlines() if line[:1].isalpha()}
-    blocks = re.split(r"^(?=[a-z])", FILES[path], flags=re.MULTILINE)
+    blocks = re.split(r"^(?=[a-z])", base, flags=re.MULTILINE)
     return "".join(b for b in blocks if b.partition(":")[0] not in shown) + text
 
 

@@ -34,6 +34,7 @@ CASES = {
     "response: {over: 5 %}": ("missing-key", "'response' has 'over' without 'max'", ""),
     "name: My Test": ("wrong-value", None, "for example 'my-test'"),
     "seed: -1": ("out-of-range", "'seed' is -1, expected 0 to 4294967295", ""),
+    f"seed: {'9' * 5000}": ("wrong-type", "'seed' has 5000 digits, expected a whole number", ""),
     "description: ''": ("missing-key", "'description' is empty, expected a string", ""),
     "evaluation: {}": ("missing-key", "'evaluation' is empty, expected at least one entry", ""),
     f"action: {{{ENTRIES}}}": ("too-large", "'action' has 101 entries, expected at most 100", ""),
