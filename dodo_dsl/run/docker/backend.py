@@ -80,6 +80,7 @@ class DockerBackend:
         self._say = say
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._compose = self.compose_kind(plan, folder, report, project, say)
+        self._application = tuple(service.name for service in plan.application.services)
         self._containers: dict[str, Any] = {}
         self._processes = ContainerProcesses({})
         self._use = ContainerUse({})
@@ -139,8 +140,7 @@ class DockerBackend:
         try:
             self._containers = await asyncio.to_thread(self._find_containers)
             self._processes = ContainerProcesses(self._containers)
-            names = {service.name for service in self.plan.application.services}
-            self._use = ContainerUse({name: c for name, c in self._containers.items() if name in names})
+            self._use = ContainerUse({name: c for name, c in self._containers.items() if name in self._application})
             self._require_health()
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
             for name in (SANDBOX, FILES):
@@ -216,8 +216,6 @@ class DockerBackend:
 
     async def _wait_for_copies(self) -> None:
         """Until the application has its own copies of the repository's files; raises BackendError."""
-        from docker.errors import DockerException
-
         if FILES not in self._containers:
             return
         try:
@@ -227,8 +225,7 @@ class DockerBackend:
             raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}") from None
         if self._copy_problem:
             raise BackendError(self._copy_problem)
-        with contextlib.suppress(DockerException, OSError):
-            await asyncio.to_thread(self._containers[FILES].kill)
+        await asyncio.to_thread(self._kill, FILES)
 
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
@@ -256,7 +253,7 @@ class DockerBackend:
     async def start(self, layer: str) -> dict[str, bool]:
         names = [s.name for s in self.plan.layer(layer)]
         if layer == "application":
-            names = [s.name for s in self.plan.application.services if s.name in self._containers]
+            names = [name for name in self._application if name in self._containers]
             await self._wait_for_copies()
             if self.lines:
                 await self._connect()
@@ -360,8 +357,7 @@ class DockerBackend:
         return await self._events.get()
 
     async def listeners(self) -> Collection[str] | None:
-        names = {s.name for s in self.plan.application.services}
-        return await asyncio.to_thread(self._processes.listeners, names, self.cid)
+        return await asyncio.to_thread(self._processes.listeners, self._application, self.cid)
 
     async def require_own_host(self) -> None:
         """Raises BackendError where the test is on the network of a host that is not this machine.
@@ -390,8 +386,7 @@ class DockerBackend:
         return await asyncio.to_thread(self._use.take)
 
     async def application(self) -> Collection[int] | None:
-        names = {s.name for s in self.plan.application.services}
-        return await asyncio.to_thread(self._processes.first, names)
+        return await asyncio.to_thread(self._processes.first, self._application)
 
     async def close(self, keep: bool) -> list[str]:
         self._is_closing = True
