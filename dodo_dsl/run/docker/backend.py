@@ -21,7 +21,7 @@ from dodo_dsl.run.announce import hearers, that_hear
 from dodo_dsl.run.application_time import PAGE_DESTROYED
 from dodo_dsl.run.docker import shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
-from dodo_dsl.run.docker.client import engine_error
+from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerProcesses, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch, announce_begin
@@ -145,7 +145,7 @@ class DockerBackend:
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
             for name in (SANDBOX, FILES):
                 if name in self._containers:
-                    await asyncio.to_thread(self._containers[name].start)
+                    await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
@@ -329,17 +329,29 @@ class DockerBackend:
     async def _start(self, name: str) -> None:
         from docker.errors import DockerException
 
-        container, output = self._containers[name], self._outputs[name]
         try:
-            # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
-            stream = await asyncio.to_thread(attached, container) if self._prints(name) else None
-            await asyncio.to_thread(container.start)
+            stream = await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
             self._not_started(name, engine_error(error))
             return
         self._conditions.started(name)
-        follow, source = (self._follow, container) if stream is None else (copy_into, stream)
-        threading.Thread(target=follow, args=(source, output.writer), daemon=True).start()
+        follow, source = (self._follow, self._containers[name]) if stream is None else (copy_into, stream)
+        threading.Thread(target=follow, args=(source, self._outputs[name].writer), daemon=True).start()
+
+    def _start_container(self, name: str, again: bool = False) -> Any:
+        """Starts a container, if need be twice; what it prints, where that becomes messages."""
+        from docker.errors import APIError
+
+        # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
+        stream = attached(self._containers[name]) if self._prints(name) else None
+        try:
+            self._containers[name].start()
+        except APIError as error:
+            if again or not TOO_SLOW.search(engine_error(error)):
+                raise
+            self._note(f"the container of '{name}' is started once more: {engine_error(error)}")
+            return self._start_container(name, again=True)
+        return stream
 
     @staticmethod
     def _follow(container: Any, writer: int) -> None:
