@@ -21,7 +21,7 @@ from dodo_dsl.run.announce import hearers, that_hear
 from dodo_dsl.run.application_time import PAGE_DESTROYED
 from dodo_dsl.run.docker import shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
-from dodo_dsl.run.docker.client import engine_error
+from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerProcesses, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch, announce_begin
@@ -80,6 +80,7 @@ class DockerBackend:
         self._say = say
         self._events: asyncio.Queue[Event] = asyncio.Queue()
         self._compose = self.compose_kind(plan, folder, report, project, say)
+        self._application = tuple(service.name for service in plan.application.services)
         self._containers: dict[str, Any] = {}
         self._processes = ContainerProcesses({})
         self._use = ContainerUse({})
@@ -139,13 +140,12 @@ class DockerBackend:
         try:
             self._containers = await asyncio.to_thread(self._find_containers)
             self._processes = ContainerProcesses(self._containers)
-            names = {service.name for service in self.plan.application.services}
-            self._use = ContainerUse({name: c for name, c in self._containers.items() if name in names})
+            self._use = ContainerUse({name: c for name, c in self._containers.items() if name in self._application})
             self._require_health()
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
             for name in (SANDBOX, FILES):
                 if name in self._containers:
-                    await asyncio.to_thread(self._containers[name].start)
+                    await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
@@ -216,8 +216,6 @@ class DockerBackend:
 
     async def _wait_for_copies(self) -> None:
         """Until the application has its own copies of the repository's files; raises BackendError."""
-        from docker.errors import DockerException
-
         if FILES not in self._containers:
             return
         try:
@@ -227,8 +225,7 @@ class DockerBackend:
             raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}") from None
         if self._copy_problem:
             raise BackendError(self._copy_problem)
-        with contextlib.suppress(DockerException, OSError):
-            await asyncio.to_thread(self._containers[FILES].kill)
+        await asyncio.to_thread(self._kill, FILES)
 
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
@@ -256,7 +253,7 @@ class DockerBackend:
     async def start(self, layer: str) -> dict[str, bool]:
         names = [s.name for s in self.plan.layer(layer)]
         if layer == "application":
-            names = [s.name for s in self.plan.application.services if s.name in self._containers]
+            names = [name for name in self._application if name in self._containers]
             await self._wait_for_copies()
             if self.lines:
                 await self._connect()
@@ -332,17 +329,29 @@ class DockerBackend:
     async def _start(self, name: str) -> None:
         from docker.errors import DockerException
 
-        container, output = self._containers[name], self._outputs[name]
         try:
-            # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
-            stream = await asyncio.to_thread(attached, container) if self._prints(name) else None
-            await asyncio.to_thread(container.start)
+            stream = await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
             self._not_started(name, engine_error(error))
             return
         self._conditions.started(name)
-        follow, source = (self._follow, container) if stream is None else (copy_into, stream)
-        threading.Thread(target=follow, args=(source, output.writer), daemon=True).start()
+        follow, source = (self._follow, self._containers[name]) if stream is None else (copy_into, stream)
+        threading.Thread(target=follow, args=(source, self._outputs[name].writer), daemon=True).start()
+
+    def _start_container(self, name: str, again: bool = False) -> Any:
+        """Starts a container, if need be twice; what it prints, where that becomes messages."""
+        from docker.errors import APIError
+
+        # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
+        stream = attached(self._containers[name]) if self._prints(name) else None
+        try:
+            self._containers[name].start()
+        except APIError as error:
+            if again or not TOO_SLOW.search(engine_error(error)):
+                raise
+            self._note(f"the container of '{name}' is started once more: {engine_error(error)}")
+            return self._start_container(name, again=True)
+        return stream
 
     @staticmethod
     def _follow(container: Any, writer: int) -> None:
@@ -360,8 +369,7 @@ class DockerBackend:
         return await self._events.get()
 
     async def listeners(self) -> Collection[str] | None:
-        names = {s.name for s in self.plan.application.services}
-        return await asyncio.to_thread(self._processes.listeners, names, self.cid)
+        return await asyncio.to_thread(self._processes.listeners, self._application, self.cid)
 
     async def require_own_host(self) -> None:
         """Raises BackendError where the test is on the network of a host that is not this machine.
@@ -390,8 +398,7 @@ class DockerBackend:
         return await asyncio.to_thread(self._use.take)
 
     async def application(self) -> Collection[int] | None:
-        names = {s.name for s in self.plan.application.services}
-        return await asyncio.to_thread(self._processes.first, names)
+        return await asyncio.to_thread(self._processes.first, self._application)
 
     async def close(self, keep: bool) -> list[str]:
         self._is_closing = True

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ from dodo_dsl import advice
 from dodo_dsl.run.protocol import BackendError
 
 _CONNECTIONS = 200
+TOO_SLOW = re.compile("failed to create shim.*context deadline exceeded")
+"""In the error of an engine that was too busy to start a container, whatever that is; it may try again."""
 
 
 class NoEngine(BackendError):

@@ -61,7 +61,7 @@ class UseReader:
         self._pids: dict[str, list[int]] = {}
         self._held: dict[str, int] = {}
         self._detached: dict[str, int] = {}
-        self._sharing: dict[str, _Sharing] = {}
+        self._sharing: dict[str, _Sharing] = defaultdict(lambda: _Sharing(1.0, frozenset(), float("-inf")))
         self._ticks: dict[str, int] = defaultdict(int)
         """What the processes said at last, and what is to be added, as some ended for which nobody waited."""
         self._lost: dict[str, int] = defaultdict(int)
@@ -141,22 +141,25 @@ class UseReader:
         if len(large) > 1:
             sharing = self._shared(name, large, sizes, now)
             known = {pid: size for pid, size in sizes.items() if pid not in large - sharing.among}
-            if not known:
+            if not large & sharing.among:
                 return max(map(sum, sizes.values())) + detached
             part, sizes = sharing.part, known
         anonymous, shared = (sum(parts) for parts in zip(*sizes.values(), strict=True))
         return int((anonymous + max(shared, self._held.get(name, 0))) * part) + detached
 
     def _shared(self, name: str, large: Set[int], sizes: Mapping[int, tuple[int, int]], now: float) -> _Sharing:
-        """Which part of their memory counts, by the kernel's last figures."""
-        sharing = self._sharing.get(name)
-        if sharing is None or now >= sharing.until_s:
+        """Which part of their memory counts, by the kernel's last figures of processes that stayed as they were."""
+        sharing = self._sharing[name]
+        if now >= sharing.until_s:
             began = time.thread_time()
-            theirs = [sum(proportional(pid, self._proc)) for pid in large]
-            every = sum(sum(size) for size in sizes.values())
-            shared = sum(sum(sizes[pid]) for pid in large) - sum(theirs)
-            part = (every - max(shared, 0)) / every if all(theirs) else 1.0  # not readable for everybody
-            sharing = self._sharing[name] = _Sharing(part, frozenset(large), now + _patience_s(began))
+            theirs = {pid: sum(proportional(pid, self._proc)) for pid in large}
+            after = {pid: sum(resident(pid, self._proc)) for pid in large}
+            before, every = sum(sum(sizes[pid]) for pid in large), sum(map(sum, sizes.values()))
+            if abs(sum(after.values()) - before) <= _SMALL * len(large):  # else others have now what one gave back
+                is_known = all(theirs[pid] for pid in large if after[pid])  # not readable for everybody
+                part = min(1 - (before - sum(theirs.values())) / every, 1.0) if is_known else 1.0
+                sharing = _Sharing(part, frozenset(large), now)
+            sharing = self._sharing[name] = sharing._replace(until_s=now + _patience_s(began))
         return sharing
 
     def _read(self, pid: int) -> _Process | None:

@@ -6,12 +6,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from docker.errors import APIError
 
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run.docker.backend import DockerBackend
 from dodo_dsl.run.protocol import Event, Exited, Noted, Ready, Unstartable
 from tests.run.scripted import plan
 
+NOBODY: Any = None
 FATAL = "[FATAL tini (7)] exec drive failed: No such file or directory"
 
 
@@ -19,8 +21,7 @@ def test_words_of_a_program_are_no_excuse(tmp_path: Path) -> None:
     """With ``init: true`` the engine's first process says this of a program that cannot start; so can any program."""
 
     async def died() -> Any:
-        client: Any = None
-        backend = DockerBackend(plan("t"), tmp_path, tmp_path, client, client, "dodo-t", [], print, b"")
+        backend = DockerBackend(plan("t"), tmp_path, tmp_path, NOBODY, NOBODY, "dodo-t", [], print, b"")
         done = asyncio.Event()
         done.set()
         output: Any = SimpleNamespace(done=done, tail=lambda: [FATAL])
@@ -36,8 +37,7 @@ def test_words_of_a_program_are_no_excuse(tmp_path: Path) -> None:
 
 def test_a_crash_upon_the_end_is_reported(tmp_path: Path) -> None:
     async def ends() -> list[Event]:
-        client: Any = None
-        backend = DockerBackend(plan("t"), tmp_path, tmp_path, client, client, "dodo-t", [], print, b"")
+        backend = DockerBackend(plan("t"), tmp_path, tmp_path, NOBODY, NOBODY, "dodo-t", [], print, b"")
         backend._is_closing = True
         for code in (0, 1, 134, 137, 139, 143):
             backend._take(f"app{code}", "die", {"exitCode": str(code)})
@@ -51,30 +51,29 @@ CHECK = {"test": ["CMD", "false"]}
 
 
 class Container:
-    """One that starts, with a health check that the engine never asks."""
+    """One that starts after ``problems``, with a health check that the engine never asks."""
 
-    def __init__(self) -> None:
-        self.attrs: dict[str, Any] = {"Config": {"Healthcheck": {"Test": CHECK["test"]}}}
+    def __init__(self, *problems: str, config: str = "Config") -> None:
+        self.problems = [*problems]
+        self.attrs: dict[str, Any] = {config: {"Healthcheck": {"Test": CHECK["test"]}}}
 
     def start(self) -> None:
-        """At once."""
+        if self.problems:
+            raise APIError("", None, self.problems.pop(0))
 
     def logs(self, **_: object) -> Any:
         return SimpleNamespace(__iter__=lambda: iter(()), close=lambda: None)
 
 
-def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] = (), attrs: Any = None) -> Any:
+def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] = (), **others: Container) -> Any:
     """What is awaited of an application, and what is reported, of one that waits for another one's health."""
     services = (ApplicationService("app", after={"db": "service_healthy"}, optional=optional), ApplicationService("db"))
 
     async def started() -> tuple[dict[str, bool], list[Event]]:
-        client: Any = None
         tested = plan("t", application=Application(".", services))
-        backend = DockerBackend(tested, folder, folder, client, client, "dodo-t", [], print, b"")
-        backend._containers = {name: Container() for name in ("app", "db")}
+        backend = DockerBackend(tested, folder, folder, NOBODY, NOBODY, "dodo-t", [], print, b"")
+        backend._containers = {"app": Container(), "db": Container(), **others}
         backend._compose.services = {name: {"healthcheck": CHECK} for name in ("app", "db")}
-        if attrs is not None:
-            backend._containers["db"].attrs = attrs
         waits = await backend.start("application")
         for name, status in statuses:
             backend._take(name, f"health_status: {status}", {})
@@ -103,4 +102,14 @@ def test_an_optional_service_need_not_be_healthy(tmp_path: Path) -> None:
 
 
 def test_an_exception_while_one_waits_is_the_test_s_error(tmp_path: Path) -> None:
-    assert in_turn(tmp_path, attrs={})[1] == [Unstartable("app", "KeyError: 'Config'")]
+    assert in_turn(tmp_path, db=Container(config=""))[1] == [Unstartable("app", "KeyError: 'Config'")]
+
+
+SLOW, BAD = "failed to create shim task: io pipe: context deadline exceeded", "failed to create shim task: no such file"
+
+
+@pytest.mark.parametrize("problems", [(SLOW,), (SLOW, SLOW), (BAD,)])
+def test_what_a_busy_engine_does_not_start_is_started_once_more(problems: tuple[str, ...], tmp_path: Path) -> None:
+    events = in_turn(tmp_path, ("db", "healthy"), ("app", "healthy"), app=Container(*problems))[1]
+    notes = [Noted(f"the container of 'app' is started once more: {SLOW}")] * (problems[0] == SLOW)
+    assert events[2:] == [*notes, *[Unstartable("app", problems[-1])] * (problems != (SLOW,))]

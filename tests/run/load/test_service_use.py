@@ -70,7 +70,7 @@ def test_a_process_that_was_waited_for_counts_once(tmp_path: Path) -> None:
     assert use.take({10: "app"})["app"].processor_s == pytest.approx(177 * TICK)
 
 
-def test_what_processes_share_counts_once(tmp_path: Path) -> None:
+def test_what_processes_share_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Forks share what they have not written to; a small one has no say in that."""
     put(tmp_path, 10, 1, megabytes=100, proportional=40)
     put(tmp_path, 11, 10, megabytes=100, proportional=50)
@@ -78,6 +78,9 @@ def test_what_processes_share_counts_once(tmp_path: Path) -> None:
     assert UseReader(tmp_path).take({10: "app"})["app"].memory == pytest.approx(92 * MB, abs=2)
     (tmp_path / "11" / "smaps_rollup").unlink()
     assert UseReader(tmp_path).take({10: "app"})["app"].memory == 202 * MB, "not everybody may know"
+    sizes = iter((100, 100, 2, 100, 0))
+    monkeypatch.setattr(service_use, "resident", lambda *_: (next(sizes) * MB, 0))
+    assert UseReader(tmp_path).take({10: "app"})["app"].memory == 100 * MB, "one has ended meanwhile"
 
 
 def test_new_forks_count_when_it_is_known_what_they_share(tmp_path: Path) -> None:
@@ -91,7 +94,7 @@ def test_new_forks_count_when_it_is_known_what_they_share(tmp_path: Path) -> Non
     assert use.take({10: "app"})["app"].memory == 100 * MB
     for pid in (10, 11):
         put(tmp_path, pid, 1 if pid == 10 else 10, megabytes=1)
-    assert use.take({10: "app"})["app"].memory == MB, "the small ones, until it is known"
+    assert use.take({10: "app"})["app"].memory == 100 * MB, "one alone, until it is known"
 
 
 def test_a_service_that_has_ended_keeps_its_time(tmp_path: Path) -> None:
