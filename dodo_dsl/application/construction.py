@@ -162,7 +162,7 @@ class Construction:
                 is_service = bool(about & _OF_SERVICES)
                 hint = "indent it by 2: it looks like a service" if is_service else did_you_mean(key, known)
                 fix = None if is_service else only_fix(key, known)
-                of.bad(entry.key, f"unknown key '{key}' in the compose file", hint, rule="unknown-key", fix=fix)
+                of.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in the compose file", hint, fix=fix))
 
 
 def checked_builds(application: ApplicationSource) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from dodo_dsl.application.model import (
 from dodo_dsl.application.mounts import mounts
 from dodo_dsl.application.part import ASK_KEY, Part, pairs, spot
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import did_you_mean, listed, only_fix
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, listed, only_fix
 from dodo_dsl.source import Node, Scalar
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Container(Part):
                 known = (*_CARRIED, *_REFUSED, *_LEFT_OUT)
                 hint = did_you_mean(key, known) or ASK_KEY.format(key)
                 fix = only_fix(key, known, self.service.node.entries)
-                self.bad(entry.key, f"unknown key '{key}' in '{self.name}'", hint, rule="unknown-key", fix=fix)
+                self.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in '{self.name}'", hint, fix=fix))
         for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
             step(self)
         if self.left:
@@ -74,7 +74,7 @@ class Container(Part):
             are = "is" if len(keys) == 1 else "are"
             message = f"{listed([f'{key!r}' for key in keys])} of '{self.name}' {are} left out: a test does not carry "
             message += "this key" if len(keys) == 1 else "these keys"
-            self.bad(self.left[0][1], message, rule="application-key", severity="warning")
+            self.add(Diagnostic(self.left[0][1], "application-key", message, severity="warning"))
         return self.own
 
     def filled(self, node: Node) -> Node:

@@ -4,9 +4,10 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application.host_paths import is_port, is_rule_for_port
+from dodo_dsl.application.host_paths import holds_port, is_rule_for_port
 from dodo_dsl.application.model import is_true, plain
 from dodo_dsl.application.part import NO_PORT, WITHOUT_HARDWARE
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Node
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def devices(c: "Container", node: Node) -> Any:
             c.refuse(about.span, f"device '{word}' {_CDI}", "name a file below /dev")
         elif paths.is_of_machine(path):
             c.refuse(about.span, f"device '{word}' gives access to the host's disks or memory", "remove it")
-        elif is_port(paths.whole(path), c.project.ports):
+        elif holds_port(paths.whole(path), c.project.ports):
             c.hardware(about.span, f"device '{word}' of '{c.name}' {NO_PORT}", _OTHER)
         elif c.project.setting.hil:
             made.append(plain(item))
@@ -97,7 +98,7 @@ def security(c: "Container", node: Node) -> Any:
             made.append(word)
         else:
             message = f"'{word}' of '{c.name}' is left out, the engine's own confinement stays"
-            c.bad(item.span, message, rule="application-isolation", severity="warning")
+            c.add(Diagnostic(item.span, "application-isolation", message, severity="warning"))
     return made or None
 
 

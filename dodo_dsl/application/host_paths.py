@@ -189,18 +189,20 @@ _RULE = re.compile(r"[ac] ([0-9]+|\*):([0-9]+|\*) [rwm]+")
 
 
 def is_port(device: str, ports: Iterable[str]) -> bool:
-    """Whether a path is a rig's port, one of its names, a way to it, or a folder that holds it.
-
-    A rig is moved by its own service, and no application gets its port: an engine gives a container all in a folder.
-    """
+    """Whether a path is a rig's port, one of its names, or a way to it; a rig is moved by its own service alone."""
     files, names = list(_files(ports)), (os.path.normpath(device), real(device))
-    is_way = any(name in files or _below(name, _WAYS) for name in names)
-    return bool(files) and (is_way or any(_below(file, names) for file in files))
+    return bool(files) and any(name in files or _below(name, _WAYS) for name in names)
 
 
-def is_rule_for_port(rule: object, ports: Iterable[str]) -> bool:
+def holds_port(folder: str, ports: Iterable[str]) -> bool:
+    """The same, and of a folder whether it holds a port: an engine gives a container all devices in it."""
+    files, names = list(_files(ports)), (os.path.normpath(folder), real(folder))
+    return is_port(folder, files) or any(_below(file, names) for file in files)
+
+
+def is_rule_for_port(written: object, ports: Iterable[str]) -> bool:
     """Whether a rule of ``device_cgroup_rules`` lets a container open a port."""
-    found = _RULE.fullmatch(str(rule))
+    found = _RULE.fullmatch(str(written))
     files = list(_files(ports))
     if found is None or not files:
         return False

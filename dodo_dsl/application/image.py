@@ -85,7 +85,7 @@ def build(c: "Container", node: Node) -> Any:
     if "shm_size" in fields:
         made["shm_size"] = c.number(fields["shm_size"], c.limits.memory, "build.shm_size", "memory", limits.size)
     if "ulimits" in fields:
-        made["ulimits"] = limits.ulimits(c, fields["ulimits"])
+        made["ulimits"] = limits.ulimits(c, fields["ulimits"], is_whole=False)
     return made
 
 

@@ -61,13 +61,13 @@ def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
     return ",".join([*(word for word in words if word not in sizes), f"size={limits.memory}"]), bool(sizes), unknown
 
 
-def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
+def ulimits(c: "Container", node: Node | None = None, *, is_whole: bool = True) -> dict[str, Any]:
     """Highest limits of a process, those of the test and no core dumps where it sets none.
 
     ``nproc`` counts the user's processes on the whole machine, so that ``pids_limit`` takes its place.
     """
     own = {"core": 0, "fsize": c.limits.file_size, "nofile": c.limits.files}
-    made: dict[str, Any] = dict(own)
+    made: dict[str, Any] = dict(own) if is_whole else {}
     for name, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
         most = {**own, "memlock": c.limits.memory, "msgqueue": _MESSAGE_QUEUES}.get(name, math.inf)
         if name == "nproc":

@@ -174,13 +174,17 @@ def _carried(of: "Container", mount: Mount) -> Mount | None:
         hint = hint if hint.startswith("did") else f"declare it at the end of the file: 'volumes: {{{mount.source}: }}'"
         message = f"'{of.name}' mounts the volume '{mount.source}', which the top-level 'volumes' do not declare"
         near = only_fix(mount.source, known)
-        of.bad(mount.span, message, hint, fix=Fix(f"{near.old}:/", f"{near.new}:/") if near and mount.is_short else near)
+        of.bad(
+            mount.span, message, hint, fix=Fix(f"{near.old}:/", f"{near.new}:/") if near and mount.is_short else near
+        )
         return None
     if known[mount.source].is_external and not mount.read_only:
         hint = "mount it read-only (:ro), or remove 'external', so that compose creates it"
         of.refuse(mount.span, f"volume '{mount.source}' is external, so tests would share it", hint)
         return None
-    of.project.show(known[mount.source].device, known[mount.source].span, "" if mount.read_only else of.name)
+    about = known[mount.source]
+    is_read = mount.read_only or "ro" in str(about.made.get("driver_opts", {}).get("o")).split(",")
+    of.project.show(about.device, about.span, "" if is_read else of.name)
     return replace(mount, source=own_name(mount.source))
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from dodo_dsl import source
 from dodo_dsl.application.interpolation import literal
 from dodo_dsl.application.model import text
-from dodo_dsl.diagnostics import Diagnostic, Fix, Severity, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -30,32 +30,26 @@ class Part:
     def limits(self) -> SandboxLimits:
         return self.project.setting.limits
 
-    def bad(
-        self,
-        span: Span,
-        message: str,
-        hint: str = "",
-        *,
-        rule: str = "application-file",
-        severity: Severity = "error",
-        fix: Fix | None = None,
-    ) -> None:
-        self.project.problems.append(Diagnostic(span, rule, message, hint, severity, fix=fix))
+    def add(self, problem: Diagnostic) -> None:
+        self.project.problems.append(problem)
+
+    def bad(self, span: Span, message: str, hint: str = "", fix: Fix | None = None) -> None:
+        self.add(Diagnostic(span, "application-file", message, hint, fix=fix))
 
     def refuse(self, span: Span, message: str, hint: str) -> None:
         """Access to the host that tests would share."""
-        self.bad(span, message, hint, rule="application-isolation")
+        self.add(Diagnostic(span, "application-isolation", message, hint))
 
     def hardware(self, span: Span, message: str, hint: str = "test it on a rig (level hil)") -> None:
         """What only rigs have, and other tests leave out."""
-        self.bad(span, message, hint, rule="application-hardware", severity="warning")
+        self.add(Diagnostic(span, "application-hardware", message, hint, "warning"))
 
     def cut(self, span: Span, what: str, most: float, key: str = "") -> None:
         """A limit beyond ``most``, which takes its place; ``key`` of ``sandbox`` sets it, if one does."""
         hint = f"it is cut; '{key}' of 'sandbox' in dodo.yml sets the limit" if key else "it is cut"
         whose = f"'{self.name}'" if "'" not in self.name else self.name
         message = f"'{what}' of {whose} is beyond the test's limit of {_limit(most, key)}"
-        self.bad(span, message, hint, rule="application-limit", severity="warning")
+        self.add(Diagnostic(span, "application-limit", message, hint, "warning"))
 
     def literal(self, node: Node) -> str | None:
         """A text that is known when the test is compiled; None for any other, with a problem."""
@@ -100,7 +94,7 @@ class Part:
                 every = (*words, *gone, *(refused or ()))
                 hint = did_you_mean(key, every) or ASK_KEY.format(key)
                 fix = only_fix(key, every, node.entries if isinstance(node, source.Mapping) else ())
-                self.bad(entry.key, f"unknown key '{key}' in {what}", hint, rule="unknown-key", fix=fix)
+                self.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in {what}", hint, fix=fix))
         return found
 
 

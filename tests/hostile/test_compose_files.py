@@ -3,7 +3,6 @@
 import asyncio
 import json
 import pwd
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,6 @@ import pytest
 import yaml
 
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.protocol import BackendError
 from tests.application.compiled import FILE, Compiled, compiled, filled, repository
 from tests.emit.readers import compose
 from tests.hostile.harmless import harm, is_harmless
@@ -34,9 +32,9 @@ def attacked(attack: dict[str, Any], folder: Path, **deployment: Any) -> tuple[C
     return compiled(root, text, **deployment), root
 
 
-@pytest.mark.parametrize("attack", attacks("refused", "left out", "secrets", "removed", "cut"))
+@pytest.mark.parametrize("attack", attacks("refused", "left out", "secrets", "removed", "cut", "at run time"))
 def test_it_is_refused_or_harmless(attack: dict[str, Any], tmp_path: Path) -> None:
-    test, root = attacked(attack, tmp_path)
+    test, root = attacked(attack, tmp_path, environment=list(attack.get("set", {})))
     if test.errors:
         assert {(told.file, bool(told.line and told.column)) for told in test.errors} == {(FILE, True)}
         return
@@ -58,39 +56,6 @@ def test_what_is_no_home(mount: str, home: str, tmp_path: Path, monkeypatch: pyt
 
 def nobody(user: int) -> Any:
     raise KeyError(user)
-
-
-def config(test: Compiled) -> subprocess.CompletedProcess[str]:
-    """What compose makes of a compiled test."""
-    words = [*compose(), "config", "--format", "json"]
-    return subprocess.run(words, cwd=test.write(), capture_output=True, text=True, check=False)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("attack", attacks("at run time"))
-def test_it_is_harmless_with_any_value(attack: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of what only the engine would see nothing is created: it is refused before, or was refused already."""
-    compose()
-    monkeypatch.delenv("X", raising=False)
-    test, root = attacked(attack, tmp_path, environment=list(attack["set"]))
-    if test.errors:
-        return
-    for name, value in attack["set"].items():
-        monkeypatch.setenv(name, value.replace("{repo}", str(root)))
-    shown = config(test)
-    names = [service.name for service in test.plan.application.services] if test.plan else []
-    if shown.returncode == 0 and is_harmless(application(json.loads(shown.stdout), names), root):
-        return
-    assert test.plan is not None
-    with pytest.raises(BackendError):
-        asyncio.run(Compose(test.plan, test.folder, tmp_path / "report", "dodo-t", print).read())
-
-
-def application(shown: dict[str, Any], names: list[str]) -> dict[str, Any]:
-    """What compose shows of the application alone."""
-    kept = {key: value for key, value in shown.items() if key in ("services", "volumes", "secrets", "configs")}
-    services = {name: service for name, service in shown["services"].items() if name in (*names, "dodo-files")}
-    return {**kept, "services": services}
 
 
 def test_without_the_attack_all_is_well(tmp_path: Path) -> None:

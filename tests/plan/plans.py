@@ -78,7 +78,6 @@ _applications = st.builds(
     services=st.lists(_application_services, max_size=2).map(tuple),
     compose=st.dictionaries(_texts, _compose, max_size=2),
     changes=_words,
-    variables=st.dictionaries(_texts, _texts, max_size=2),
 )
 
 plans = st.builds(

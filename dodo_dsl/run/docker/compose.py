@@ -16,7 +16,7 @@ from typing import Any
 
 from dodo_dsl import advice, atomic
 from dodo_dsl.application import compose_paths, secret_variables
-from dodo_dsl.application.host_paths import HostPaths, is_port, is_rule_for_port
+from dodo_dsl.application.host_paths import HostPaths, holds_port, is_port, is_rule_for_port
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import FILES, image_variable
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
@@ -145,8 +145,10 @@ class Compose:
             devices = [str(each.get("source")) for each in made.get("devices") or ()]
             mounted = [str(v.get("source")) for v in made.get("volumes") or () if v.get("type") == "bind"]
             rules = made.get("device_cgroup_rules") or ()
-            if any(is_port(path, ports) for path in (*devices, *mounted)) or any(
-                is_rule_for_port(r, ports) for r in rules
+            if (
+                any(holds_port(path, ports) for path in devices)
+                or any(is_port(path, ports) for path in mounted)
+                or any(is_rule_for_port(r, ports) for r in rules)
             ):
                 raise BackendError(
                     f"service '{service.name}' may not have the port of a rig, which only its service opens"
