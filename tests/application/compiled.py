@@ -26,6 +26,7 @@ SERIAL = "/dev/ttyACM7"
 FILE = "docker-compose.yml"
 _RIG = {"kind": "dynamic", "cid": CID, "serial": SERIAL, "camera": {"source": "rpicam"}, "privileged": True}
 _DEPLOYMENT = {"dodo": 1, "registry": ["tests"], "application": FILE, "cids": f"{CID}-149"}
+_HOME = str(Path.home())
 _DEPTH = 2
 """Of the keys of services, and of what volumes, secrets and configs have."""
 _HIL = (
@@ -67,7 +68,7 @@ class Compiled:
         assert self.files, self.told
         found = yaml.safe_load(self.files["application.compose.yml"])
         found.pop("x-shared", None)
-        variables = _dotenv(self.files[".env"])
+        variables = {"HOME": _HOME, **_dotenv(self.files[".env"])}
         made: dict[str, Any] = filled(found, variables)
         for service in made["services"].values():
             for part in (service, service.get("build")):
@@ -94,7 +95,7 @@ class Compiled:
 def repository(folder: Path, files: Mapping[str, str] = {}) -> Path:
     """A repository with three tests, and the ``files`` of an application."""
     root = folder / "team"
-    spec = SPEC.replace("../maps", "maps")
+    spec = SPEC.replace("../maps", "maps").replace("  camera:", "  scene:")
     specs = {
         "network": spec,
         "host": spec.replace("level: sil", "level: sil\nisolation: host"),
@@ -340,4 +341,6 @@ def of_repository(path: str, folder: Path) -> str:
     place = Path(os.path.normpath(folder / path))
     if place == root:
         return "."
+    if place.is_relative_to(_HOME) and not root.is_relative_to(_HOME):
+        return f"~/{place.relative_to(_HOME)}"
     return f"./{place.relative_to(root)}" if place.is_relative_to(root) else str(place)
