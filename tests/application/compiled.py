@@ -16,6 +16,7 @@ from dodo_dsl import compiler
 from dodo_dsl.diagnostics import Diagnostic, forget_lines
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.spec.load import Settings
 from tests.check.examples import FILES, SPEC
 
 WAYS = ("network", "host", "hil")
@@ -113,7 +114,11 @@ def repository(folder: Path, files: Mapping[str, str] = {}) -> Path:
 
 
 def compiled(
-    root: Path, document: str | Mapping[str, Any] | None = None, way: str = "network", **deployment: Any
+    root: Path,
+    document: str | Mapping[str, Any] | None = None,
+    way: str = "network",
+    settings: Settings = Settings(),  # noqa: B008  (it is frozen)
+    **deployment: Any,
 ) -> Compiled:
     """A test of a repository with a compose file, and with what ``deployment`` says beside it in ``dodo.yml``."""
     if document is not None:
@@ -122,7 +127,7 @@ def compiled(
     (root / "dodo.yml").write_text(written({**_DEPLOYMENT, **rigs, **deployment}))
     forget_lines()
     out = root / "generated"
-    checked = compiler.load([root / "tests" / f"{way}.dodo.yml"], sources=compiler.Sources(root))
+    checked = compiler.load([root / "tests" / f"{way}.dodo.yml"], settings=settings, sources=compiler.Sources(root))
     if not checked.ok:
         return Compiled(out / way, tuple(_told(checked.diagnostics, root)), {}, None)
     made = compiler.plan(checked, out)
