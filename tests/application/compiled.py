@@ -16,6 +16,7 @@ from dodo_dsl import compiler
 from dodo_dsl.diagnostics import Diagnostic, forget_lines
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Plan
+from dodo_dsl.spec.load import Settings
 from tests.check.examples import FILES, SPEC
 
 WAYS = ("network", "host", "hil")
@@ -26,6 +27,7 @@ SERIAL = "/dev/ttyACM7"
 FILE = "docker-compose.yml"
 _RIG = {"kind": "dynamic", "cid": CID, "serial": SERIAL, "camera": {"source": "rpicam"}, "privileged": True}
 _DEPLOYMENT = {"dodo": 1, "registry": ["tests"], "application": FILE, "cids": f"{CID}-149"}
+_HOME = str(Path.home())
 _DEPTH = 2
 """Of the keys of services, and of what volumes, secrets and configs have."""
 _HIL = (
@@ -67,7 +69,7 @@ class Compiled:
         assert self.files, self.told
         found = yaml.safe_load(self.files["application.compose.yml"])
         found.pop("x-shared", None)
-        variables = _dotenv(self.files[".env"])
+        variables = {"HOME": _HOME, **_dotenv(self.files[".env"])}
         made: dict[str, Any] = filled(found, variables)
         for service in made["services"].values():
             for part in (service, service.get("build")):
@@ -94,7 +96,7 @@ class Compiled:
 def repository(folder: Path, files: Mapping[str, str] = {}) -> Path:
     """A repository with three tests, and the ``files`` of an application."""
     root = folder / "team"
-    spec = SPEC.replace("../maps", "maps")
+    spec = SPEC.replace("../maps", "maps").replace("  camera:", "  scene:")
     specs = {
         "network": spec,
         "host": spec.replace("level: sil", "level: sil\nisolation: host"),
@@ -112,7 +114,11 @@ def repository(folder: Path, files: Mapping[str, str] = {}) -> Path:
 
 
 def compiled(
-    root: Path, document: str | Mapping[str, Any] | None = None, way: str = "network", **deployment: Any
+    root: Path,
+    document: str | Mapping[str, Any] | None = None,
+    way: str = "network",
+    settings: Settings = Settings(),  # noqa: B008  (it is frozen)
+    **deployment: Any,
 ) -> Compiled:
     """A test of a repository with a compose file, and with what ``deployment`` says beside it in ``dodo.yml``."""
     if document is not None:
@@ -121,7 +127,7 @@ def compiled(
     (root / "dodo.yml").write_text(written({**_DEPLOYMENT, **rigs, **deployment}))
     forget_lines()
     out = root / "generated"
-    checked = compiler.load([root / "tests" / f"{way}.dodo.yml"], sources=compiler.Sources(root))
+    checked = compiler.load([root / "tests" / f"{way}.dodo.yml"], settings=settings, sources=compiler.Sources(root))
     if not checked.ok:
         return Compiled(out / way, tuple(_told(checked.diagnostics, root)), {}, None)
     made = compiler.plan(checked, out)
@@ -340,4 +346,6 @@ def of_repository(path: str, folder: Path) -> str:
     place = Path(os.path.normpath(folder / path))
     if place == root:
         return "."
+    if place.is_relative_to(_HOME) and not root.is_relative_to(_HOME):
+        return f"~/{place.relative_to(_HOME)}"
     return f"./{place.relative_to(root)}" if place.is_relative_to(root) else str(place)

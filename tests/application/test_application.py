@@ -1,0 +1,338 @@
+"""Applications as a whole: which services start, on which bus, with what; and the files that are read for them."""
+
+import itertools
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dodo_dsl import compiler
+from dodo_dsl.plan.model import ApplicationService
+from tests.application.compiled import FILE, Compiled, compiled, repository
+
+FILES = {"here.py": "", "a.txt": "x", "b.env": "# the other car's\nOD4SESSION_CID=112\n", "data/x": "A=1\n"}
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    root = repository(tmp_path, FILES)
+    (root / "three").touch(0o755)
+    return root
+
+
+def of_services(root: Path, **services: Any) -> Compiled:
+    return compiled(root, {"services": services})
+
+
+def rules(test: Compiled) -> list[tuple[str, str, int]]:
+    return [(told.severity, told.rule, told.line) for told in test.told]
+
+
+def car(**more: Any) -> dict[str, Any]:
+    return {"image": "x", "command": "--cid=111", **more}
+
+
+REFUSED = {
+    "": "application-file",
+    "services: {}\n": "missing-key",
+    "a: 1\n": "missing-key",
+    "- a\n": "wrong-type",
+    "services: {a: 3}\n": "wrong-type",
+    "services: {a: {command: {cid: 1}}}\n": "wrong-type",
+    "services: {a: {command: --cid=1, volumes: {a: b}}}\n": "wrong-type",
+    "services: {a: {command: --cid=1, x-dodo-process: python x.py}}\n": "wrong-type",
+    "services: {a: {command: --cid=1, x-dodo: {inn: []}}}\n": "unknown-key",
+    "services: {../a: {command: --cid=1}}\n": "wrong-value",
+    "services: {sandbox: {image: x, command: --cid=1}}\n": "application-file",
+    "services: {dodo-clock: {image: x, command: --cid=1}}\n": "application-file",
+    "services: {a: {image: x}}\n": "application-cid",
+    "services: {a: {image: x}, a: {image: y}}\n": "duplicate-key",
+    "services: {a: {image: x, profiles: [p]}}\n": "application-file",
+    "services: {a.b: {image: x, command: --cid=1}, a-b: {image: y}}\n": "application-file",
+    "services: {a: {image: x, depends_on: [b]}, b: {image: x, links: [c]}, c: {image: x, network_mode: 'service:a'}}\n": (
+        "application-file"
+    ),
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_is_no_application(text: str, root: Path) -> None:
+    test = compiled(root, text)
+    assert REFUSED[text] in [told.rule for told in test.told]
+    assert test.errors or REFUSED[text] == "application-cid"
+
+
+HUGE = {
+    "a string": {"a": {"image": "x", "command": "--cid={" * 100_000}},
+    "many services": {f"s{n}": {"image": "x", "depends_on": [f"s{n + 1}"]} for n in range(3_000)},
+    "a chain": {f"s{n}": {"image": "x", "extends": f"s{n + 1}", "environment": [f"A{n}=1"]} for n in range(2_000)},
+    "many copies": {
+        "s": {"image": "x", "environment": [f"A{n}=1" for n in range(5_000)]},
+        **{f"s{n}": {"image": "x", "extends": "s"} for n in range(2_000)},
+    },
+}
+
+
+@pytest.mark.parametrize("services", HUGE.values(), ids=HUGE)
+@pytest.mark.thorough
+def test_what_would_grow_without_end_is_refused(services: dict[str, Any], root: Path) -> None:
+    assert "too-large" in {told.rule for told in compiled(root, json.dumps({"services": services})).errors}
+
+
+def test_services_that_extend_one_another_without_end(root: Path) -> None:
+    chain = {one: {"image": "x", "extends": other} for one, other in itertools.pairwise("abcdefghijklm")}
+    assert of_services(root, **chain, m=car()).errors
+
+
+def test_services_that_do_not_start(root: Path) -> None:
+    off = {"b": {"profiles": ["car", "lab"]}, "c": {"scale": 0}, "d": {"deploy": {"replicas": 0}}}
+    waiting = car(depends_on=["b", "c", "e"])
+    test = of_services(root, a=waiting, e=car(), **{name: {"image": "x", **why} for name, why in off.items()})
+    assert test.told == ()
+    assert list(test.services) == ["a", "e"]
+    assert not set(test.services["a"]["depends_on"]) & set(off)
+
+
+@pytest.mark.parametrize(
+    ("service", "rule"),
+    [
+        ({"x-dodo-process": ["python", "drive.py"]}, "application-file"),
+        ({"x-dodo-process": ["python", "here.py"]}, ""),
+        ({"x-dodo-process": ["python", "-m", "drive"]}, ""),
+        ({"x-dodo-process": ["./drive"]}, "application-file"),
+        ({"x-dodo-process": ["build/drive"], "build": "."}, ""),
+        ({"x-dodo-process": ["python here.py"]}, "application-file"),
+        ({"x-dodo-process": ["here.py"]}, "application-file"),
+        ({"x-dodo-process": ["pyhton", "here.py"]}, "application-file"),
+        ({"x-dodo-process": ["./here.py"]}, "application-file"),
+        ({"x-dodo-process": ["./three"]}, ""),
+        ({"build": "."}, ""),
+        ({"build": "away"}, "application-file"),
+        ({"build": {"context": "${FOLDER:-data}"}}, ""),
+        ({"env_file": ["gone.env", {"path": "b.txt", "required": False}]}, "application-file"),
+        ({"image": "r.x:5/a/B"}, "application-file"),
+        ({"hostname": "h" * 65}, "application-file"),
+        ({"hostname": "h" * 64}, ""),
+        ({"volumes": ["v:/d"]}, "application-file"),
+        ({"volumes": ["./a.txt:/opt/x:ro"], "x-dodo-process": ["./three"]}, "application-file"),
+        ({"volumes": [".:/app", "/tmp:/tmp"], "x-dodo-process": ["./three"]}, ""),
+        ({"depends_on": {"b": {"condition": "service_healthy"}}}, "application-file"),
+    ],
+)
+def test_what_is_missing(service: dict[str, Any], rule: str, root: Path) -> None:
+    """Each at a line of the service; what an image may have is a warning."""
+    healthless = car(healthcheck={"disable": True})
+    told = of_services(root, a=car(**service), b=healthless).told
+    assert [one.rule for one in told] == ([rule] if rule else [])
+    assert all(2 < one.line < 3 + len(car(**service)) for one in told)
+
+
+CIDS = (
+    ({"command": "--cid=112"}, "own"),
+    ({"command": "prog --cid 112"}, "own"),
+    ({"command": ["--cid", "112"]}, "own"),
+    ({"entrypoint": ["sh", "-c", 'exec prog --cid="112" | tee log']}, "own"),
+    ({"command": "--cid=${CID:-112}"}, "own"),
+    ({"command": ["sh", "-c", "prog --cid=$${NUMBER:-111}"], "environment": ["NUMBER=112"]}, "own"),
+    ({"environment": {"CID": 112}}, "own"),
+    ({"environment": {"FLAGS": "--cid=112 --freq=10"}}, "own"),
+    ({"env_file": "b.env"}, "own"),
+    ({"env_file": [{"path": "b.env", "format": "raw"}]}, "own"),
+    ({"x-dodo-process": ["./three", "--cid=112"]}, "own"),
+    ({"x-dodo": {"cid": 112}}, "own"),
+    ({"command": "--cid=111 --cid-to=112"}, "bridge"),
+    ({"command": "--cid=112", "environment": {"CID": 111}}, "bridge"),
+    ({"command": "--cid=0111"}, ""),
+    ({"command": "--cid=${CID}"}, ""),
+    ({"command": "--cid=${CID:-111}", "environment": {"OTHER_CIDS": 112}}, ""),
+    ({"command": "--freq=112"}, ""),
+    ({"image": "opendlv-vehicle-view", "command": "--cid=112"}, "stack"),
+    ({"command": 'sh -c "cluon-OD4toStdout --cid=112 > log"'}, "stack"),
+)
+"""Services beside one on CID 111: on a bus of their own, on both, or neither."""
+
+
+@pytest.mark.parametrize(("service", "kind"), CIDS)
+def test_a_test_has_one_bus(service: dict[str, Any], kind: str, root: Path) -> None:
+    test = of_services(root, a=car(), b={"image": "y", **service})
+    told = [(one.severity, one.rule) for one in test.told if one.rule in ("application-cid", "application-stack")]
+    cid = "application-cid"
+    expected = {"own": [("error", cid)], "bridge": [("warning", cid)], "stack": [("warning", "application-stack")]}
+    assert told == expected.get(kind, [])
+
+
+def test_what_is_on_both_buses_joins_them(root: Path) -> None:
+    on = {"a": "--cid=111", "relay": "--cid-from=112 --cid-to=111", "b": "--cid=112", "c": "--cid=113"}
+    test = of_services(root, **{name: {"image": "x", "command": words} for name, words in on.items()})
+    assert [(severity, line) for severity, _, line in rules(test)] == [("warning", 5), ("error", 11)]
+
+
+@pytest.mark.parametrize(
+    ("service", "takes_cid"),
+    [
+        ({"command": "prog"}, False),
+        ({"command": "prog --cid=111"}, True),
+        ({"entrypoint": ["prog", "--cid", "1"]}, True),
+        ({"environment": ["OD4SESSION_CID=111"]}, True),
+        ({"environment": {"ARGUMENTS": "--cid=3"}}, True),
+        ({"environment": {"OTHER": 1}}, False),
+    ],
+)
+def test_a_cid_that_can_be_set(service: dict[str, Any], takes_cid: bool, root: Path) -> None:
+    test = of_services(root, a={"image": "x", **service})
+    assert [rule for _, rule, _ in rules(test)] == [] if takes_cid else ["application-cid"]
+
+
+def planned(test: Compiled) -> dict[str, ApplicationService]:
+    assert test.plan is not None, test.told
+    return {service.name: service for service in test.plan.application.services}
+
+
+def test_processes(root: Path) -> None:
+    """What a service is without its container, from the same file."""
+    lines = [{"match": "(?P<position>.)$$", "message": "opendlv.proxy.PedalPositionRequest", "sender": 2}]
+    own = {"in": ["opendlv.proxy.ImageReading"], "out": ["opendlv.proxy.GroundSteeringRequest"], "lines": lines}
+    command = "here.py --cid=111 --name=video0.argb"
+    one = car(command=command, **{"x-dodo-process": ["python", "here.py"], "x-dodo": own})
+    found = planned(of_services(root, a=one, b={"image": "x", "environment": ["OD4SESSION_CID=111", "GAIN=2"]}))
+    assert found["a"].process == ("python", "here.py")
+    assert found["a"].command == ("--cid=140", "--name=video0.argb")
+    assert (found["a"].takes_cid, found["a"].takes_memory) == (True, True)
+    assert found["a"].inputs == ("opendlv.proxy.ImageReading",)
+    assert set(found["a"].outputs) == {"opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest/2"}
+    assert [(line.match, line.sender) for line in found["a"].lines] == [("(?P<position>.)$", 2)]
+    assert (found["b"].process, found["b"].environment) == (None, {"OD4SESSION_CID": "140", "GAIN": "2"})
+
+
+def test_what_starts_before_a_service(root: Path) -> None:
+    """By the conditions of ``depends_on``, and where it joins another one."""
+    healthy, ended = {"condition": "service_healthy"}, {"condition": "service_completed_successfully"}
+    found = planned(
+        of_services(
+            root,
+            a=car(depends_on=["b"], network_mode="service:c", links=["d:x"]),
+            b=car(depends_on={"c": {**healthy, "required": False}, "gone": {"condition": "service_started"}}),
+            c=car(depends_on={"d": ended}, healthcheck={"test": "x"}),
+            d=car(),
+            gone=car(profiles=["view"]),
+        )
+    )
+    started = "service_started"
+    assert {name: service.after for name, service in found.items()} == {
+        "a": {"c": started, "d": started, "b": started},
+        "b": {"c": "service_healthy"},
+        "c": {"d": "service_completed_successfully"},
+        "d": {},
+    }
+    assert {name: service.optional for name, service in found.items() if service.optional} == {"b": ("c",)}
+
+
+def test_its_time_is_the_test_s(root: Path) -> None:
+    """Also where variables are a list; what the file sets itself stays."""
+    own = {"a": car(environment={"A": "1"}), "b": car(environment=["OMP_NUM_THREADS=4", "LD_PRELOAD=/own.so"])}
+    test = compiled(root, {"services": own}, settings=compiler.Settings(clock="virtual"))
+    for number, service in enumerate(test.services.values()):
+        assert service["pid"] == "service:sandbox"
+        assert "dodo-time:/opt/dodo/time:ro" in service["volumes"]
+        assert service["environment"]["DODO_TIME_SERVICE"] == str(number)
+    assert test.services["b"]["environment"]["LD_PRELOAD"] == "/opt/dodo/time/libdodo-time.so:/own.so"
+    assert test.services["b"]["environment"]["OMP_NUM_THREADS"] == "4"
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("TAG=v1", True),
+        ("UNUSED=x", False),
+        ("TAG=x://a:b@c", False),
+        ("TAG_TOKEN=x", False),
+        ("DODO_SUBNET=x\nCOMPOSE_FILE=y", False),
+    ],
+)
+def test_what_a_compiled_test_has_of_the_variables(line: str, named: bool, root: Path) -> None:
+    (root / ".env").write_text(f"{line}\n")
+    test = of_services(root, a=car(image="driver:${TAG:-0}"))
+    value = line.partition("=")[2].partition("\n")[0]
+    lines = [
+        one
+        for text in test.files.values()
+        for one in text.splitlines()
+        if one.endswith((f"={value}", f":{value}", f'"{value}"'))
+    ]
+    assert bool(lines) == named
+
+
+@pytest.mark.parametrize(
+    ("service", "env", "named"),
+    [
+        ({"command": "--cid=111 --a=${API_KEY} --b=$CI_X"}, "", ["API_KEY", "CI_X"]),
+        ({"command": ["--cid=111", "${A:-${API_KEY}}", "${API_KEY}"]}, "", ["API_KEY"]),
+        ({"command": "sh -c 'echo --cid=111 $${API_KEY}'"}, "", []),
+        ({"environment": ["API_KEY", "SPEED", "A_TOKEN=1"]}, "", ["API_KEY"]),
+        ({"environment": {"API_KEY": None, "A_TOKEN": "x"}}, "", ["API_KEY"]),
+        ({"build": {"context": ".", "args": ["API_KEY"]}}, "", ["API_KEY"]),
+        ({"environment": ["DATABASE", "HOME", "SPEED"]}, "", ["DATABASE"]),
+        ({"environment": ["PASSED"]}, "", []),
+        ({"environment": {"A": "${OWN}"}}, "OWN=1", []),
+    ],
+)
+def test_variables_of_the_host_are_named(
+    service: dict[str, Any], env: str, named: list[str], root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a warning each where the application may not have them."""
+    for name, value in {"DATABASE": "x://a:s3cr3t@b", "PASSED": "1"}.items():
+        monkeypatch.setenv(name, value)
+    (root / ".env").write_text(f"{env}\n")
+    test = compiled(root, {"services": {"a": car(**service)}}, environment=["PASSED"])
+    told = [one for one in test.told if one.rule == "application-secret"]
+    assert [one.text.split("'")[1] for one in told] == named
+    assert "s3cr3t" not in "".join(one.text for one in told)
+
+
+def test_links_are_not_followed(root: Path, tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("CID=1\nPASSWORD=h1dd3n\nservices: {a: {image: secret}}\n")
+    for name in (".env", "common.yml"):
+        (root / name).symlink_to(tmp_path / "secret")
+    test = of_services(root, b=car())
+    assert test.told == () and "h1dd3n" not in "".join(test.files.values())
+    assert of_services(root, b=car(extends={"file": "common.yml", "service": "a"})).errors
+
+
+def test_the_repository_is_where_git_and_dodo_yml_are(root: Path) -> None:
+    """Not the folder of the compose file alone."""
+    (root / "sub").mkdir()
+    (root / "sub" / FILE).write_text(json.dumps({"services": {"a": car(volumes=["../data:/d:ro"])}}))
+    test = compiled(root, application=f"sub/{FILE}")
+    assert (test.told, test.services["a"]["volumes"]) == ((), ["./data:/d:ro"])
+
+
+@pytest.mark.parametrize("holder", ["tests", ".git", "generated", "dodo-report"])
+@pytest.mark.parametrize(
+    "document",
+    [
+        {"services": {"a": car(volumes=["./FOLDER/x:/x:ro"])}},
+        {"services": {"a": car(env_file="FOLDER/x")}},
+        {"services": {"a": car(build="FOLDER")}},
+        {"services": {"a": car(configs=["c"])}, "configs": {"c": {"file": "FOLDER/x"}}},
+        {"services": {"a": car(secrets=["c"])}, "secrets": {"c": {"file": "./FOLDER/x"}}},
+        {"services": {"a": car(volumes=["./link/x:/x"])}},
+    ],
+    ids=["volume", "env_file", "build", "config", "secret", "link"],
+)
+def test_what_no_application_sees(document: dict[str, Any], holder: str, root: Path) -> None:
+    (root / holder).mkdir(exist_ok=True)
+    (root / holder / "x").write_text("A=1\n")
+    (root / "link").symlink_to(holder)
+    text = json.dumps(document)
+    assert compiled(root, text.replace("FOLDER", holder)).errors
+    (root / "link").unlink()
+    (root / "link").symlink_to("data")
+    assert compiled(root, text.replace("FOLDER", "data")).errors == []
+
+
+def test_a_name_that_is_too_long_for_the_engine(root: Path) -> None:
+    """A volume's has the test's slug in it; a service's is a host's."""
+    assert of_services(root, **{"n" * 64: car()}).errors
+    document = {"services": {"a": car()}, "volumes": {"n" * 240: {}}}
+    assert [told.rule for told in compiled(root, document).errors] == ["application-file"]
