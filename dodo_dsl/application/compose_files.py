@@ -16,6 +16,8 @@ TEST_FILLED = ("command", "entrypoint", "environment", "healthcheck")
 """The keys of a service whose variables a test may set, so that they are filled in for each test."""
 _FILLED = ("services", "volumes", "networks", "secrets", "configs", "include")
 """The top-level keys below which compose fills in variables."""
+_FOLDERS = {"PWD": ".", "HOME": "~"}
+"""Variables that stand for folders, in keys that hold paths."""
 _LATE = ("PATH",)
 _IMAGES = "DODO_IMAGE_"
 """How variables begin by which a pipeline sets images."""
@@ -42,7 +44,7 @@ class ComposeFiles:
         self._roots = roots
         self.passed = passed
         self.problems: list[Diagnostic] = []
-        self.known: dict[str, str] = {"PWD": "."}
+        self.known: dict[str, str] = {}
         self.secrets: dict[str, Path] = {}
         self.written: dict[Span, str] = {}
         self._of: dict[str, Path] = {}
@@ -123,7 +125,7 @@ class ComposeFiles:
         if slip := slip_in(node.value):
             self.problems.append(Diagnostic(node.span, "application-file", *slip))
         self.written[node.span] = node.value
-        text = filled(node.value, self.known, self.is_late) if is_filled else node.value
+        text = filled(node.value, {**_FOLDERS, **self.known}, self.is_late) if is_filled else node.value
         return replace(node, value=text, text=text)
 
     def other(self, word: Scalar, folder: Path) -> Path | None:

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application import compose_paths
+from dodo_dsl.application import compose_paths, secret_variables
 from dodo_dsl.application.container import TOP_LEFT_OUT, Container
 from dodo_dsl.application.interpolation import interpolate
-from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.model import ApplicationSource, ComposeService, is_true
 from dodo_dsl.application.mounts import COPY, nested, own_name, volume
 from dodo_dsl.application.part import Part
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
@@ -73,7 +73,8 @@ class Construction:
         self.volumes = {name: volume(self, name, node, span) for name, node, span in self._named("volumes")}
 
     def _named(self, key: str) -> Iterator[tuple[str, Node, Span]]:
-        node = self.application.rest.get(key)
+        top = self.application.top.get(key)
+        node = top.value if top else None
         for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
             yield name, entry.value, entry.key
 
@@ -137,19 +138,29 @@ class Construction:
         variable = of.literal(fields["environment"]) if "environment" in fields else None
         if variable and self.application.is_late(variable):
             return {"environment": variable}
-        if variable:
-            message = f"{what} is '{variable}', which belongs to DoDo's environment and not to the application"
+        if variable and secret_variables.is_of_pipeline(variable):
+            message = f"{what} is '{variable}', which belongs to the pipeline and not to the application"
             hint = f"to allow it, write environment: [{variable}] in dodo.yml"
             of.refuse(fields["environment"].span, message, hint)
-        return {}
+        return {"file": "/dev/null"}
 
     def check(self) -> list[Diagnostic]:
         """The problems of everything but the services, which are made already."""
         self.rest()
         self._top()
+        self._networks()
         for span, message, hint in nested(self):
             self.problems.append(Diagnostic(span, "application-isolation", message, hint))
         return self.problems
+
+    def _networks(self) -> None:
+        known = "attachable driver driver_opts enable_ipv4 enable_ipv6 external internal ipam labels name"
+        for name, node, span in self._named("networks"):
+            fields = self.about(name, span).fields(node, f"the network '{name}'", known)
+            external = fields.get("external")
+            if isinstance(external, Mapping) or (isinstance(external, Scalar) and is_true(external.value)):
+                message = f"the network '{name}' is external, and a test has its own network only"
+                self.problems.append(Diagnostic(span, "application-key", message, severity="warning"))
 
     def _top(self) -> None:
         known = ("services", "include", *_NAMED, *TOP_LEFT_OUT, *_REFUSED)

@@ -185,7 +185,8 @@ def _carried(of: "Container", mount: Mount) -> Mount | None:
     about = known[mount.source]
     is_read = mount.read_only or "ro" in str(about.made.get("driver_opts", {}).get("o")).split(",")
     of.project.show(about.device, about.span, "" if is_read else of.name)
-    return replace(mount, source=own_name(mount.source))
+    own = own_name(mount.source)
+    return replace(mount, source=own, nocopy=mount.nocopy or own in of.project.copies)
 
 
 def _bound(of: "Container", mount: Mount) -> Mount | None:
