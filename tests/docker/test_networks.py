@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.model import Access
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Application, Plan
 from tests.docker.compose import IMAGE, Crate

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.model import Access
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan
 from dodo_dsl.run.application_files import files_of_tests

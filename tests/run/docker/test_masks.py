@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.application.access.host_paths import HostPaths
+from dodo_dsl.application.host_paths import HostPaths
 from dodo_dsl.plan.model import Application
 from dodo_dsl.run.application_files import hidden_paths
 from dodo_dsl.run.docker.compose import absent, masks

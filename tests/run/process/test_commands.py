@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.access.model import Access
+from dodo_dsl.application.model import Access
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Application, Plan, PlannedService
-from dodo_dsl.plan.rewrite.rewrite import plan_application
-from dodo_dsl.plan.rewrite.service_copy import Setting
+from dodo_dsl.plan.application import plan_application
+from dodo_dsl.application.construction import Setting
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
 from tests.run import scripted
