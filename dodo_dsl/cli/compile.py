@@ -17,9 +17,9 @@ from dodo_dsl import __version__, atomic, package_data
 from dodo_dsl.check import catalogue
 from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
-from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError
+from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.numbers import patience, positive
-from dodo_dsl.compiler import Checked, NoApplication, plan
+from dodo_dsl.compiler import Checked, plan
 from dodo_dsl.diagnostics import (
     Diagnostic,
     Fix,
@@ -277,9 +277,9 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
-    sound = checked if checked.ok else checked.sound()
-    if sound.ok and sound.application is not None and sound.specs:
-        searches = _searches(options) if sound is checked else []
+    sound = checked.sound()
+    if sound.specs:
+        searches = _searches(options) if checked.ok else ()
         made = plan(sound, options.output, searches, pipeline_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
@@ -325,10 +325,7 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     if not checked.ok:
         _show(list(checked.diagnostics), options.format, checked, stdout, stderr)
         return Exit.USAGE
-    try:
-        made = plan(checked, options.output, _searches(options), jobs)
-    except NoApplication:
-        raise UsageError(NO_APPLICATION) from None
+    made = plan(checked, options.output, _searches(options), jobs)
     diagnostics = ordered([*checked.diagnostics, *made.problems])
     _show(diagnostics, options.format, checked, stdout, stderr)
     if has_errors(diagnostics):

@@ -102,12 +102,6 @@ def read_only(volume: Any) -> Any:
     return ":".join([source, *target, ",".join([*words, "ro"])]) if target else volume
 
 
-_LONGEST = 255
-"""Characters of a volume's name on the engine: it is a folder's."""
-_MARK = "xxxxxx"
-"""Stands for what distinguishes projects of one test."""
-
-
 def own_mounts(copy: ServiceCopy) -> None:
     volumes = copy.service.get("volumes")
     if not isinstance(volumes, list):
@@ -186,11 +180,6 @@ def _to_read(about: Any, paths: HostPaths) -> str:
         return ""
     words = (word.strip() for word in host_access.volume_options(about))
     return ",".join([*(word for word in words if word not in ("", "ro", "rw")), "ro"])
-
-
-def too_long(slug: str, volumes: Iterable[str]) -> str:
-    """A volume whose name in the test's project is longer than the engine takes; empty without one."""
-    return next((name for name in volumes if len(f"dodo-{slug}-{_MARK}_{name}") > _LONGEST), "")
 
 
 def own_volumes(volumes: Any, changes: MutableSequence[str], project: ComposeProject) -> dict[str, Any]:

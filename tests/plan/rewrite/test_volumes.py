@@ -8,7 +8,7 @@ import pytest
 
 from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.plan.rewrite.service_copy import Setting
-from dodo_dsl.plan.rewrite.volumes import FileCopies, own_mounts, own_name, own_volumes, too_long
+from dodo_dsl.plan.rewrite.volumes import FileCopies, own_mounts, own_name, own_volumes
 from tests.plan.rewrite.copies import FOLDER, copy, project
 
 PROJECT = project(Setting(140, "network", FOLDER))
@@ -136,8 +136,3 @@ def test_copies_of_long_forms_and_of_volumes(team: Path) -> None:
 def test_volumes_that_nobody_knows_are_only_read() -> None:
     unknown = {"vol": {"driver_opts": {"o": "bind,rw", "type": "none", "device": "${X}"}}}
     assert own_volumes(unknown, [], PROJECT)["vol"]["driver_opts"]["o"] == "bind,ro"
-
-
-def test_names_that_are_too_long_for_the_engine() -> None:
-    names = {"short": {}, "n" * 63: {}}
-    assert (too_long("t" * 179, names), too_long("t" * 180, names)) == ("", "n" * 63)
