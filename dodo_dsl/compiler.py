@@ -29,7 +29,7 @@ from dodo_dsl.spec.rig import PORT
 from dodo_dsl.spec.vary import Values
 
 if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it takes as long as the rest
-    from dodo_dsl.emit.pipeline import SearchJobs
+    from dodo_dsl.emit.pipeline import Pipeline, SearchJobs
     from dodo_dsl.emit.pipeline_jobs import JobOptions
     from dodo_dsl.emit.render import File
     from dodo_dsl.plan.build import Compiled
@@ -116,9 +116,10 @@ class Checked:
 
 @dataclass(frozen=True)
 class Compilation:
-    """Everything to be written: Plans with the files they need, and the child pipeline. Empty when there are errors."""
+    """Everything to be written: Plans with the files they need, and the child pipeline with its ``jobs``."""
 
     compiled: "Compiled"
+    jobs: "Pipeline"
     pipeline: "File"
     problems: tuple[Diagnostic, ...]
 
@@ -255,7 +256,7 @@ def plan(
     The pipeline has the jobs of ``searches``, too, and ``options`` hold for all its jobs.
     """
     from dodo_dsl.emit.output_folder import pipeline_folder
-    from dodo_dsl.emit.pipeline import artifact_problems, pipeline_problems
+    from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_problems
     from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS
     from dodo_dsl.emit.render import render_pipeline
     from dodo_dsl.plan.build import build
@@ -267,12 +268,13 @@ def plan(
     compiled = build(
         checked.tests, checked.manifests, deployment, application, out.resolve(), settings, options.from_repository
     )
-    child = render_pipeline(compiled.suite, pipeline_folder(out), searches, options)
+    jobs = pipeline(compiled.suite, pipeline_folder(out), searches, options)
+    child = render_pipeline(jobs)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    limits = pipeline_problems(compiled.suite, child.text, searches, options)
+    limits = pipeline_problems(compiled.suite, jobs, child.text)
     problems = [
         replace(problem, span=replace(problem.span, file=shown.get(problem.span.file, problem.span.file)))
         for problem in [*limits, *artifact_problems(compiled, options)]
     ]
-    return Compilation(compiled, child, tuple(ordered(problems)))
+    return Compilation(compiled, jobs, child, tuple(ordered(problems)))

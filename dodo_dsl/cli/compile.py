@@ -19,7 +19,7 @@ from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.numbers import patience, positive
-from dodo_dsl.compiler import Checked, plan
+from dodo_dsl.compiler import Checked, Compilation, plan
 from dodo_dsl.diagnostics import (
     Diagnostic,
     Fix,
@@ -35,8 +35,6 @@ from dodo_dsl.diagnostics import (
 )
 from dodo_dsl.emit.output_folder import add_images, differences, stale_folders, write
 from dodo_dsl.emit.pipeline import SearchJobs
-from dodo_dsl.emit.pipeline_jobs import JobOptions
-from dodo_dsl.plan.model import Suite
 from dodo_dsl.terminal import WIDE, json_text, printable
 
 Fixes = dict[Span, Fix]
@@ -330,7 +328,7 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     _show(diagnostics, options.format, checked, stdout, stderr)
     if has_errors(diagnostics):
         return Exit.USAGE
-    expected = _forecast(made.compiled.suite, jobs, options)
+    expected = _forecast(made, options)
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output)
     if options.images:
@@ -353,15 +351,16 @@ def _searches(options: argparse.Namespace) -> tuple[SearchJobs, ...]:
     return search_jobs(options.search, options.workers or _WORKERS, options.application)
 
 
-def _forecast(suite: Suite, jobs: JobOptions, options: argparse.Namespace) -> str:
+def _forecast(made: Compilation, options: argparse.Namespace) -> str:
     """How long the pipeline or its longest job takes, if that is wanted; raises UsageError for what has no times."""
+    suite = made.compiled.suite
     if not (options.forecast or options.jobs) or not suite.plans:
         return ""
     from dodo_dsl.cli.forecast import forecast_text, packing_text
 
     if options.forecast:
-        return forecast_text(suite, options.forecast, jobs, options.overhead)
-    return packing_text(suite, jobs)
+        return forecast_text(suite, made.jobs, options.forecast, options.overhead)
+    return packing_text(suite, made.jobs)
 
 
 def _count(number: int, what: str = "test") -> str:

@@ -166,26 +166,8 @@ class _Builder:
         automatic = tuple(self._automatic())
         services = (*automatic, *(self._service(service) for service in self.test.services))
         evaluators = tuple(s.name for s in services if s.judge)
-        for key in (
-            "name",
-            "level",
-            "kind",
-            "timeout",
-            "clock",
-            "rig",
-            "matrix",
-            "vary",
-            "seed",
-            "isolation",
-            "pose",
-            "record",
-            "response",
-            "resources",
-            "goals",
-            "baseline",
-        ):
-            if key in spec.spans:
-                self._place(key, spec.span(key))
+        for key, span in spec.spans.items():
+            self._place(key, span)
         isolated = isolation(spec, rig)
         setting = Setting(
             self.cid,

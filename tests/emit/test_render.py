@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from dodo_dsl import compiler, source
-from dodo_dsl.emit.pipeline import CHILD, SearchJobs
+from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.emit.render import _templates, render_pipeline, render_plan
 from dodo_dsl.plan.model import Suite
 from tests.emit.readers import ROOT, tree
@@ -40,7 +40,7 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     files[SUMMARY] = yaml.safe_dump(summaries, sort_keys=False, width=150)
     searched = made.compiled.suite.plans[-1]
     search = SearchJobs(searched.name, searched.slug, 4, ("docker-compose.yml",))
-    files[SEARCH] = render_pipeline(Suite((searched,)), "generated", [search]).text
+    files[SEARCH] = render_pipeline(pipeline(Suite((searched,)), "generated", [search])).text
     if update_goldens:
         shutil.rmtree(GOLDEN, ignore_errors=True)
         for path, text in files.items():
