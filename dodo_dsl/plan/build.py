@@ -29,7 +29,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.model import VIRTUAL
+from dodo_dsl.spec.model import LAYERS, VIRTUAL
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.values import default_value
@@ -167,7 +167,8 @@ class _Builder:
         services = (*automatic, *(self._service(service) for service in self.test.services))
         evaluators = tuple(s.name for s in services if s.judge)
         for key, span in spec.spans.items():
-            self._place(key, span)
+            if key not in LAYERS:
+                self._place(key, span)
         isolated = isolation(spec, rig)
         setting = Setting(
             self.cid,
