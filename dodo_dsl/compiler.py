@@ -107,6 +107,8 @@ class Checked:
 
     def sound(self) -> "Checked":
         """The same with the tests that can be planned: those without errors, none where what all have has some."""
+        if self.ok and self.application:
+            return self
         found = (*self.problems.as_read.items(), *self.problems.by_rules.items())
         broken = {path for path, problems in found if has_errors(problems)}
         kept = narrowed(self, [spec for spec in self.specs if spec.path not in broken])

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.spec.arguments import Argument
+from dodo_dsl.spec.manifest import Parameter
 
 MAX_FILES = 5_000
 MAX_BYTES = 2 << 30
@@ -19,23 +19,25 @@ def check_needed_files(context: RuleContext) -> Iterator[Diagnostic]:
     root = context.spec.location.root
     for service in context.services:
         for argument in service.arguments.values():
-            found = needed(argument, root)
-            if argument.entry and isinstance(found, str):
-                yield Diagnostic(argument.entry.key, "path-escape", found)
+            if argument.entry and argument.value and argument.value.path:
+                found = needed(argument.parameter, argument.value.path, root)
+                if isinstance(found, str):
+                    yield Diagnostic(argument.entry.key, "path-escape", found)
 
 
-def needed(argument: Argument, root: Path) -> Mapping[str, Path] | str:
-    """The real paths of the files that a written path names, by where they lie below ``root``, or what is wrong."""
-    path = argument.value.path if argument.entry and argument.value else None
-    if path is None:
-        return {}
-    is_map = argument.parameter.format == "map" and path.suffix == ".json"  # its meshes stand beside it
-    return files(path.parent if is_map else path, root.resolve())
+def needed(parameter: Parameter, path: Path, root: Path) -> Mapping[str, Path] | str:
+    """The files that a parameter's path needs."""
+    is_map = parameter.format == "map" and path.suffix == ".json"  # its meshes stand beside it
+    return files(path.parent if is_map else path, root)
 
 
 @functools.lru_cache(maxsize=256)
 def files(path: Path, root: Path) -> Mapping[str, Path] | str:
-    """The file, or the files of the folder, without hidden ones."""
+    """The real paths of the file, or of all in the folder but hidden ones, by where they lie below ``root``.
+
+    Or what is wrong with them.
+    """
+    root = root.resolve()
     found: dict[str, Path] = {}
     size = 0
     for file in (path,) if path.is_file() else sorted(path.rglob("*")):

@@ -28,7 +28,7 @@ from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
-from dodo_dsl.spec.manifest import Manifest
+from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import LAYERS, VIRTUAL
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -298,18 +298,18 @@ class _Builder:
         if value is None:
             return None
         if value.path is not None and entry:
-            return self._file_flag(argument, value.path)
+            return self._file_flag(argument.parameter, value.path)
         return Flag(argument.parameter.name, value.text, value.kind)
 
-    def _file_flag(self, argument: Argument, path: Path) -> Flag:
+    def _file_flag(self, parameter: Parameter, path: Path) -> Flag:
         root = self.spec.location.root
-        found = needed(argument, root)
+        found = needed(parameter, path, root)
         if isinstance(found, str):
             raise FilesError(found)
         self.files.update(itertools.starmap(FileCopy, found.items()))
         if not self.application.folder.resolve().is_relative_to(path.resolve()):
             self.named.update(found.values())
-        return Flag(argument.parameter.name, path.relative_to(root.resolve()).as_posix(), "path")
+        return Flag(parameter.name, path.relative_to(root.resolve()).as_posix(), "path")
 
 
 def _leaving_out(flag: Flag, messages: Sequence[str]) -> Flag:
