@@ -1,7 +1,7 @@
 """Rules on all tests together, whatever else is wrong with some of them.
 
-``out-of-cids``: tests on the host's network have CIDs of their own. ``out-of-range``: the deployment's network has room
-for a test. ``application-file``: the engine takes the names of volumes.
+``out-of-cids``: no two tests on the host's network share a CID. ``out-of-range``: the deployment's network has room for
+a test. ``application-file``: the engine takes the names of volumes.
 """
 
 from collections.abc import Iterator, Sequence

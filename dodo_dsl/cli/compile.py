@@ -114,7 +114,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     display.add_verbosity(parser, "print only problems, and what is stale", "also print the name of each test")
     parser.add_argument("--fix", action="store_true",
                         help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
-    parser.add_argument("--format", choices=FORMATS, default="text",
+    parser.add_argument("--format", choices=tuple(FORMATS), default="text",
                         help="format of diagnostics (default: text); with gitlab the text goes to stderr")  # fmt: skip
     parser.add_argument(
         "--forecast", type=positive, metavar="R", help="show the duration of the pipeline with R runners"
