@@ -4,8 +4,7 @@ The tests are copies of the shipped ones, with their matrices and with what they
 one, makes a mistake and fixes it again, text by text: a key is answered when the problems are shown, or shown to be
 gone. The peer is what editors otherwise check a test with: it knows the schema alone, and one file at a time, where
 ``dodo lsp`` checks wiring, maps and all other tests, too. Both wait a moment for the next key, 0.05 and 0.2 s, which is
-part of the figures, as an editor's user waits for it, too. The keys "after a pause" come when all tests are being
-planned together, which begins half a second after a key.
+part of the figures, as an editor's user waits for it, too.
 """
 
 import shutil
@@ -30,12 +29,11 @@ OWN = ROOT / "build" / "bench" / "node" / "node_modules" / ".bin" / SERVER
 """Where scripts/install-bench-tools puts it."""
 PEER = str(OWN) if OWN.is_file() else shutil.which(SERVER)
 NO_PEER = f"{SERVER} is not installed (scripts/install-bench-tools, with npm)"
-TESTS, ROUNDS, KEYS, PAUSES = 100, 5, 10, 2
-PAUSE_S = 0.8
+TESTS, ROUNDS, KEYS = 100, 5, 10
 GOAL = Goal(0.2, of="value")
 OPENED = "sil-closed-straight-1"
 MISTAKE = ("timeout: 60 s", "timeot: 60 s")
-KEY, LATE, AFTER_PAUSE = "problems after a key", "problems after a key, 95 %", "problems after a key, after a pause"
+KEY, LATE = "problems after a key", "problems after a key, 95 %"
 
 
 def write_registry(folder: Path) -> Path:
@@ -83,14 +81,6 @@ class Session:
         self.editor.until(answers)
         return time.perf_counter() - begin
 
-    def key_after_a_pause(self) -> float:
-        """As ``key``, for a mistake: only a test without errors is planned."""
-        assert self.shown == self.texts[1]
-        time.sleep(PAUSE_S)
-        found = self.key()
-        self.key()
-        return found
-
 
 @contextmanager
 def peer(folder: Path, path: Path) -> Iterator[Session]:
@@ -106,9 +96,8 @@ Times = dict[str, list[float]]
 
 
 def measure(session: Session, times: Times) -> None:
-    """One round: some keys, some of them after pauses."""
+    """One round: some keys."""
     times.setdefault(KEY, []).extend(session.key() for _ in range(KEYS))
-    times.setdefault(AFTER_PAUSE, []).extend(session.key_after_a_pause() for _ in range(PAUSES))
 
 
 def late(values: Sequence[float]) -> list[float]:
@@ -118,7 +107,7 @@ def late(values: Sequence[float]) -> list[float]:
 def rows(ours: Times, theirs: Times) -> list[Row]:
     """A row for each kind of wait; every value of ours has one of the peer's, if it has an answer at all."""
     made = []
-    for name in (KEY, LATE, AFTER_PAUSE):
+    for name in (KEY, LATE):
         pair = [late(times.get(KEY, ())) if name == LATE else times.get(name, []) for times in (ours, theirs)]
         beside = (SERVER, pair[1]) if pair[1] else ()
         made.append(cost_row(f"editor, {name}", "s", pair[0], *beside, goal=GOAL, note="" if theirs else NO_PEER))
@@ -143,11 +132,10 @@ def _rounds(budget: Budget, sessions: Sequence[tuple[Session, Times]], ours: Tim
         for session, times in sessions if number % 2 else reversed(sessions):
             measure(session, times)
         report(*rows(ours, theirs))
-    for name in (KEY, AFTER_PAUSE):
-        for whose, times in (("ours", ours), ("peer", theirs)):
-            if values := times.get(name):
-                middle, end = statistics.median(values) * 1000, late(values)[0] * 1000
-                print(f"{name:36s} {whose}: {middle:6.0f} ms, 95 % {end:6.0f} ms, of {len(values)}")
+    for whose, times in (("ours", ours), ("peer", theirs)):
+        if values := times.get(KEY):
+            middle, end = statistics.median(values) * 1000, late(values)[0] * 1000
+            print(f"{KEY} {whose}: {middle:6.0f} ms, 95 % {end:6.0f} ms, of {len(values)}")
 
 
 def main() -> int:

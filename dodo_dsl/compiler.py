@@ -15,6 +15,7 @@ from dodo_dsl.check import problems as check_problems
 from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.problems import Problems
 from dodo_dsl.check.resolve import ResolvedTest, resolve
+from dodo_dsl.check.suite_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
@@ -27,7 +28,7 @@ from dodo_dsl.spec.rig import PORT
 from dodo_dsl.spec.vary import Values
 
 if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it takes as long as the rest
-    from dodo_dsl.emit.pipeline import SearchJobs
+    from dodo_dsl.emit.pipeline import Pipeline, SearchJobs
     from dodo_dsl.emit.pipeline_jobs import JobOptions
     from dodo_dsl.emit.render import File
     from dodo_dsl.plan.build import Compiled
@@ -47,8 +48,12 @@ class CheckInputs(NamedTuple):
     application: ApplicationSource | None
 
 
-Ruled = tuple[tuple[ResolvedTest, ...], Mapping[Path, Sequence[Diagnostic]]]
-"""The tests that instances are, and what the rules found, by spec."""
+@dataclass(frozen=True)
+class CheckResult:
+    """The tests that instances are, and what the rules found, by the path of their spec."""
+
+    tests: tuple[ResolvedTest, ...] = ()
+    problems: Mapping[Path, Sequence[Diagnostic]] = field(default_factory=dict)
 
 
 class Sources:
@@ -65,18 +70,19 @@ class Sources:
         once = functools.lru_cache(maxsize=_MOST_READ)(self.read)
         return {location.path: load_spec(location, once) for location in locations}
 
-    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> Ruled:
+    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> CheckResult:
         """Resolves and checks the instances, and those at the ends of their ranges."""
         tests = tuple(resolve(specs, *inputs))
-        return tests, check(tests, *inputs, resolve(corners, *inputs))
+        return CheckResult(tests, check(tests, *inputs, resolve(corners, *inputs)))
 
 
 @dataclass(frozen=True)
 class Checked:
     """Tests with everything that was found wrong with them, sorted by place.
 
-    ``problems`` are all that were found when the tests were loaded. ``unasked`` are the specs of shipped tests that
-    were not asked for by name; ``left_out`` names those among them that do not fit the application: UNSATISFIED.
+    ``problems`` are all that were found when the tests were loaded, also those of the ``application``, which is None
+    where it cannot be read. ``unasked`` are the specs of shipped tests that were not asked for by name; ``left_out``
+    names those among them that do not fit the application: UNSATISFIED.
     """
 
     deployment: Deployment
@@ -95,32 +101,37 @@ class Checked:
         return tuple(test.spec for test in self.tests)
 
     @property
-    def by_rules(self) -> Mapping[Path, Sequence[Diagnostic]]:
-        """What the rules found, by spec."""
-        return self.problems.by_rules
-
-    @property
     def ok(self) -> bool:
         return not has_errors(self.diagnostics)
 
     def sound(self) -> "Checked":
-        """The same with those tests alone in whose specs there is no error."""
+        """The same with the tests that can be planned: those without errors, none where what all have has some."""
+        if self.ok and self.application:
+            return self
         found = (*self.problems.as_read.items(), *self.problems.by_rules.items())
         broken = {path for path, problems in found if has_errors(problems)}
-        return narrowed(self, [spec for spec in self.specs if spec.path not in broken])
+        kept = narrowed(self, [spec for spec in self.specs if spec.path not in broken])
+        is_planned = self.application and not has_errors((*kept.problems.common, *kept.problems.of_services))
+        return kept if is_planned else narrowed(kept, ())
 
 
 @dataclass(frozen=True)
 class Compilation:
-    """Everything to be written: Plans with the files they need, and the child pipeline. Empty when there are errors."""
+    """Everything to be written: Plans with the files they need, and the child pipeline with its ``jobs``."""
 
     compiled: "Compiled"
+    jobs: "Pipeline"
     pipeline: "File"
     problems: tuple[Diagnostic, ...]
 
 
 class NoApplication(Exception):
     """Plans need an application, and neither the command line nor a deployment names one."""
+
+    usage = True
+
+    def __init__(self) -> None:
+        super().__init__("no application; name its compose file with --application or in dodo.yml")
 
 
 def load(
@@ -143,28 +154,36 @@ def load(
     source = None
     if files := application or deployment.application:
         source, of_application = read_application(
-            files, access(deployment), deployment.sandbox, reader, deployment.declarations
+            files, access(deployment), deployment.sandbox, reader, deployment.declarations, keeps_wrong=True
         )
-        found = [*found, *of_application, *(unseen_problems(source, deployment) if source else ())]
+        found = [*found, *of_application]
+        if source:
+            found += unseen_problems(source, deployment)
     if settings.emulate:
         rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
         deployment = replace(deployment, rigs=rigs)
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
-    tests, by_rules = sources.check(specs, corners, CheckInputs(manifests, deployment, source))
+    result = sources.check(specs, corners, CheckInputs(manifests, deployment, source))
     as_read = {path: of_file for path, (_, of_file) in loaded.items()}
-    problems = Problems(tuple(found), (*manifest_problems, *own), as_read, by_rules)
-    return Checked(deployment, manifests, tests, problems.of(specs), settings, source, tuple(empty), problems)
+    problems = Problems(tuple(found), (*manifest_problems, *own), as_read, result.problems)
+    checked = Checked(deployment, manifests, (), (), settings, source, tuple(empty), problems)
+    return _with_tests(checked, result.tests)
 
 
 def narrowed(checked: Checked, specs: Collection[Spec]) -> Checked:
     """The same with fewer tests, and the problems of these."""
     keys = {(spec.path, spec.slug) for spec in specs}
     tests = tuple(test for test in checked.tests if (test.spec.path, test.spec.slug) in keys)
-    problems = checked.problems.without_unused(tests)
-    diagnostics = problems.of(test.spec for test in tests)
-    return replace(checked, tests=tests, diagnostics=diagnostics, problems=problems)
+    return _with_tests(replace(checked, problems=checked.problems.without_unused(tests)), tests)
+
+
+def _with_tests(checked: Checked, tests: tuple[ResolvedTest, ...]) -> Checked:
+    """The same with these tests, and what is wrong with them, alone and together."""
+    together = check_suite(tests, checked.deployment, checked.application)
+    found = ordered([*checked.problems.of(test.spec for test in tests), *together])
+    return replace(checked, tests=tests, diagnostics=tuple(found))
 
 
 def at_values(checked: Checked, spec: Spec, values: Mapping[str, Values]) -> Checked:
@@ -178,7 +197,8 @@ def sampled(checked: Checked, samples: Callable[[ResolvedTest], Iterable[Values]
     for test in checked.tests:
         numbered = {str(number): values for number, values in enumerate(samples(test), 1)} if test.spec.ranges else {}
         tests.extend(_at(checked, test.spec, SAMPLE, numbered) if numbered else [test])
-    return replace(checked, tests=tuple(tests))
+    together = check_suite(tests, checked.deployment, checked.application)
+    return replace(checked, tests=tuple(tests), diagnostics=(*checked.diagnostics, *together))
 
 
 def _at(checked: Checked, spec: Spec, label: str, values: Mapping[str, Values]) -> tuple[ResolvedTest, ...]:
@@ -207,15 +227,13 @@ def without_unsatisfied(checked: Checked, named: Collection[Path] = ()) -> Check
     first = {test.spec.path: test.spec for test in reversed(checked.tests)}
     root = checked.deployment.root
     shipped = {path for path, spec in first.items() if package_data.is_shipped(spec.location.root, root)}
-    unfed = {path for path in shipped if any(d.rule in UNSATISFIED for d in checked.by_rules[path])}
+    unfed = {path for path in shipped if any(d.rule in UNSATISFIED for d in checked.problems.by_rules[path])}
     left_out = unfed - set(named)
-    tests = tuple(test for test in checked.tests if test.spec.path not in left_out)
-    found = checked.problems.of(test.spec for test in tests)
+    kept = _with_tests(checked, tuple(test for test in checked.tests if test.spec.path not in left_out))
     files = {str(path) for path in shipped}
     return replace(
-        checked,
-        tests=tests,
-        diagnostics=tuple(d for d in found if d.severity == "error" or d.span.file not in files),
+        kept,
+        diagnostics=tuple(d for d in kept.diagnostics if d.severity == "error" or d.span.file not in files),
         unasked=frozenset(shipped - set(named)),
         left_out=tuple(sorted(first[path].location.stem for path in left_out)),
     )
@@ -232,15 +250,13 @@ def plan(
     out: Path,
     searches: Sequence["SearchJobs"] = (),
     options: "JobOptions | None" = None,
-    before_each: Callable[[], None] = lambda: None,
 ) -> Compilation:
     """The Plans of tests without errors, for the output folder ``out``; raises NoApplication without one.
 
-    The pipeline has the jobs of ``searches``, too, and ``options`` hold for all its jobs. What ``before_each`` raises,
-    which is called before each test, ends the planning.
+    The pipeline has the jobs of ``searches``, too, and ``options`` hold for all its jobs.
     """
     from dodo_dsl.emit.output_folder import pipeline_folder
-    from dodo_dsl.emit.pipeline import artifact_problems, pipeline_problems
+    from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_problems
     from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS
     from dodo_dsl.emit.render import render_pipeline
     from dodo_dsl.plan.build import build
@@ -249,22 +265,16 @@ def plan(
         raise NoApplication
     deployment, application, settings = checked.deployment, checked.application, checked.settings
     options = options or NO_OPTIONS
-    compiled, problems = build(
-        checked.tests,
-        checked.manifests,
-        deployment,
-        application,
-        out.resolve(),
-        settings,
-        before_each,
-        options.from_repository,
+    compiled = build(
+        checked.tests, checked.manifests, deployment, application, out.resolve(), settings, options.from_repository
     )
-    before_each()
-    child = render_pipeline(compiled.suite, pipeline_folder(out), searches, options)
+    jobs = pipeline(compiled.suite, pipeline_folder(out), searches, options)
+    child = render_pipeline(jobs)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    limits = pipeline_problems(compiled.suite, child.text, searches, options)
-    for problem in [*limits, *artifact_problems(compiled, options)]:
-        span = replace(problem.span, file=shown.get(problem.span.file, problem.span.file))
-        problems.append(replace(problem, span=span))
-    return Compilation(compiled, child, tuple(ordered(problems)))
+    limits = pipeline_problems(compiled.suite, jobs, child.text)
+    problems = [
+        replace(problem, span=replace(problem.span, file=shown.get(problem.span.file, problem.span.file)))
+        for problem in [*limits, *artifact_problems(compiled, options)]
+    ]
+    return Compilation(compiled, jobs, child, tuple(ordered(problems)))

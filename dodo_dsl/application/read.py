@@ -42,11 +42,13 @@ def read_application(
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008
     reader: Reader = source.read,
     declarations: Declarations = Declarations(),  # noqa: B008
+    keeps_wrong: bool = False,
 ) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems.
 
     ``access`` is what the deployment allows it, ``limits`` are the highest that it may set. ``declarations`` are what
-    the deployment says of the application in its files; they do not hold for others.
+    the deployment says of the application in its files; they do not hold for others. ``keeps_wrong`` keeps one with
+    errors, as far as it could be read.
     """
     paths = [path] if isinstance(path, Path) else list(path)
     declarations = declared.holding(declarations, paths)
@@ -81,7 +83,7 @@ def read_application(
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
     found.extend(problem for problem in _secrets(application, document, files) if problem.span not in refused)
-    return (None if has_errors(found) else application), found
+    return (application if keeps_wrong or not has_errors(found) else None), found
 
 
 def _secrets(application: ApplicationSource, document: source.Mapping, files: ComposeFiles) -> Iterator[Diagnostic]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check import baseline, file_rules, resolve, service_rules, spec_rules, wiring_rules
+from dodo_dsl.check import baseline, file_rules, needed_files, resolve, service_rules, spec_rules, wiring_rules
 from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic
@@ -28,6 +28,7 @@ RULES: tuple[Rule, ...] = (
     service_rules.check_own_messages,
     file_rules.check_references,
     file_rules.check_files,
+    needed_files.check_needed_files,
     file_rules.check_starts,
     file_rules.check_limits,
     file_rules.check_input,
@@ -84,6 +85,7 @@ def forget_files() -> None:
         file_rules.table_span,
         file_rules.pictures,
         baseline.results,
+        needed_files.files,
     )
     for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()

@@ -47,6 +47,9 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
             message = f"the name '{use.name}' is already used in layer {first_layer[use.name]}"
             yield Diagnostic(use.span, "service-taken", message, "the names of a test's services are unique")
         first_layer.setdefault(use.name, use.layer)
+        if context.application and use.name in context.application.services:
+            message = f"the application also has a service '{use.name}'"
+            yield Diagnostic(use.span, "service-taken", message, "rename the one in the test")
 
 
 def _is_broken(context: RuleContext, name: str) -> bool:

@@ -1,30 +1,25 @@
 """dodo compile: check tests and write their compose files and child pipeline.
 
-With ``--check --fix`` it writes what has exactly one fix into the files, and shows it as a diff. Diagnostics are text,
-SARIF 2.1.0, JUnit or GitLab's code quality.
+With ``--check --fix`` it writes what has exactly one fix into the files, and shows it as a diff.
 """
 
 import argparse
 import difflib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import groupby
 from pathlib import Path
-from typing import Any, TextIO
-from urllib.parse import quote
+from typing import TextIO
 
-from dodo_dsl import __version__, atomic, package_data
-from dodo_dsl.check import catalogue
+from dodo_dsl import atomic, package_data
 from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
-from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError
+from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.numbers import patience, positive
-from dodo_dsl.compiler import Checked, NoApplication, plan
+from dodo_dsl.compiler import Checked, Compilation, plan
 from dodo_dsl.diagnostics import (
     Diagnostic,
     Fix,
     Span,
-    fingerprints,
     forget_lines,
     format_gitlab,
     format_json,
@@ -35,9 +30,7 @@ from dodo_dsl.diagnostics import (
 )
 from dodo_dsl.emit.output_folder import add_images, differences, stale_folders, write
 from dodo_dsl.emit.pipeline import SearchJobs
-from dodo_dsl.emit.pipeline_jobs import JobOptions
-from dodo_dsl.plan.model import Suite
-from dodo_dsl.terminal import WIDE, json_text, printable
+from dodo_dsl.terminal import printable
 
 Fixes = dict[Span, Fix]
 
@@ -79,101 +72,18 @@ def _shown(lines: Iterable[str]) -> Iterator[str]:
     return (printable(line.rstrip("\r\n")) + "\n" for line in lines)
 
 
-_SARIF = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
-
-
-def format_sarif(diagnostics: Sequence[Diagnostic]) -> str:
-    """A SARIF log, as code scanning and editors read it; columns count characters."""
-    pages = catalogue.pages()
-    rules = sorted({d.rule for d in diagnostics})
-    marks = fingerprints(diagnostics)
-    results = [_result(d, rules.index(d.rule), mark) for d, mark in zip(diagnostics, marks, strict=True)]
-    driver = {"name": "DoDo", "version": __version__, "rules": [_rule(pages[rule]) for rule in rules]}
-    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
-    return json_text({"$schema": _SARIF, "version": "2.1.0", "runs": [run]})
-
-
-def _rule(page: catalogue.Page) -> dict[str, Any]:
-    return {
-        "id": page.name,
-        "shortDescription": {"text": page.summary},
-        "fullDescription": {"text": page.why},
-    }
-
-
-def _result(diagnostic: Diagnostic, index: int, fingerprint: str) -> dict[str, Any]:
-    span = diagnostic.span
-    region = {"startLine": span.line, "startColumn": span.column, "endColumn": span.column + max(1, span.length)}
-    place = {"artifactLocation": {"uri": _uri(span.file)}, "region": region}
-    return {
-        "ruleId": diagnostic.rule,
-        "ruleIndex": index,
-        "level": diagnostic.severity,
-        "message": {"text": _sentence(diagnostic)},
-        "locations": [{"physicalLocation": place}],
-        "partialFingerprints": {"dodo/v1": fingerprint},
-    }
-
-
-def _uri(file: str) -> str:
-    """Relative to the working folder, or a file's whole address."""
-    shown = shown_path(file)
-    return Path(shown).as_uri() if Path(shown).is_absolute() else quote(shown)
-
-
-def _sentence(diagnostic: Diagnostic) -> str:
-    return diagnostic.sentence + (f" ({diagnostic.hint})" if diagnostic.hint else "")
-
-
-def format_junit(diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -> str:
-    """A test case a file: it fails by its errors; warnings are its output. ``files`` are those that were checked."""
-    from junitparser import Failure, JUnitXml, TestCase, TestSuite
-
-    from dodo_dsl.report.for_gitlab import xml_text
-
-    by_file = {file: list(found) for file, found in groupby(diagnostics, lambda d: d.span.file)}
-    cases = []
-    for file in sorted({*files, *by_file}):
-        name = xml_text(shown_path(file))
-        case = TestCase(name, classname="dodo")
-        case._elem.set("file", name)
-        found = by_file.get(file, [])
-        errors, warnings = ([d for d in found if d.severity == severity] for severity in ("error", "warning"))
-        if errors:
-            failure = Failure(xml_text(f"{errors[0].span.line}: {errors[0].sentence}"), errors[0].rule)
-            failure.text = xml_text(format_text(errors, WIDE))
-            case.result = [failure]
-        if warnings:
-            case.system_out = xml_text(format_text(warnings, WIDE))
-        cases.append(case)
-    suite = TestSuite("dodo compile --check")
-    suite.add_testcases(cases)  # one by one, each is counted with all before it
-    document = JUnitXml("dodo")
-    document.add_testsuite(suite)
-    document.update_statistics()  # type: ignore[no-untyped-call]
-    text: bytes = document.tostring()  # type: ignore[no-untyped-call]
-    return text.decode() + "\n"
-
-
-def rendered(style: str, diagnostics: Sequence[Diagnostic], files: Sequence[str]) -> str:
-    """The diagnostics in a format of ``FORMATS``; ``files`` are the specs that were checked."""
-    return format_junit(diagnostics, files) if style == "junit" else _OTHERS[style](diagnostics)
-
-
-_OTHERS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {
+FORMATS: dict[str, Callable[[Sequence[Diagnostic]], str]] = {
     "text": format_text,
     "json": format_json,
     "gitlab": format_gitlab,
-    "sarif": format_sarif,
 }
-FORMATS = (*_OTHERS, "junit")
 
 EXAMPLES = """examples:
   dodo compile                             all tests of the deployment, into generated/
   dodo compile tests/my-test -o out        one folder of tests
   dodo compile --check                     problems of all tests; writes nothing
   dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
-  dodo compile --check --format gitlab     the same as a code quality report; others: sarif, junit
+  dodo compile --check --format gitlab     the same as a code quality report
   dodo compile --forecast 4 --times dodo-report    how long the pipeline takes with four runners
   dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
   dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
@@ -204,9 +114,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     display.add_verbosity(parser, "print only problems, and what is stale", "also print the name of each test")
     parser.add_argument("--fix", action="store_true",
                         help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
-    parser.add_argument("--format", choices=FORMATS, default="text",
-                        help="format of the diagnostics (default: text); with gitlab, sarif and junit the text goes to "
-                        "standard error")  # fmt: skip
+    parser.add_argument("--format", choices=tuple(FORMATS), default="text",
+                        help="format of diagnostics (default: text); with gitlab the text goes to stderr")  # fmt: skip
     parser.add_argument(
         "--forecast", type=positive, metavar="R", help="show the duration of the pipeline with R runners"
     )
@@ -263,9 +172,9 @@ def _log(style: str, stdout: TextIO, stderr: TextIO) -> TextIO | None:
     return None if style == "json" or stdout.isatty() else stderr
 
 
-def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: TextIO, stderr: TextIO) -> None:
+def _show(diagnostics: Sequence[Diagnostic], style: str, stdout: TextIO, stderr: TextIO) -> None:
     if style != "text":
-        stdout.write(rendered(style, diagnostics, [str(spec.path) for spec in checked.specs]))
+        stdout.write(FORMATS[style](diagnostics))
     log = _log(style, stdout, stderr)
     if diagnostics and log:
         write_diagnostics(log, diagnostics[:_MOST_PROBLEMS])
@@ -277,14 +186,14 @@ def _show(diagnostics: list[Diagnostic], style: str, checked: Checked, stdout: T
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
-    sound = checked if checked.ok else checked.sound()
-    if sound.ok and sound.application is not None and sound.specs:
-        searches = _searches(options) if sound is checked else []
+    sound = checked.sound()
+    if sound.specs:
+        searches = _searches(options) if checked.ok else ()
         made = plan(sound, options.output, searches, pipeline_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)
-    _show(diagnostics, options.format, checked, stdout, stderr)
+    _show(diagnostics, options.format, stdout, stderr)
     if has_errors(diagnostics):
         return Exit.USAGE
     outdated = f"{options.output} is stale; dodo compile brings it up to date"
@@ -323,17 +232,14 @@ def _names(names: Sequence[str]) -> str:
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     jobs = pipeline_options.job_options(options)
     if not checked.ok:
-        _show(list(checked.diagnostics), options.format, checked, stdout, stderr)
+        _show(checked.diagnostics, options.format, stdout, stderr)
         return Exit.USAGE
-    try:
-        made = plan(checked, options.output, _searches(options), jobs)
-    except NoApplication:
-        raise UsageError(NO_APPLICATION) from None
+    made = plan(checked, options.output, _searches(options), jobs)
     diagnostics = ordered([*checked.diagnostics, *made.problems])
-    _show(diagnostics, options.format, checked, stdout, stderr)
+    _show(diagnostics, options.format, stdout, stderr)
     if has_errors(diagnostics):
         return Exit.USAGE
-    expected = _forecast(made.compiled.suite, jobs, options)
+    expected = _forecast(made, options)
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output)
     if options.images:
@@ -356,15 +262,16 @@ def _searches(options: argparse.Namespace) -> tuple[SearchJobs, ...]:
     return search_jobs(options.search, options.workers or _WORKERS, options.application)
 
 
-def _forecast(suite: Suite, jobs: JobOptions, options: argparse.Namespace) -> str:
+def _forecast(made: Compilation, options: argparse.Namespace) -> str:
     """How long the pipeline or its longest job takes, if that is wanted; raises UsageError for what has no times."""
+    suite = made.compiled.suite
     if not (options.forecast or options.jobs) or not suite.plans:
         return ""
     from dodo_dsl.cli.forecast import forecast_text, packing_text
 
     if options.forecast:
-        return forecast_text(suite, options.forecast, jobs, options.overhead)
-    return packing_text(suite, jobs)
+        return forecast_text(suite, made.jobs, options.forecast, options.overhead)
+    return packing_text(suite, made.jobs)
 
 
 def _count(number: int, what: str = "test") -> str:

@@ -36,9 +36,6 @@ def require_extra(what: str, extra: str) -> None:
         raise UsageError(f"{what} needs {module}: {advice.install(extra)}")
 
 
-NO_APPLICATION = "no application; name its compose file with --application or in dodo.yml"
-
-
 @contextmanager
 def files_of_the_user() -> Iterator[None]:
     """A file or folder of the command line that is missing or refused is a UsageError."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from dodo_dsl.cli import progress
 from dodo_dsl.cli.errors import UsageError
-from dodo_dsl.emit.pipeline import forecast, pipeline
-from dodo_dsl.emit.pipeline_jobs import JobOptions, Seconds
+from dodo_dsl.emit.pipeline import Pipeline, forecast
+from dodo_dsl.emit.pipeline_jobs import Seconds
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.runs import by_test
 from dodo_dsl.report import results
@@ -19,24 +19,24 @@ from dodo_dsl.run.history import History
 from dodo_dsl.run.schedule import Schedule
 
 
-def forecast_text(suite: Suite, runners: int, options: JobOptions, overhead: float) -> str:
+def forecast_text(suite: Suite, child: Pipeline, runners: int, overhead: float) -> str:
     """One line, and a second one for tests of which no time is known; raises UsageError for reports that are none.
 
     ``overhead`` are seconds from when GitLab gives a job to a runner until its test begins, and at its end.
     """
-    known = dict(options.seconds(by_test(suite.plans)))
+    known = dict(child.options.seconds(by_test(suite.plans)))
     timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
     unknown = [slug for slug in timeouts if slug not in known]
-    found = forecast(pipeline(suite, "", (), options), (timeouts | known).__getitem__, runners, overhead)
+    found = forecast(child, (timeouts | known).__getitem__, runners, overhead)
     who = f"{runners} runner{'s' if runners > 1 else ''}"
     line = f"forecast with {who}: {'at most' if unknown else 'about'} {_duration(found.seconds)}"
     parts = [f"{_duration(found.work)} of work", f"{overhead:g} s a job before its test", f"{found.last} ends last"]
     return f"{line} ({', '.join(parts)})\n{_without(unknown)}"
 
 
-def packing_text(suite: Suite, options: JobOptions) -> str:
+def packing_text(suite: Suite, child: Pipeline) -> str:
     """How many jobs share the tests, and how long the tests of the longest take if they run one after the other."""
-    known, jobs = options.seconds(by_test(suite.plans)), pipeline(suite, "", (), options).jobs
+    known, jobs = child.options.seconds(by_test(suite.plans)), child.jobs
     took = {plan.slug: known.get(plan.slug, plan.timeout_s) for plan in by_test(suite.plans)}
     unknown = [slug for slug in took if slug not in known]
     seconds, longest = max((sum(map(took.__getitem__, job.tests)), job.name) for job in jobs)

@@ -11,7 +11,7 @@ from typing import TextIO
 
 from dodo_dsl import compiler
 from dodo_dsl.cli import selection
-from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError
+from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import did_you_mean, has_errors
 from dodo_dsl.emit.output_folder import write
@@ -73,7 +73,7 @@ def _tests(options: argparse.Namespace) -> tuple[Checked, Rig]:
     if not tests:
         unread = "" if checked.ok else " of those without problems; dodo compile --check shows the others"
         raise UsageError(f"no test runs on rig '{options.rig}'{unread}")
-    if any(d.severity == "error" for test in tests for d in checked.by_rules.get(test.spec.path, ())):
+    if checked.application and not {test.spec.path for test in tests} <= {s.path for s in checked.sound().specs}:
         raise UsageError(f"tests of rig '{options.rig}' have problems; dodo compile --check shows them")
     return replace(checked, tests=tests), rigs[options.rig]
 
@@ -96,10 +96,7 @@ def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str], dic
     built: set[str] = set()
     with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
         folder = Path(name)
-        try:
-            made = compiler.plan(checked, folder)
-        except compiler.NoApplication:
-            raise UsageError(NO_APPLICATION) from None
+        made = compiler.plan(checked, folder)
         if has_errors(made.problems):
             raise UsageError("the tests cannot be compiled; dodo compile --check says why")
         write(made.compiled, made.pipeline, folder)

@@ -19,7 +19,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.cli import image_pull, selection
-from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError, require_extra
+from dodo_dsl.cli.errors import Exit, UsageError, require_extra
 from dodo_dsl.diagnostics import format_text, has_errors, shown_path
 from dodo_dsl.images import build_context, docker_command, sbom
 from dodo_dsl.images import names as images_names
@@ -184,7 +184,7 @@ def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) ->
     deployment = selection.checked_deployment()
     files = selection.existing_files(options.application) or deployment.application
     if not files:
-        raise UsageError(NO_APPLICATION)
+        raise compiler.NoApplication
     source, problems = read_application(
         files, compiler.access(deployment), deployment.sandbox, declarations=deployment.declarations
     )

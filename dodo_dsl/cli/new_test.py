@@ -12,11 +12,11 @@ from pathlib import Path
 import yaml
 
 from dodo_dsl import package_data
+from dodo_dsl.check import needed_files
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.existing_application import Pictures
 from dodo_dsl.cli.new_files import New, filled, schema_of_specs
 from dodo_dsl.diagnostics import did_you_mean
-from dodo_dsl.plan.test_files import copies
 from dodo_dsl.source import Mapping as Written
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import extends, vary
@@ -204,10 +204,12 @@ def _files(name: str, instances: Sequence[Spec], manifests: Mapping[str, Manifes
     for path in dict.fromkeys(path for spec in instances for path in _paths(spec, manifests)):
         if (registry / path.relative_to(root)).exists() and not path.relative_to(root).is_relative_to(own):
             continue
-        for copy in copies(path, root):
-            target = Path(copy.target)
+        found = needed_files.files(path, root)
+        if isinstance(found, str):
+            raise UsageError(found)
+        for target, source in zip(map(Path, found), found.values(), strict=True):
             place = Path(name) / target.relative_to(own) if target.is_relative_to(own) else target
-            yield New(registry / place, copy.source.read_bytes())
+            yield New(registry / place, source.read_bytes())
 
 
 def _paths(spec: Spec, manifests: Mapping[str, Manifest]) -> Iterator[Path]:

@@ -16,8 +16,8 @@ from dodo_dsl import atomic, compiler
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
-from dodo_dsl.cli.errors import NO_APPLICATION, UsageError, require_extra
-from dodo_dsl.compiler import Checked, NoApplication, narrowed, plan
+from dodo_dsl.cli.errors import UsageError, require_extra
+from dodo_dsl.compiler import Checked, narrowed, plan
 from dodo_dsl.diagnostics import has_errors, ordered, told_once
 from dodo_dsl.emit.output_folder import PLAN_FILE, write
 from dodo_dsl.opendlv import regular_file
@@ -58,7 +58,8 @@ def without_rigless(checked: Checked, options: argparse.Namespace) -> tuple[Chec
         return checked, ""
     known, kept = set(checked.diagnostics), [s for s in checked.specs if s.path not in rigless | unbuilt]
     fewer = narrowed(checked, kept)
-    return replace(fewer, diagnostics=tuple(d for d in fewer.diagnostics if d in known)), said
+    found = tuple(d for d in fewer.diagnostics if d.severity == "error" or d in known)
+    return replace(fewer, diagnostics=found), said
 
 
 def _runs_processes(checked: Checked, backend: str | None) -> bool:
@@ -198,13 +199,8 @@ def compile_tests(
         raise UsageError("the tests above cannot be compiled")
     tests: dict[str, str] = {}
     if samples:
-        pass
-
         checked, tests = sample(checked, samples)
-    try:
-        made = plan(checked, folder)
-    except NoApplication:
-        raise UsageError(NO_APPLICATION) from None
+    made = plan(checked, folder)
     problems = ordered([*checked.diagnostics, *made.problems])
     write_diagnostics(stdout, told_once(problems, SUFFIX))
     if has_errors(problems):

@@ -11,7 +11,7 @@ from typing import Any, Self, TextIO, cast
 from dodo_dsl import compiler
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
-from dodo_dsl.cli.errors import NO_APPLICATION, UsageError
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.forecast import expectation
 from dodo_dsl.cli.loading import Loading, loading
 from dodo_dsl.cli.progress import about, count
@@ -52,10 +52,7 @@ class SearchSession:
 
     def compiled(self, checked: compiler.Checked) -> compiler.Compilation:
         """The tests at their nominal values, with their problems shown; raises UsageError if some are errors."""
-        try:
-            made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
-        except compiler.NoApplication:
-            raise UsageError(NO_APPLICATION) from None
+        made = compiler.plan(checked, checked.deployment.root / "nominal") if checked.ok else None
         problems = ordered([*checked.diagnostics, *(made.problems if made else ())])
         write_diagnostics(self.stdout, told_once(problems, SUFFIX))
         if made is None or has_errors(problems):

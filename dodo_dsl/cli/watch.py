@@ -13,12 +13,14 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
+from dodo_dsl.check import forget_files
 from dodo_dsl.cli import run as cli_run
 from dodo_dsl.cli.errors import UsageError, of_outcomes
 from dodo_dsl.cli.loading import loading
 from dodo_dsl.cli.provenance import origin
 from dodo_dsl.cli.run import reserved
 from dodo_dsl.cli.run_jobs import prepare
+from dodo_dsl.compiler import NoApplication
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.comparison import change_lines, compare
 from dodo_dsl.report.results import GivenReport
@@ -129,9 +131,10 @@ class Watch:
         """Runs what the changed files affect, all tests for None; returns whether it was interrupted."""
         self._changed |= {*(changed or ())}
         with loading(self._options, self._folder.lease.descriptor) as load:
+            forget_files()
             try:
                 jobs, deployment = prepare(self._options, self._folder.path, self._stdout)
-            except UsageError as problem:
+            except (UsageError, NoApplication) as problem:
                 if changed is None:
                     raise
                 self._stdout.write(f"{problem}\n")

@@ -7,7 +7,7 @@ import heapq
 import math
 import shlex
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 CHILD = "child.gitlab-ci.yml"
 RULE = "pipeline-limit"
 
-MAX_NAME = 255
 MAX_BYTES = 5 << 20
 MAX_JOBS_FREE = 500
 MAX_JOBS_PARSED = 1700
@@ -85,10 +84,7 @@ class Pipeline:
 
 
 def pipeline(
-    suite: Suite,
-    folder: str,
-    searches: Sequence[SearchJobs] = (),
-    options: JobOptions = NO_OPTIONS,
+    suite: Suite, folder: str, searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
 ) -> Pipeline:
     """The jobs of a suite; ``folder`` is the output folder's name, as the parent's artifact has it."""
     levels = {plan.level for plan in suite.plans}
@@ -147,24 +143,30 @@ def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) ->
     )
 
 
-def pipeline_problems(
-    suite: Suite, text: str, searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
-) -> list[Diagnostic]:
-    """What GitLab would refuse in the child pipeline ``text`` of a suite, at the test with the largest share.
+def pipeline_problems(suite: Suite, child: Pipeline, text: str) -> Iterator[Diagnostic]:
+    """What GitLab would refuse in the child pipeline of a suite, with its ``text``, at the test with the largest share.
 
-    A job's name has at most 255 characters. The archive of an artifact that holds the YAML of a child pipeline has at
-    most 5 MB (``max_artifacts_content_include_size``). The number of jobs of a pipeline is unlimited on a self-managed
-    GitLab unless an administrator limits it, and 500, 1,500 or 2,000 on gitlab.com, by its tier. A YAML file may take
-    2 MB of memory when parsed (``max_yaml_size_bytes``); a job takes 0.7 to 1.2 kB of that in Ruby, as GitLab counts
-    before it looks at what jobs extend. All limits but the first can be raised, so numbers of jobs are warnings. A
-    job's limit of 50 ``needs`` is never reached: the job ``gate`` represents all tests before it.
+    The archive of an artifact that holds the YAML of a child pipeline has at most 5 MB
+    (``max_artifacts_content_include_size``). The number of jobs of a pipeline is unlimited on a self-managed GitLab
+    unless an administrator limits it, and 500, 1,500 or 2,000 on gitlab.com, by its tier. A YAML file may take 2 MB of
+    memory when parsed (``max_yaml_size_bytes``); a job takes 0.7 to 1.2 kB of that in Ruby, as GitLab counts before it
+    looks at what jobs extend. All limits can be raised, so numbers of jobs are warnings.
 
     Sources: https://docs.gitlab.com/administration/cicd/limits/ and
     https://docs.gitlab.com/user/gitlab_com/#cicd
     """
-    made = pipeline(suite, "", searches, options)
-    number = len(made.jobs) + made.gate + sum(search.workers + 1 for search in searches)
-    return [*_names(suite, {job.name for job in made.jobs}), *_whole(suite, text, number)]
+    jobs = len(child.jobs) + child.gate + sum(search.workers + 1 for search in child.searches)
+    size = len(text.encode())
+    hint = "pack them into fewer with --jobs, compile fewer tests into one pipeline, or a smaller 'matrix'"
+    if size > MAX_BYTES:
+        message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab accepts 5 MB"
+        yield _largest(suite, message, hint, "error")
+    if jobs > MAX_JOBS_PARSED:
+        message = f"the child pipeline has {jobs} jobs, which take more than the 2 MB that GitLab reads by default"
+        yield _largest(suite, message, f"{hint}; an administrator can raise max_yaml_size_bytes", "warning")
+    elif jobs > MAX_JOBS_FREE:
+        message = f"the child pipeline has {jobs} jobs, gitlab.com allows 500 on its free tier and 1500 on Premium"
+        yield _largest(suite, message, f"{hint}; a self-managed GitLab allows any number by default", "warning")
 
 
 def artifact_problems(compiled: "Compiled", options: JobOptions) -> list[Diagnostic]:
@@ -192,28 +194,6 @@ def artifact_problems(compiled: "Compiled", options: JobOptions) -> list[Diagnos
         f"{options.artifact_mb} MB; the largest: {', '.join(named)}"
     )
     return [Diagnostic(_place(plan), RULE, message, _ARTIFACT_HINT, "warning")]
-
-
-def _names(suite: Suite, jobs: Collection[str]) -> Iterator[Diagnostic]:
-    for plan in suite.plans:
-        if len(plan.slug) > MAX_NAME and plan.slug in jobs:
-            message = f"the job '{plan.slug[:40]}...' has a name of {len(plan.slug)} characters, more than {MAX_NAME}"
-            yield Diagnostic(_place(plan), RULE, message, "shorten the test's name, or the keys and values of 'matrix'")
-
-
-def _whole(suite: Suite, text: str, jobs: int) -> Iterator[Diagnostic]:
-    """Problems of all ``jobs`` together."""
-    size = len(text.encode())
-    hint = "pack them into fewer with --jobs, compile fewer tests into one pipeline, or a smaller 'matrix'"
-    if size > MAX_BYTES:
-        message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab accepts 5 MB"
-        yield _largest(suite, message, hint, "error")
-    if jobs > MAX_JOBS_PARSED:
-        message = f"the child pipeline has {jobs} jobs, which take more than the 2 MB that GitLab reads by default"
-        yield _largest(suite, message, f"{hint}; an administrator can raise max_yaml_size_bytes", "warning")
-    elif jobs > MAX_JOBS_FREE:
-        message = f"the child pipeline has {jobs} jobs, gitlab.com allows 500 on its free tier and 1500 on Premium"
-        yield _largest(suite, message, f"{hint}; a self-managed GitLab allows any number by default", "warning")
 
 
 def _largest(suite: Suite, message: str, hint: str, severity: Severity) -> Diagnostic:

@@ -3,7 +3,7 @@
 import functools
 import re
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,10 +13,10 @@ import yaml
 from dodo_dsl import package_data
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, Variable, containers, copy_command
-from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
-from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions
+from dodo_dsl.emit.pipeline import CHILD, Pipeline
+from dodo_dsl.emit.pipeline_jobs import SPARE_MINUTES
 from dodo_dsl.plan.added_services import RECORDER, TIME, TIME_MOUNT, agent_flags
-from dodo_dsl.plan.model import LAYERS, Plan, Suite
+from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.plan_json import json_text, to_json
 from dodo_dsl.source import resolve
 from dodo_dsl.spec.model import VIRTUAL
@@ -205,18 +205,6 @@ def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
     return files
 
 
-def render_pipeline(
-    suite: Suite,
-    folder: str,
-    searches: Sequence[SearchJobs] = (),
-    options: JobOptions = NO_OPTIONS,
-) -> File:
-    """The child pipeline; ``folder`` is the output folder's name, as the parent's artifact has it."""
-    child = pipeline(suite, folder, searches, options)
+def render_pipeline(child: Pipeline) -> File:
     parts = {field.name: getattr(child, field.name) for field in fields(child)}
     return File(CHILD, _render("child.gitlab-ci.yml.j2", spare_minutes=SPARE_MINUTES, **parts))
-
-
-def render(suite: Suite, folder: str) -> list[File]:
-    """Every generated file of a compilation, the pipeline first."""
-    return [render_pipeline(suite, folder), *(file for plan in suite.plans for file in render_plan(plan))]

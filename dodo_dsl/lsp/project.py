@@ -4,13 +4,12 @@ What the editor shows counts in place of what the files hold. What a change cann
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl.check import check, forget_files
 from dodo_dsl.check.resolve import resolve
-from dodo_dsl.compiler import Checked, CheckInputs, Ruled, Sources, load, plan, without_unsatisfied
+from dodo_dsl.compiler import Checked, CheckInputs, CheckResult, Sources, load, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Node, Reader, parse_bytes, read
 from dodo_dsl.spec.deployment import FILE_NAME, find_deployment, load_deployment
@@ -52,7 +51,7 @@ class ChangedSources(Sources):
         super().__init__(start, texts)
         self._loaded: dict[Location, tuple[list[tuple[Path, Parsed]], Loaded]] = {}
         self._inputs: CheckInputs | None = None
-        self._ruled: Ruled = (), {}
+        self._result = CheckResult()
 
     def load(self, locations: Iterable[Location]) -> dict[Path, Loaded]:
         """Loads again only where a file that specs were made of has changed."""
@@ -72,13 +71,13 @@ class ChangedSources(Sources):
         self._loaded[location] = made_of, load_spec(location, recorded)
         return self._loaded[location][1]
 
-    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> Ruled:
+    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> CheckResult:
         """Instances that are the very objects of the check before keep what it found.
 
         A test is checked again, too, if another one took or gave up its name.
         """
-        former, found = self._ruled if self._inputs == inputs else ((), {})
-        known = {id(test.spec): test for test in former}
+        former = self._result if self._inputs == inputs else CheckResult()
+        known = {id(test.spec): test for test in former.tests}
         new = [spec for spec in specs if id(spec) not in known]
         paths = {spec.path for spec in new}
         fresh = {id(test.spec): test for test in resolve((s for s in specs if s.path in paths), *inputs)}
@@ -88,9 +87,9 @@ class ChangedSources(Sources):
         names = {spec.name for spec in (*new, *gone)}
         affected = {spec.path for spec in specs if spec.name in names} | paths | {spec.path for spec in gone}
         at_ends = resolve((corner for corner in corners if corner.path in affected), *inputs)
-        again = {**found, **check(tests, *inputs, at_ends, affected)}
-        self._inputs, self._ruled = inputs, (tests, {spec.path: again[spec.path] for spec in specs})
-        return self._ruled
+        again = {**former.problems, **check(tests, *inputs, at_ends, affected)}
+        self._inputs, self._result = inputs, CheckResult(tests, {spec.path: again[spec.path] for spec in specs})
+        return self._result
 
 
 def parse_text(text: str, path: Path) -> Parsed:
@@ -105,38 +104,6 @@ def _version(path: Path) -> tuple[int, int, int] | None:
     except OSError:
         return None
     return (status.st_mtime_ns, status.st_size, status.st_ino) if status else None
-
-
-_OUTPUT = "generated"
-
-
-class _Outdated(Exception):
-    """The texts have changed since."""
-
-
-@dataclass(frozen=True)
-class OpenProject:
-    """The tests of one ``dodo.yml``, or one test outside all; ``folder`` is where it was looked for."""
-
-    folder: Path
-    checked: Checked
-
-    def planned(self, is_outdated: Callable[[], bool] = lambda: False) -> list[Diagnostic]:
-        """What only shows where all tests are planned together; nothing while there are errors, or no application.
-
-        As soon as it ``is_outdated`` it ends, with nothing: many tests take seconds, and the next check would wait.
-        """
-        if not self.checked.ok or self.checked.application is None or not self.checked.specs:
-            return []
-
-        def before_each() -> None:
-            if is_outdated():
-                raise _Outdated
-
-        try:
-            return list(plan(self.checked, self.folder / _OUTPUT, before_each=before_each).problems)
-        except _Outdated:
-            return []
 
 
 def is_ours(path: Path) -> bool:
@@ -156,7 +123,7 @@ class Projects:
         """Anything may have changed: manifests, maps, messages. The next check looks at all of it."""
         self._is_outdated = True
 
-    def check(self, shown: Mapping[Path, str]) -> list[OpenProject]:
+    def check(self, shown: Mapping[Path, str]) -> list[Checked]:
         """The projects, checked with the texts that are shown, by resolved path."""
         if self._is_outdated:
             self._is_outdated = False
@@ -169,7 +136,7 @@ class Projects:
             groups.setdefault(find_deployment(file.parent) or file, []).append(file)
         return [self._project(key, files) for key, files in groups.items()]
 
-    def _project(self, key: Path, files: list[Path]) -> OpenProject:
+    def _project(self, key: Path, files: list[Path]) -> Checked:
         specs = [file for file in files if file.name.endswith(SUFFIX)]
         paths = specs
         if key.name == FILE_NAME:
@@ -177,7 +144,7 @@ class Projects:
             outside = [file for file in specs if not any(file.is_relative_to(folder) for folder in registry)]
             paths = [*registry, *outside] if outside else []
         sources = self._sources.setdefault(key, ChangedSources(key.parent, self._texts))
-        return OpenProject(key.parent, without_unsatisfied(load(paths, sources=sources), specs))
+        return without_unsatisfied(load(paths, sources=sources), specs)
 
 
 def by_file(found: Iterable[Diagnostic]) -> Mapping[Path, list[Diagnostic]]:

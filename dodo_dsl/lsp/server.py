@@ -1,9 +1,8 @@
 """The language server: it listens to the editor, and shows what is wrong a moment after a change, and its fixes."""
 
 import asyncio
-import contextlib
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,12 +14,11 @@ from dodo_dsl import __version__
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.lsp.documents import Document, Lines, opened, path_of, saved_text, uri_of
 from dodo_dsl.lsp.edits import quick_fixes
-from dodo_dsl.lsp.project import OpenProject, Projects, by_file, is_ours
+from dodo_dsl.lsp.project import Projects, by_file, is_ours
 from dodo_dsl.terminal import printable
 
 PAUSE_S = 0.05
 """After the last change, before a check begins."""
-_IDLE_S = 0.5  # before all tests are planned
 _SEVERITIES = {"error": types.DiagnosticSeverity.Error, "warning": types.DiagnosticSeverity.Warning}
 log = logging.getLogger(__name__)
 
@@ -30,12 +28,10 @@ class DodoServer(LanguageServer):
 
     def __init__(self) -> None:
         super().__init__("dodo", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
-        self.projects: Sequence[OpenProject] = ()
         self._checker = Projects()
         self._timer: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
         self._stale = asyncio.Event()
-        self._changes = 0
         self._published: set[str] = set()
         self._found: Mapping[Path, Sequence[Diagnostic]] = {}
 
@@ -60,7 +56,6 @@ class DodoServer(LanguageServer):
 
     def changed(self, *, elsewhere: bool = False) -> None:
         """Begins a check soon; ``elsewhere`` where other files than tests may have changed."""
-        self._changes += 1
         if elsewhere:
             self._checker.forget()
         if self._timer:
@@ -77,23 +72,12 @@ class DodoServer(LanguageServer):
         while self._stale.is_set():
             self._stale.clear()
             try:
-                await self._check_once()
+                documents = opened(self.workspace)
+                projects = await asyncio.to_thread(self._checker.check, {p: d.text for p, d in documents.items()})
+                self._publish(documents, (problem for project in projects for problem in project.diagnostics))
             except Exception as error:
                 log.exception("the check failed")
                 self.say(f"the check failed: {type(error).__name__}: {error}")
-
-    async def _check_once(self) -> None:
-        """Checks each test, and plans all tests together if nothing changes for a while, and until something does."""
-        changes = self._changes
-        documents = opened(self.workspace)
-        self.projects = await asyncio.to_thread(self._checker.check, {p: d.text for p, d in documents.items()})
-        found = [problem for project in self.projects for problem in project.checked.diagnostics]
-        self._publish(documents, found)
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._stale.wait(), _IDLE_S)
-        planned = await asyncio.to_thread(_planned, self.projects, lambda: self._changes != changes)
-        if planned and self._changes == changes:
-            self._publish(documents, [*found, *planned])
 
     def _publish(self, documents: Mapping[Path, Document], found: Iterable[Diagnostic]) -> None:
         """Shows the problems of each file, and clears files and open documents without any."""
@@ -110,10 +94,6 @@ class DodoServer(LanguageServer):
         for message in messages.values():
             self.text_document_publish_diagnostics(message)
         self._published = {uri for uri, message in messages.items() if message.diagnostics}
-
-
-def _planned(found: Sequence[OpenProject], is_outdated: Callable[[], bool]) -> list[Diagnostic]:
-    return [problem for project in found for problem in project.planned(is_outdated)]
 
 
 def _shown(lines: Lines, diagnostic: Diagnostic) -> ShownDiagnostic:

@@ -7,37 +7,37 @@ import ipaddress
 import zlib
 from collections.abc import Sequence
 
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.resolve import ResolvedTest, isolation
+from dodo_dsl.check.suite_rules import SMALLEST, prefix, reserved_cid
+from dodo_dsl.spec.deployment import Deployment
 
-class OutOfAddresses(ValueError):
-    """More tests than the deployment's range can hold."""
+
+def of_tests(tests: Sequence[ResolvedTest], deployment: Deployment, application: ApplicationSource | None) -> list[int]:
+    """A CID for each instance: its rig's, the one that is built into the application, or one of the range.
+
+    Tests may have the same one that is built in: those on their own networks do not hear each other, and those on
+    the host's wait for each other's leases.
+    """
+    reserved = [reserved_cid(test, application) for test in tests]
+    free = [isolation(test.spec, test.rig) for test, cid in zip(tests, reserved, strict=True) if cid is None]
+    given = iter(cids(free, deployment.cids))
+    return [next(given) if cid is None else cid for cid in reserved]
 
 
 def cids(isolations: Sequence[str], available: Sequence[int]) -> list[int]:
     """A CID for each test: unique while the range lasts, beyond it only tests on their own network share one.
 
-    Tests on the host network come first. Raises OutOfAddresses when they alone are more than the range.
+    Tests on the host network come first; they share, too, when they alone are more than the range.
     """
-    on_host = [i for i, isolation in enumerate(isolations) if isolation == "host"]
     if len(isolations) <= len(available):
         return list(available[: len(isolations)])
-    if len(on_host) >= len(available):
-        raise OutOfAddresses(f"{len(on_host)} tests on the host network, but only {len(available)} CIDs")
+    on_host = [i for i, isolation in enumerate(isolations) if isolation == "host"]
     given = dict(zip(on_host, available, strict=False))
-    shared = list(available[len(on_host) :])
+    shared = available[len(on_host) :] or available
     rest = (i for i in range(len(isolations)) if i not in given)
     given.update((index, shared[n % len(shared)]) for n, index in enumerate(rest))
     return [given[i] for i in range(len(isolations))]
-
-
-SMALLEST = 28
-"""The prefix of the smallest subnet of a test, with room for 13 containers."""
-_TAKEN = 3
-"""Addresses of a subnet that no container gets: the network's, the engine's own, and that of broadcasts."""
-
-
-def prefix(containers: int) -> int:
-    """The length of the prefix of the smallest subnet in which each container has an address."""
-    return min(SMALLEST, 32 - (containers + _TAKEN - 1).bit_length())
 
 
 def subnets(network: ipaddress.IPv4Network, length: int = SMALLEST) -> list[str]:
@@ -60,14 +60,9 @@ class Subnets:
         """Lengths of which no subnet is free."""
 
     def give(self, name: str, containers: int = 1) -> str:
-        """A test's subnet, with room for so many containers.
-
-        Raises OutOfAddresses if the network is smaller than one.
-        """
-        network, length = self._network, prefix(containers)
-        if length < network.prefixlen:
-            need = f"a test has {containers} containers and so needs a /{length}"
-            raise OutOfAddresses(f"{need}, but 'subnets' is {network}")
+        """A test's subnet, with room for so many containers as far as the network has it."""
+        network = self._network
+        length = max(prefix(containers), network.prefixlen)
         index = self._free(_number(name, 1 << (length - network.prefixlen)), length)
         self._taken.update(_parts(index, length))
         return f"{ipaddress.IPv4Address(int(network.network_address) + (index << (32 - length)))}/{length}"

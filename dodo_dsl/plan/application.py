@@ -14,10 +14,6 @@ from dodo_dsl.application.variables import variables_of
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
 from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
 
-_LONGEST = 255
-"""Characters of a volume's name on the engine: it is a folder's."""
-_MARK = "xxxxxx"
-"""Stands for what distinguishes projects of one test."""
 _LONG = 200
 
 
@@ -48,11 +44,6 @@ def plan_application(application: ApplicationSource, setting: Setting) -> Applic
 
 def _relative(path: Path, folder: Path) -> str:
     return Path(os.path.relpath(path, folder)).as_posix()
-
-
-def too_long(slug: str, volumes: Iterable[str]) -> str:
-    """A volume whose name in the test's project is longer than the engine takes; empty without one."""
-    return next((name for name in volumes if len(f"dodo-{slug}-{_MARK}_{name}") > _LONGEST), "")
 
 
 def _container(construction: Construction, service: ComposeService) -> dict[str, Any]:

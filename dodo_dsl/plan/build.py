@@ -7,30 +7,32 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from dodo_dsl import package_data, source
+from dodo_dsl import package_data
 from dodo_dsl.application import unseen
 from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.goals import resolved_goals
+from dodo_dsl.check.needed_files import needed
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
-from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.check.suite_rules import containers
+from dodo_dsl.diagnostics import Span
 from dodo_dsl.plan import added_services, addresses
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
-from dodo_dsl.plan.application import plan_application, too_long
+from dodo_dsl.plan.application import plan_application
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
-from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
+from dodo_dsl.plan.test_files import FileCopy, FilesError, standing_once
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import VIRTUAL
+from dodo_dsl.spec.model import LAYERS, VIRTUAL
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.values import Value, default_value
+from dodo_dsl.spec.values import default_value
 
 
 @dataclass(frozen=True)
@@ -53,21 +55,14 @@ def build(
     application: ApplicationSource,
     out: Path,
     settings: Settings,
-    before_each: Callable[[], None] = lambda: None,
     from_repository: bool = False,
-) -> tuple[Compiled, list[Diagnostic]]:
+) -> Compiled:
     """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below.
 
-    ``before_each`` is called before each test. Large files of the repository are linked instead of copied where they
-    come ``from_repository``.
+    Large files of the repository are linked instead of copied where they come ``from_repository``.
     """
     ordered = sorted(tests, key=lambda test: test.spec.slug)
-    try:
-        cids = _cids(ordered, deployment, application.cid)
-    except addresses.OutOfAddresses as error:
-        span = Span(str(deployment.file)) if deployment.file else ordered[-1].spec.span("name")
-        problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
-        return Compiled(Suite(()), {}), [problem]
+    cids = addresses.of_tests(ordered, deployment, application)
     hidden = unseen.below(application, deployment)
     shared = _Shared(
         manifests,
@@ -75,26 +70,17 @@ def build(
         application,
         settings,
         out / "test",
-        functools.cache(copies),  # tests share maps and recordings
         functools.cache(lambda setting: replace(plan_application(application, setting), hidden=hidden)),
         addresses.Subnets(deployment.subnets),
     )
     builders = [_Builder(test, cid, shared) for test, cid in zip(ordered, cids, strict=True)]
-    plans = []
-    for builder in builders:
-        before_each()
-        plans.append(builder.plan())
+    plans = [builder.plan() for builder in builders]
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
     if more := unseen.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
         plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
-    of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
-    problems = [
-        *itertools.islice(of_volumes, 1),
-        *itertools.chain.from_iterable(b.problems for b in builders),
-    ]
-    return Compiled(Suite(tuple(plans), deployment.gates), files, _defaults(plans, manifests)), problems
+    return Compiled(Suite(tuple(plans), deployment.gates), files, _defaults(plans, manifests))
 
 
 def _defaults(plans: Sequence[Plan], manifests: Mapping[str, Manifest]) -> dict[str, dict[str, str]]:
@@ -121,17 +107,6 @@ def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
     return replace(plan, shared=shared) if shared else plan
 
 
-def _long_name(plan: Plan, application: ApplicationSource) -> Diagnostic | None:
-    """A volume that the engine cannot make for a test, because its name must differ between tests."""
-    name = too_long(plan.slug, plan.application.compose.get("volumes") or {})
-    if not name:
-        return None
-    node, first = application.rest.get("volumes"), next(iter(application.services.values())).span
-    span = node.entries[name].key if isinstance(node, source.Mapping) and name in node.entries else first
-    message = f"the name of the volume '{name}' is too long for the engine together with that of '{plan.slug}'"
-    return Diagnostic(span, "application-file", message, "shorten one of them: they may have 242 characters together")
-
-
 def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:
     """The deployment's limits, with what may be read relative to the application's folder."""
     limits, base = deployment.sandbox, application.folder.resolve()
@@ -149,23 +124,11 @@ def _import_paths(deployment: Deployment, folder: Path) -> tuple[str, ...]:
     return tuple(Path(os.path.relpath(path, folder)).as_posix() for path in above)
 
 
-def _cids(tests: Sequence[ResolvedTest], deployment: Deployment, built_in: int | None) -> list[int]:
-    """A CID for each instance: its rig's, the one that is built into the application, or one of the range.
-
-    Tests may have the same one that is built in: those on their own networks do not hear each other, and those on
-    the host's wait for each other's leases.
-    """
-    reserved = [cid if test.rig and (cid := test.rig.cid) is not None else built_in for test in tests]
-    free = [test for test, cid in zip(tests, reserved, strict=True) if cid is None]
-    given = iter(addresses.cids([isolation(test.spec, test.rig) for test in free], deployment.cids))
-    return [next(given) if cid is None else cid for cid in reserved]
-
-
 @dataclass(frozen=True)
 class _Shared:
     """What the tests of a suite share; ``folder`` stands for a compiled test's, as all lie side by side.
 
-    ``tree`` has the copies of a folder in a root, and ``rewritten`` the application in a setting.
+    ``rewritten`` has the application in a setting.
     """
 
     manifests: Mapping[str, Manifest]
@@ -173,7 +136,6 @@ class _Shared:
     application: ApplicationSource
     settings: Settings
     folder: Path
-    tree: Callable[[Path, Path], list[FileCopy]]
     rewritten: Callable[[Setting], Application]
     subnets: addresses.Subnets
 
@@ -195,7 +157,6 @@ class _Builder:
         self.files: set[FileCopy] = set()
         self.named: set[Path] = set()
         """Files that the spec names, or a folder does that it names."""
-        self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
 
@@ -204,28 +165,10 @@ class _Builder:
         spec, rig = self.spec, self.rig
         automatic = tuple(self._automatic())
         services = (*automatic, *(self._service(service) for service in self.test.services))
-        self._distinct_names(services)
         evaluators = tuple(s.name for s in services if s.judge)
-        for key in (
-            "name",
-            "level",
-            "kind",
-            "timeout",
-            "clock",
-            "rig",
-            "matrix",
-            "vary",
-            "seed",
-            "isolation",
-            "pose",
-            "record",
-            "response",
-            "resources",
-            "goals",
-            "baseline",
-        ):
-            if key in spec.spans:
-                self._place(key, spec.span(key))
+        for key, span in spec.spans.items():
+            if key not in LAYERS:
+                self._place(key, span)
         isolated = isolation(spec, rig)
         setting = Setting(
             self.cid,
@@ -251,7 +194,9 @@ class _Builder:
             isolation=isolated,
             seed=spec.seed,
             cid=self.cid,
-            subnet=self._subnet(services) if isolated == "network" else "",
+            subnet=self.shared.subnets.give(spec.slug, containers(self.test, self.application))
+            if isolated == "network"
+            else "",
             tag=rig.tag if rig else SIMULATION_TAG,
             sandbox_image=self._image("sandbox"),
             services=services,
@@ -273,17 +218,6 @@ class _Builder:
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),
         )
-
-    def _subnet(self, services: Sequence[PlannedService]) -> str:
-        """The test's subnet, with an address for each service, and for the container that holds the network."""
-        containers = 1 + len(services) + len(self.application.services)
-        try:
-            return self.shared.subnets.give(self.spec.slug, containers)
-        except addresses.OutOfAddresses as error:
-            hint = "give 'subnets' in dodo.yml more, such as 10.213.0.0/16"
-            span = Span(str(self.deployment.file)) if self.deployment.file else self.spec.span("name")
-            self.problems.append(Diagnostic(span, "out-of-range", str(error), hint))
-            return ""
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)
@@ -332,13 +266,6 @@ class _Builder:
                 self.test, own, self._image(own.image), watch, self.cid, tuple(self.application.services)
             )
 
-    def _distinct_names(self, services: Sequence[PlannedService]) -> None:
-        for service in services:
-            if service.name in self.application.services:
-                use = next(u for u in self.spec.uses if u.name == service.name)
-                message = f"the application also has a service '{service.name}'"
-                self.problems.append(Diagnostic(use.span, "service-taken", message, "rename the one in the test"))
-
     def _service(self, service: ResolvedService) -> PlannedService:
         use, manifest = service.use, service.manifest
         key = f"{use.layer}.{use.name}"
@@ -371,22 +298,18 @@ class _Builder:
         if value is None:
             return None
         if value.path is not None and entry:
-            return self._file_flag(argument.parameter, value, entry.key)
+            return self._file_flag(argument.parameter, value.path)
         return Flag(argument.parameter.name, value.text, value.kind)
 
-    def _file_flag(self, parameter: Parameter, value: Value, span: Span) -> Flag:
-        path = value.path or Path()
-        needed = path.parent if parameter.format == "map" and path.suffix == ".json" else path  # meshes stand beside it
-        root = self.spec.location.root.resolve()
-        try:
-            found = self.shared.tree(needed, root)
-        except FilesError as error:
-            self.problems.append(Diagnostic(span, "path-escape", str(error)))
-        else:
-            self.files.update(found)
-            if not self.application.folder.resolve().is_relative_to(path.resolve()):
-                self.named.update(copy.source for copy in found)
-        return Flag(parameter.name, path.relative_to(root).as_posix(), "path")
+    def _file_flag(self, parameter: Parameter, path: Path) -> Flag:
+        root = self.spec.location.root
+        found = needed(parameter, path, root)
+        if isinstance(found, str):
+            raise FilesError(found)
+        self.files.update(itertools.starmap(FileCopy, found.items()))
+        if not self.application.folder.resolve().is_relative_to(path.resolve()):
+            self.named.update(found.values())
+        return Flag(parameter.name, path.relative_to(root.resolve()).as_posix(), "path")
 
 
 def _leaving_out(flag: Flag, messages: Sequence[str]) -> Flag:

@@ -8,15 +8,13 @@ import hashlib
 import os
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 from dodo_dsl.opendlv import regular_file
 
-MAX_FILES = 5_000
-MAX_BYTES = 2 << 30
 LARGE = 1 << 20
 """Bytes from which a file is not copied for each test that needs it."""
 SHARED = "_files"
@@ -58,32 +56,6 @@ def link(target: str, shared: str) -> str:
 def is_shared_name(name: str) -> bool:
     """Whether DoDo calls a shared file so."""
     return _NAME.fullmatch(name) is not None
-
-
-def copies(path: Path, root: Path) -> list[FileCopy]:
-    """The file, or all files of the folder, below ``root``; raises FilesError for links out of it or too many."""
-    root = root.resolve()
-    found: list[FileCopy] = []
-    size = 0
-    for file in _files(path):
-        resolved = file.resolve()
-        if not resolved.is_relative_to(root):
-            raise FilesError(f"'{file.relative_to(root)}' is a symbolic link that leaves the registry")
-        size += resolved.stat().st_size
-        found.append(FileCopy(file.relative_to(root).as_posix(), resolved))
-        if len(found) > MAX_FILES or size > MAX_BYTES:
-            raise FilesError(f"'{path.relative_to(root)}' holds more than {MAX_FILES} files or {MAX_BYTES >> 30} GiB")
-    return found
-
-
-def _files(path: Path) -> Iterator[Path]:
-    if path.is_file():
-        yield path
-        return
-    for entry in sorted(path.rglob("*")):
-        hidden = any(part.startswith(".") or part == "__pycache__" for part in entry.relative_to(path).parts)
-        if entry.is_file() and not hidden:
-            yield entry
 
 
 def standing_once(

@@ -62,3 +62,28 @@ action:
 
 def test_a_test_without_problems(tmp_path: Path) -> None:
     assert messages("finish", tmp_path) == []
+
+
+def test_all_errors_in_one_run(tmp_path: Path) -> None:
+    """One of a spec or the application hides no other, neither of names and paths nor of all tests together."""
+    text = """\
+timeout: 60 sx
+isolation: host
+matrix: {n: [1, 2, 3]}
+evaluation: {driver: {uses: collision, with: {goal: finish}}}
+# dodo.yml
+cids: 128-129
+# docker-compose.yml
+services: {driver: {image: driver, command: --cid=111, env_file: gone.env}}
+"""
+    (tmp_path / "tests/maps/plain").mkdir(parents=True)
+    (tmp_path / "tests/maps/plain/out").symlink_to("/etc/hostname")
+    errors = [d for d in checked(text, tmp_path).diagnostics if d.severity == "error"]
+    assert [(d.rule, Path(d.span.file).name) for d in errors] == [
+        ("application-file", "docker-compose.yml"),
+        ("out-of-cids", "dodo.yml"),
+        ("path-escape", "base.dodo.yml"),
+        ("path-escape", "example.dodo.yml"),
+        ("wrong-unit", "example.dodo.yml"),
+        ("service-taken", "example.dodo.yml"),
+    ]

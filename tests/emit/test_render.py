@@ -12,14 +12,15 @@ import pytest
 import yaml
 
 from dodo_dsl import compiler, source
-from dodo_dsl.emit.pipeline import CHILD, SearchJobs
+from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
 from dodo_dsl.emit.render import _templates, render_pipeline, render_plan
 from dodo_dsl.plan.model import Suite
 from tests.emit.readers import ROOT, tree
 
 GOLDEN = Path(__file__).parent / "golden"
 WHOLE = ("sil-closed-straight", "hil-dynamic")
-"""The tests whose files are compared as they are: a simulation in lockstep and a rig. Of the others, what differs."""
+"""The tests whose compose files are compared as they are: a simulation in lockstep and a rig."""
+PLAN = "sil-closed-straight/test.json"
 SUMMARY = "summary.yml"
 SEARCH = "search.gitlab-ci.yml"
 """A child pipeline that also searches its test."""
@@ -35,12 +36,14 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     first = {plan.spec: plan.slug for plan in reversed(made.compiled.suite.plans)}  # one instance of a matrix
     plans = [plan for plan in made.compiled.suite.plans if first[plan.spec] == plan.slug]
     written = {plan.slug: render_plan(plan, made.compiled.defaults) for plan in plans}
-    files = {file.path: file.text for slug in WHOLE for file in written.pop(slug)} | {CHILD: made.pipeline.text}
+    whole = [file for slug in WHOLE for file in written[slug]]
+    files = {f.path: f.text for f in whole if f.path == PLAN or not f.path.endswith("/test.json")}
+    files[CHILD] = made.pipeline.text
     summaries = {slug: _summary({Path(file.path).name: file.text for file in test}) for slug, test in written.items()}
     files[SUMMARY] = yaml.safe_dump(summaries, sort_keys=False, width=150)
     searched = made.compiled.suite.plans[-1]
     search = SearchJobs(searched.name, searched.slug, 4, ("docker-compose.yml",))
-    files[SEARCH] = render_pipeline(Suite((searched,)), "generated", [search]).text
+    files[SEARCH] = render_pipeline(pipeline(Suite((searched,)), "generated", [search])).text
     if update_goldens:
         shutil.rmtree(GOLDEN, ignore_errors=True)
         for path, text in files.items():

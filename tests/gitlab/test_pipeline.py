@@ -2,7 +2,7 @@
 
 import os
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,23 +11,34 @@ import pytest
 import yaml
 
 from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.emit import pipeline as emitted
+from dodo_dsl.emit import render
 from dodo_dsl.emit.pipeline import SearchJobs, artifact_problems, pipeline_problems
-from dodo_dsl.emit.pipeline_jobs import JobOptions
-from dodo_dsl.emit.render import render_pipeline
+from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, JobOptions
+from dodo_dsl.emit.render import File
 from dodo_dsl.plan.build import Compiled
-from dodo_dsl.plan.model import Place, Plan, Pooled, Suite
+from dodo_dsl.plan.model import Plan, Pooled, Suite
 from dodo_dsl.plan.test_files import FileCopy
 from tests.emit.readers import pipeline
 
 OnRig = Callable[[str, str], Plan]
 
 
+def render_pipeline(
+    suite: Suite, folder: str, searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
+) -> File:
+    return render.render_pipeline(emitted.pipeline(suite, folder, searches, options))
+
+
 def child(*plans: Plan, gates: bool = True, folder: str = "generated") -> dict[str, Any]:
     return pipeline(render_pipeline(Suite(plans, gates), folder).text)
 
 
-def problems(*plans: Plan, text: str = "") -> list[Diagnostic]:
-    return pipeline_problems(Suite(plans), text or render_pipeline(Suite(plans), "generated").text)
+def problems(
+    *plans: Plan, text: str = "", searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
+) -> list[Diagnostic]:
+    made = emitted.pipeline(Suite(plans), "generated", searches, options)
+    return list(pipeline_problems(Suite(plans), made, text or render.render_pipeline(made).text))
 
 
 def test_a_simulation_is_a_job(plan: Plan) -> None:
@@ -80,7 +91,7 @@ def test_workers_search_together_and_another_job_reports(
 def test_jobs_of_searches_count(plan: Plan) -> None:
     plans = [replace(plan, slug=f"test-{n}") for n in range(480)]
     assert problems(*plans) == []
-    (problem,) = pipeline_problems(Suite(tuple(plans)), "", [SearchJobs("x", "x", 20)])
+    (problem,) = problems(*plans, searches=[SearchJobs("x", "x", 20)])
     assert "has 501 jobs" in problem.message
 
 
@@ -279,8 +290,7 @@ def test_packed_tests_share_jobs(plan: Plan, on_rig: OnRig, tmp_path: Path, acce
         "dodo run --compiled generated/hil-a --compiled generated/hil-b --report dodo-report $DODO_RUN_OPTIONS --jobs 1"
     ]
     assert rig["needs"][1:] == ["gate"] and made["stages"] == ["sil", "dil", "gate", "hil"]
-    many = Suite(tuple(replace(plan, slug=f"sil-{'x' * 260}-{n}") for n in range(900)))
-    assert pipeline_problems(many, text, (), JobOptions(most_jobs=9)) == []
+    assert problems(*(replace(plan, slug=f"sil-{n}") for n in range(900)), options=JobOptions(most_jobs=9)) == []
 
 
 def test_a_folder_is_one_word_to_the_shell(plan: Plan) -> None:
@@ -298,15 +308,6 @@ def test_gitlab_accepts_it(plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: 
 
 def test_a_common_pipeline_has_no_problem(plan: Plan) -> None:
     assert problems(*(replace(plan, slug=f"{plan.slug}--n-{n}") for n in range(500))) == []
-
-
-def test_long_job_names_are_errors_at_the_matrix(plan: Plan) -> None:
-    places = {"name": Place(plan.spec, 3, 7), "matrix": Place(plan.spec, 8, 9)}
-    (problem,) = problems(plan, replace(plan, slug="a" * 256, source_map=places))
-    assert (problem.severity, problem.rule) == ("error", "pipeline-limit")
-    assert (problem.span.file, problem.span.line, problem.span.column) == (plan.spec, 8, 9)
-    assert "has a name of 256 characters, more than 255" in problem.message
-    assert problems(replace(plan, slug="a" * 255)) == []
 
 
 def test_a_file_over_5_mb_is_an_error(plan: Plan) -> None:

@@ -24,7 +24,7 @@ DEPLOYMENTS = (DEPLOYMENT, DEPLOYMENT.replace("registry", "registri"), "dodo: 1\
 
 
 def found(projects: Projects, shown: dict[Path, str]) -> list[tuple[Diagnostic, ...]]:
-    return [project.checked.diagnostics for project in projects.check(shown)]
+    return [project.diagnostics for project in projects.check(shown)]
 
 
 @pytest.mark.thorough
@@ -41,29 +41,23 @@ def test_what_is_not_checked_again_has_not_changed(repository: Repository) -> No
 
 
 def test_the_application_counts_as_it_is_shown(repository: Repository) -> None:
-    """Problems of the compose file itself, and those that show only in the plan of all tests."""
     compose = repository.folder / "docker-compose.yml"
     projects = Projects()
     (broken,) = projects.check({repository.spec: SPEC, compose: COMPOSE.replace("services:", "service:")})
-    assert {Path(d.span.file) for d in broken.checked.diagnostics} == {compose}
+    assert {Path(d.span.file) for d in broken.diagnostics} == {compose}
     (taken,) = projects.check({repository.spec: SPEC, compose: COMPOSE.replace("steering:", "camera:")})
-    assert taken.checked.ok
-    assert {d.rule for d in taken.planned()} == {"service-taken"}
-    asked = iter([False, True])
-    assert taken.planned(lambda: next(asked)) == []
-    assert next(asked, None) is None
+    assert {d.rule for d in taken.diagnostics} == {"service-taken"}
     (fine,) = projects.check({repository.spec: SPEC, compose: COMPOSE})
-    assert fine.checked.ok
-    assert fine.planned() == []
+    assert fine.ok
 
 
 def test_a_change_checks_again_only_what_it_can_affect(repository: Repository) -> None:
     projects = Projects()
     (first,) = projects.check({repository.spec: SPEC})
     (second,) = projects.check({repository.spec: SPEC, repository.longer: LONGER.replace("50 s", "55 s")})
-    before, after = ({t.spec.path: t for t in p.checked.tests} for p in (first, second))
+    before, after = ({t.spec.path: t for t in p.tests} for p in (first, second))
     assert after[repository.spec] is before[repository.spec]
     assert after[repository.longer] is not before[repository.longer]
     projects.forget()
     (third,) = projects.check({repository.spec: SPEC})
-    assert all(test is not after[test.spec.path] for test in third.checked.tests)
+    assert all(test is not after[test.spec.path] for test in third.tests)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.plan.addresses import OutOfAddresses, Subnets, cids, prefix, subnets
+from dodo_dsl.check.suite_rules import prefix
+from dodo_dsl.plan.addresses import Subnets, cids, subnets
 from dodo_dsl.spec.deployment import Deployment
 
 RANGE = Deployment.cids
@@ -25,12 +26,10 @@ def test_in_order_and_without_the_habitual_ones() -> None:
 @given(st.lists(st.sampled_from(["network", "host"]), min_size=1, max_size=400))
 def test_host_tests_never_share(isolations: list[str]) -> None:
     hosts = isolations.count("host")
-    if len(isolations) > len(RANGE) and hosts >= len(RANGE):
-        with pytest.raises(OutOfAddresses):
-            cids(isolations, RANGE)
-        return
     given_cids = cids(isolations, RANGE)
     assert set(given_cids) <= set(RANGE)
+    if len(isolations) > len(RANGE) and hosts >= len(RANGE):
+        return  # reported as out-of-cids
     if len(isolations) <= len(RANGE):
         assert len(set(given_cids)) == len(isolations)
     for cid, isolation in zip(given_cids, isolations, strict=True):
@@ -71,8 +70,3 @@ def test_large_and_small_subnets_are_apart() -> None:
     ]
     assert sorted(part.prefixlen for part in found) == [26, 27, 28, 28, 28]
     assert not any(a.overlaps(b) for a, b in itertools.combinations(found, 2))
-
-
-def test_a_subnet_that_is_too_small_for_the_application() -> None:
-    with pytest.raises(OutOfAddresses, match="14 containers and so needs a /27"):
-        Subnets(ipaddress.IPv4Network("10.213.0.0/28")).give("sil", 14)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.diagnostics import Diagnostic, has_errors
 from dodo_dsl.plan.build import Compiled, build, isolation
 from dodo_dsl.plan.model import Flag, Place, Plan
 from dodo_dsl.spec.load import Settings
@@ -16,18 +15,15 @@ from tests.source.nodes import mapping
 KIWI = Rig("kiwi", "static", 121, mapping("kind: static"))
 
 
-def built(example: str, folder: Path, settings: Settings = Settings()) -> tuple[Compiled, list[Diagnostic]]:  # noqa: B008
+def built(example: str, folder: Path, settings: Settings = Settings()) -> Compiled:  # noqa: B008
     found = checked(example, folder)
-    assert not has_errors(found.diagnostics), found.diagnostics
-    assert found.application is not None
+    assert found.ok and found.application is not None, found.diagnostics
     tests = [test for test in found.tests if test.spec.location.stem == "example"]
     return build(tests, found.manifests, found.deployment, found.application, folder / "generated", settings)
 
 
 def plan(example: str, folder: Path) -> Plan:
-    compiled, problems = built(example, folder)
-    assert problems == []
-    return compiled.suite.plans[0]
+    return built(example, folder).suite.plans[0]
 
 
 def test_a_plan(tmp_path: Path) -> None:
@@ -48,7 +44,7 @@ def test_files_of_a_test(tmp_path: Path) -> None:
     (tmp_path / "tests" / "maps" / "plain" / "a.mtl").touch()
     camera = "environment:\n  camera: {uses: virtual-camera, with: {map-path: ../maps/plain/map.json}}\n"
     own = camera + "# dodo.yml\nmessages: [my.odvd]\n# my.odvd\nmessage my.Own [id = 3000] { float x [id = 1]; }\n"
-    compiled, _ = built(own, tmp_path)
+    compiled = built(own, tmp_path)
     targets = [copy.target for copy in compiled.copies["example"]]
     assert targets == ["maps/plain/a.mtl", "maps/plain/map.json", "messages/0-my.odvd"], "a map goes with its folder"
     assert compiled.suite.plans[0].messages == ("messages/0-my.odvd",)
@@ -62,8 +58,7 @@ def test_a_test_in_lockstep_has_a_clock(tmp_path: Path) -> None:
 
 def test_instances_in_the_order_of_their_names(tmp_path: Path) -> None:
     matrix = "matrix: {yaw: [90 deg, 80 deg]}\ndescription: At ${matrix.yaw}.\n"
-    compiled, _ = built(matrix, tmp_path)
-    assert [(p.slug, p.cid) for p in compiled.suite.plans] == [
+    assert [(p.slug, p.cid) for p in built(matrix, tmp_path).suite.plans] == [
         ("example--yaw-80-deg", 128),
         ("example--yaw-90-deg", 129),
     ]
@@ -87,35 +82,12 @@ evaluation: {track: {uses: collision, with: {map-path: ../maps/plain, goal: fini
     assert "environment.camera.source" not in found.source_map
 
 
-def test_names_that_the_application_has(tmp_path: Path) -> None:
-    compose = "# docker-compose.yml\nservices: {camera: {image: x, command: --cid=1}}\n"
-    _, (problem,) = built(compose, tmp_path)
-    assert (problem.rule, problem.message) == ("service-taken", "the application also has a service 'camera'")
-
-
-def test_more_tests_than_cids(tmp_path: Path) -> None:
-    example = "matrix: {n: [1, 2, 3]}\ndescription: At ${matrix.n}.\nisolation: host\n# dodo.yml\ncids: 128-129\n"
-    compiled, (problem,) = built(example, tmp_path)
-    assert compiled.suite.plans == ()
-    assert (problem.rule, Path(problem.span.file).name) == ("out-of-cids", "dodo.yml")
-
-
 def test_a_cid_that_is_built_in_is_that_of_each_test(tmp_path: Path) -> None:
     example = (
         "name: example\nmatrix: {light: [1, 2]}\n# dodo.yml\ncids: 128-128\n# docker-compose.yml\n"
         "services: {driver: {image: driver, x-dodo: {cid: 111}}}\n"
     )
-    compiled, problems = built(example, tmp_path)
-    assert [each.cid for each in compiled.suite.plans] == [111, 111]
-    assert not has_errors(problems)
-
-
-def test_files_that_leave_the_registry(tmp_path: Path) -> None:
-    (tmp_path / "secret").touch()
-    (tmp_path / "tests/maps/plain").mkdir(parents=True)
-    (tmp_path / "tests/maps/plain/link").symlink_to(tmp_path / "secret")
-    _, problems = built("", tmp_path)
-    assert {problem.rule for problem in problems} == {"path-escape"}
+    assert [each.cid for each in built(example, tmp_path).suite.plans] == [111, 111]
 
 
 def test_images_of_the_deployment(tmp_path: Path) -> None:
@@ -193,7 +165,7 @@ messages: [my.odvd]
 @pytest.mark.parametrize("registry", ["tests", "."])
 def test_what_tests_read_is_hidden_in_a_registry_around_the_application(tmp_path: Path, registry: str) -> None:
     """From each test what any of them reads, but not the deployment's messages, which are the application's, too."""
-    compiled, _ = built(f"{TARGETS}registry: [{registry}]\n", tmp_path)
+    compiled = built(f"{TARGETS}registry: [{registry}]\n", tmp_path)
     read = ("tests/maps/plain/map.json", "tests/targets/a.csv", "tests/targets/b.csv")
     expected = read if registry == "." else ("tests",)
     assert [plan.application.hidden for plan in compiled.suite.plans] == [expected, expected]

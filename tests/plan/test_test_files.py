@@ -7,49 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan import test_files
-from dodo_dsl.plan.test_files import SHARED, FileCopy, FilesError, copies, file_problem, standing_once
-
-
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
-    folder = tmp_path / "registry"
-    for name in ("map/map.json", "map/sub/a.png", "map/.git/x", "map/__pycache__/y.pyc", "other.csv"):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).touch()
-    return folder
-
-
-def test_a_file_and_a_folder(root: Path) -> None:
-    assert copies(root / "other.csv", root) == [FileCopy("other.csv", root / "other.csv")]
-    assert copies(root / "map", root) == [
-        FileCopy("map/map.json", root / "map/map.json"),
-        FileCopy("map/sub/a.png", root / "map/sub/a.png"),
-    ]
-
-
-def test_symlinks_within_the_registry(root: Path) -> None:
-    (root / "map/link.csv").symlink_to(root / "other.csv")
-    assert FileCopy("map/link.csv", root / "other.csv") in copies(root / "map", root)
-
-
-def test_symlinks_out_of_it(root: Path) -> None:
-    (root.parent / "secret").touch()
-    (root / "map/link").symlink_to(root.parent / "secret")
-    with pytest.raises(FilesError, match="'map/link' is a symbolic link that leaves the registry"):
-        copies(root / "map", root)
-
-
-def test_too_many_files(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(test_files, "MAX_FILES", 1)
-    with pytest.raises(FilesError, match="'map' holds more than 1 files or 2 GiB"):
-        copies(root / "map", root)
-
-
-def test_too_many_bytes(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (root / "other.csv").write_text("x" * 11)
-    monkeypatch.setattr(test_files, "MAX_BYTES", 10)
-    with pytest.raises(FilesError, match=r"'other\.csv' holds more than"):
-        copies(root / "other.csv", root)
+from dodo_dsl.plan.test_files import SHARED, FileCopy, file_problem, standing_once
 
 
 @pytest.fixture
@@ -57,17 +15,17 @@ def large(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(test_files, "LARGE", 4)
 
 
-def found(root: Path, **tests: str) -> dict[str, tuple[FileCopy, ...]]:
+def found(tmp_path: Path, **tests: str) -> dict[str, tuple[FileCopy, ...]]:
     """The files of tests by slug, each with the files that its text names, of which a letter is the content."""
     for name in {name for text in tests.values() for name in text.split()}:
-        (root / name).write_text(name[0] * (2 if name.startswith("small") else 5))
-    return {slug: tuple(FileCopy(name, root / name) for name in text.split()) for slug, text in tests.items()}
+        (tmp_path / name).write_text(name[0] * (2 if name.startswith("small") else 5))
+    return {slug: tuple(FileCopy(name, tmp_path / name) for name in text.split()) for slug, text in tests.items()}
 
 
 @pytest.mark.usefixtures("large")
-def test_large_files_of_several_tests_stand_once(root: Path) -> None:
+def test_large_files_of_several_tests_stand_once(tmp_path: Path) -> None:
     """By what they hold, and neither small ones nor those of one test."""
-    shared = standing_once(found(root, one="a.rec small.rec b.rec", two="a$2.rec small.rec", three="a.rec a$2.rec"))
+    shared = standing_once(found(tmp_path, one="a.rec small.rec b.rec", two="a$2.rec small.rec", three="a.rec a$2.rec"))
     names = {slug: [copy.shared for copy in copied] for slug, copied in shared.items()}
     (first, *others) = names["one"]
     assert first == f"{hashlib.sha256(b'aaaaa').hexdigest()}-a_2.rec"
@@ -76,10 +34,10 @@ def test_large_files_of_several_tests_stand_once(root: Path) -> None:
 
 
 @pytest.mark.usefixtures("large")
-def test_what_the_repository_has_is_linked_whoever_needs_it(root: Path) -> None:
-    (one,) = standing_once(found(root, one="a.rec small.rec"), lambda path: path.name == "a.rec")["one"][:1]
-    assert one.is_linked and one.source == root / "a.rec"
-    assert not any(copy.shared for copy in standing_once(found(root, one="a.rec"))["one"])
+def test_what_the_repository_has_is_linked_whoever_needs_it(tmp_path: Path) -> None:
+    (one,) = standing_once(found(tmp_path, one="a.rec small.rec"), lambda path: path.name == "a.rec")["one"][:1]
+    assert one.is_linked and one.source == tmp_path / "a.rec"
+    assert not any(copy.shared for copy in standing_once(found(tmp_path, one="a.rec"))["one"])
 
 
 @pytest.mark.parametrize("target", ["a.rec", "recordings/a.rec", "deep/er/a.rec"])

@@ -71,15 +71,12 @@ def test_diagnostics_say_the_same_with_colours(tmp_path: Path) -> None:
     assert shown(terminal.getvalue()) == format_text(found)
 
 
-@pytest.mark.parametrize("words", [("--format", "json"), ("--format", "junit"), ("--format", "sarif")])
-def test_what_programs_read_has_no_colours(
-    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_programs_read_has_no_colours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("FORCE_COLOR", "1")
     (tmp_path / "bad.dodo.yml").write_text("dodo: 1\nname: bad\n")
     stdout = StringIO()
-    assert main(["compile", "--check", "bad.dodo.yml", *words], stdout, StringIO()) == 2
+    assert main(["compile", "--check", "bad.dodo.yml", "--format", "json"], stdout, StringIO()) == 2
     assert "bad.dodo.yml" in stdout.getvalue()
     assert "\x1b" not in stdout.getvalue()
 

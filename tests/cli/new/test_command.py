@@ -12,11 +12,10 @@ import pytest
 import yaml
 
 from dodo_dsl import package_data
-from dodo_dsl.cli.errors import NO_APPLICATION
 from dodo_dsl.cli.main import main
 from dodo_dsl.cli.new_files import LANGUAGES
 from dodo_dsl.cli.new_test import kinds
-from dodo_dsl.compiler import load
+from dodo_dsl.compiler import NoApplication, load
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.odvd import STANDARD
 from dodo_dsl.spec.model import LEVELS
@@ -141,7 +140,7 @@ def test_an_empty_folder_becomes_a_repository(empty: Path) -> None:
     assert "dodo new --application, in an empty folder, writes a first application" in out
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     assert dodo("new", "second")[0] == 0
-    assert dodo("run", "first")[2] == f"dodo run: {NO_APPLICATION}\n"
+    assert dodo("run", "first")[2] == f"dodo run: {NoApplication()}\n"
 
 
 @pytest.mark.thorough
