@@ -83,7 +83,7 @@ def read_application(
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
     found.extend(problem for problem in _secrets(application, document, files) if problem.span not in refused)
-    return (application if keeps_wrong or not has_errors(found) else None), found
+    return (application if application.services and (keeps_wrong or not has_errors(found)) else None), found
 
 
 def _secrets(application: ApplicationSource, document: source.Mapping, files: ComposeFiles) -> Iterator[Diagnostic]:
