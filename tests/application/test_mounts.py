@@ -1,49 +1,37 @@
 """Folders that an application mounts: missing, or too large to be copied."""
 
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.mounts import large_folders
-from dodo_dsl.application.read import read_application
 from dodo_dsl.emit.containers import copy_command
 from dodo_dsl.plan.model import Application
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from tests.application.applications import problems
+from tests.application.compiled import compiled, repository
 
-LIMITS = SandboxLimits(copies=100_000, copied_files=10)
-WAY_OUT = "mount it read-only (:ro), name it under 'paths' in dodo.yml, or raise '{}' in 'sandbox' there"
+LIMITS = SandboxLimits(copies=1_000_000, copied_files=10)
+SANDBOX = {"copies": "1 MB", "copied-files": 10}
 
 
 @pytest.fixture
 def team(tmp_path: Path) -> Path:
-    """A repository with folders of 60 kB, and one of many files."""
-    for name in ("a", "b", "tests", ".git"):
-        (tmp_path / "team" / name).mkdir(parents=True)
-        (tmp_path / "team" / name / "file").write_bytes(b"x" * 60_000)
-    (tmp_path / "team" / "many").mkdir()
+    """A repository with folders of 600 kB, and one of many files."""
+    root = repository(tmp_path, {f"{name}/file": "x" * 600_000 for name in ("a", "b", "tests/own")})
+    (root / "many").mkdir()
     for number in range(11):
-        (tmp_path / "team" / "many" / str(number)).touch()
-    (tmp_path / "team" / "large").symlink_to("/usr")
-    return tmp_path / "team"
+        (root / "many" / str(number)).touch()
+    (root / "large").symlink_to("/usr")
+    return root
 
 
-def told(team: Path, limits: SandboxLimits, *volumes: str) -> list[str]:
-    (team / "docker-compose.yml").write_text(
-        f"services: {{a: {{image: x, command: --cid=1, volumes: {list(volumes)}}}}}\n"
-    )
-    source, found = read_application(team / "docker-compose.yml", Access((str(team),)), limits)
-    assert source is not None, found
-    found = list(large_folders(source, [team / "tests"]))
-    assert all((p.severity, p.span.line) == ("warning", 1) for p in found)
-    return [f"{p.message}: {p.hint}" for p in found]
-
-
-LARGE = f"'./b' holds 0 MB, and the copies of a test may hold 0 MB: {WAY_OUT.format('copies')}"
-MANY = f"'./many' holds more than 10 files, and the copies of a test may hold 10: {WAY_OUT.format('copied-files')}"
+def told(team: Path, *volumes: object, **sandbox: object) -> list[str]:
+    """The limits that the copies of a test are beyond: what a warning names as the way out."""
+    service = {"image": "x", "command": "--cid=1", "volumes": list(volumes)}
+    test = compiled(team, {"services": {"a": service}}, sandbox={**SANDBOX, **sandbox})
+    assert test.errors == []
+    assert all((one.severity, one.line) == ("warning", 5) for one in test.told)
+    return [word for one in test.told for word in ("copies", "copied-files") if f"'{word}'" in one.text]
 
 
 @pytest.mark.parametrize(
@@ -51,20 +39,18 @@ MANY = f"'./many' holds more than 10 files, and the copies of a test may hold 10
     [
         (["./a:/a"], []),
         (["./a:/a", "./a:/again", "./b:/b:ro"], []),
-        (
-            ["./a:/a", "./b:/b"],
-            ["'./b' holds 0 MB, and the copies of a test may hold 0 MB: " + WAY_OUT.format("copies")],
-        ),
-        (["./many:/m"], [MANY]),
+        (["./a:/a", "./b:/b"], ["copies"]),
+        (["./many:/m"], ["copied-files"]),
         (["./many:/m:ro", "./gone:/g", "./a/file:/f"], []),
     ],
 )
 def test_what_is_too_large(volumes: list[str], expected: list[str], team: Path) -> None:
-    assert told(team, LIMITS, *volumes) == expected
+    assert told(team, *volumes) == expected
 
 
 def test_tests_and_history_do_not_count(team: Path) -> None:
-    assert told(team, replace(LIMITS, copies=170_000, copied_files=100), ".:/app") == []
+    (team / ".git" / "file").write_bytes(b"x" * 600_000)
+    assert told(team, ".:/app", **{"copies": "1.7 MB", "copied-files": 100}) == []
 
 
 @pytest.mark.parametrize(("names", "lines"), [(("a",), ""), (("a", "b"), "copies"), (("many",), "copied-files")])
@@ -81,15 +67,15 @@ def test_what_copies_counts_first(names: tuple[str, ...], lines: str, team: Path
     assert (ran.returncode, ran.stderr) == (1 if lines else 0, "")
     assert (tmp_path / "copied").exists() == (not lines)
     if lines:
-        assert ran.stdout.startswith(f"'./{names[-1]}' holds ") and ran.stdout.endswith(f"{WAY_OUT.format(lines)}\n")
+        assert ran.stdout.startswith(f"'./{names[-1]}' holds ") and f"'{lines}' in 'sandbox'" in ran.stdout
 
 
 def test_the_folder_itself_does_not_count_as_one_of_its_files(team: Path, tmp_path: Path) -> None:
     """Neither where they are counted before a test, nor by its program."""
     (tmp_path / "to").mkdir()
     for most, code in ((11, 0), (10, 1)):
-        limits = replace(LIMITS, copied_files=most)
-        assert bool(told(team, limits, "./many:/app")) == bool(code)
+        limits = SandboxLimits(copies=1_000_000, copied_files=most)
+        assert bool(told(team, "./many:/app", **{"copied-files": most})) == bool(code)
         script = copy_command(Application("../..", (), copies={"files-0": "../../many"}, limits=limits))
         script = script.replace("/from/files-0", str(team / "many")).replace("/to/files-0", str(tmp_path / "to"))
         script = script.replace("touch /run/copied", "true").replace("sleep infinity", "true").replace("$$", "$")
@@ -98,10 +84,5 @@ def test_the_folder_itself_does_not_count_as_one_of_its_files(team: Path, tmp_pa
 
 def test_folders_that_are_asked_for_and_not_there(team: Path) -> None:
     """Of others the test has an empty one, as compose makes it."""
-    long = "{type: bind, source: ./gone, target: /g, bind: {create_host_path: %s}}"
-    for word, count in (("false", 1), ("true", 0)):
-        found = problems(f"services: {{a: {{image: x, command: --cid=1, volumes: [{long % word}]}}}}\n", team)
-        assert [p.message for p in found] == [
-            "there is no file or folder './gone', and 'create_host_path: false' requires it"
-        ] * count
+    assert told(team, {"type": "bind", "source": "./gone", "target": "/g", "bind": {"create_host_path": True}}) == []
     assert not (team / "gone").exists()
