@@ -102,7 +102,7 @@ class Construction:
         if Path(place).is_file():
             return ""
         if name or place not in self._copied:
-            own = name or f"{COPY}{len(self._copied)}"
+            own = name or f"{COPY}{sum(each.startswith(COPY) for each in self.copies)}"
             self._copied.setdefault(place, own)
             self.copies[own] = self.rebased(source)
             return own

@@ -50,9 +50,7 @@ REFUSED = {
     "services: {a: {image: x}, a: {image: y}}\n": "duplicate-key",
     "services: {a: {image: x, profiles: [p]}}\n": "application-file",
     "services: {a.b: {image: x, command: --cid=1}, a-b: {image: y}}\n": "application-file",
-    "services: {a: {image: x, depends_on: [b]}, b: {image: x, links: [c]}, c: {image: x, network_mode: 'service:a'}}\n": (
-        "application-file"
-    ),
+    "services: {a: {image: x, depends_on: [b]}, b: {image: x, network_mode: 'service:a'}}\n": "application-file",
 }
 
 
@@ -327,6 +325,53 @@ def test_what_no_application_sees(document: dict[str, Any], holder: str, root: P
     (root / "link").unlink()
     (root / "link").symlink_to("data")
     assert compiled(root, text.replace("FOLDER", "data")).errors == []
+
+
+SANDBOX = {"cpus": 2.5, "memory": "500 MB", "processes": 100, "files": 50, "file-size": "10 MB"}
+
+
+@pytest.mark.parametrize(
+    ("service", "key", "cut"),
+    [
+        ({}, "cpus", "2.5"),
+        ({"cpus": 1.5}, "cpus", "1.5"),
+        ({"cpus": 3}, "cpus", "2.5"),
+        ({"cpus": 0}, "cpus", "2.5"),
+        ({}, "mem_limit", "500000000"),
+        ({"mem_limit": "1g"}, "mem_limit", "500000000"),
+        ({"pids_limit": 200}, "pids_limit", "100"),
+        ({"tmpfs": "/run"}, "tmpfs", ["/run:size=500000000"]),
+        ({"ulimits": {"nofile": 99}}, "ulimits", {"core": "0", "fsize": "10000000", "nofile": "50"}),
+    ],
+)
+def test_limits_of_dodo_yml(service: dict[str, Any], key: str, cut: object, root: Path) -> None:
+    assert compiled(root, {"services": {"a": car(**service)}}, sandbox=SANDBOX).services["a"][key] == cut
+
+
+def test_folders_that_dodo_yml_allows(root: Path, tmp_path: Path) -> None:
+    """They are the host's own, also to write to."""
+    (tmp_path / "host").mkdir()
+    document = {"services": {"a": car(volumes=[f"{tmp_path}/host:/h"])}}
+    assert compiled(root, document).errors
+    assert compiled(root, document, paths=[f"{tmp_path}/host"]).services["a"]["volumes"] == [f"{tmp_path}/host:/h"]
+
+
+def test_services_share_a_copy_and_nothing_beside_it(root: Path) -> None:
+    bound = {"driver_opts": {"o": "bind", "type": "none", "device": "./data"}}
+    services = {
+        "a": car(volumes=["./new:/d"]),
+        "b": car(volumes=["./new/:/e:ro", "./data/x:/f:ro"]),
+        "c": car(volumes=[".:/app"]),
+        "d": car(volumes=["bound:/b:ro"]),
+    }
+    test = compiled(root, {"services": services, "volumes": {"bound": bound}})
+    assert [service["volumes"] for service in test.services.values()] == [
+        ["files-0:/d:nocopy"],
+        ["files-0:/e:nocopy,ro", "./data/x:/f:ro"],
+        ["files-1:/app:nocopy"],
+        ["bound:/b:nocopy,ro"],
+    ]
+    assert set(test.document["volumes"]) == {"bound", "files-0", "files-1"}
 
 
 def test_a_name_that_is_too_long_for_the_engine(root: Path) -> None:

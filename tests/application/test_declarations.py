@@ -4,9 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.model import ApplicationSource, plain
 from dodo_dsl.compiler import load
+from dodo_dsl.compiler import plan as planned
+from dodo_dsl.plan.model import ApplicationService
 from dodo_dsl.spec.schema_errors import written_schema
+from tests.application.compiled import FILE, repository
 
 COMPOSE = """\
 services:
@@ -19,38 +21,38 @@ services:
 """
 DEPLOYMENT = """\
 dodo: 1
+registry: [tests]
 application:
   files: docker-compose.yml
   without: [viewer]
   services:
     driver:
-      out: [opendlv.proxy.PedalPositionRequest]
+      out: [opendlv.proxy.PedalPositionRequest, opendlv.proxy.GroundSteeringRequest]
       process: [python3, -m, steering]
 """
 
 
-def application(folder: Path, *given: Path) -> ApplicationSource:
-    (folder / "docker-compose.yml").write_text(COMPOSE)
-    (folder / "dodo.yml").write_text(DEPLOYMENT)
-    found = load([], given).application
-    assert found is not None
-    return found
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A repository that has both files and the program."""
+    root = repository(tmp_path, {FILE: COMPOSE, "steering.py": ""})
+    (root / "dodo.yml").write_text(DEPLOYMENT)
+    monkeypatch.chdir(root)
+    return root
 
 
-def test_each_key_of_the_deployment_replaces_that_of_the_compose_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    found = application(tmp_path, Path("docker-compose.yml"))
-    declared = found.services["driver"].declared
-    assert declared is not None
-    assert [(name, Path(span.file).name, span.line) for name, span in declared.outputs] == [
-        ("opendlv.proxy.PedalPositionRequest", "dodo.yml", 7)
-    ]
-    assert declared.readers == 2
-    assert plain(found.services["driver"].node)["x-dodo-process"] == ["python3", "-m", "steering"]
-    assert list(found.services) == ["driver"]
-    assert found.dropped == {"viewer": "dodo.yml leaves it out"}
+def services(root: Path) -> dict[str, ApplicationService]:
+    checked = load([root / "tests" / "network.dodo.yml"])
+    assert checked.ok, checked.diagnostics
+    (plan,) = planned(checked, root / "generated").compiled.suite.plans
+    return {service.name: service for service in plan.application.services}
+
+
+def test_each_key_of_the_deployment_replaces_that_of_the_compose_file(folder: Path) -> None:
+    found = services(folder)
+    assert list(found) == ["driver"]
+    assert found["driver"].outputs == ("opendlv.proxy.PedalPositionRequest", "opendlv.proxy.GroundSteeringRequest")
+    assert found["driver"].process == ("python3", "-m", "steering")
 
 
 def test_something_has_to_be_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,11 +71,9 @@ def test_something_has_to_be_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     )
 
 
-def test_they_are_about_the_files_that_they_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "other.yml").write_text("services: {steer: {image: steer, command: --cid=111}}")
-    found = application(tmp_path, Path("other.yml"))
-    assert (list(found.services), found.services["steer"].declared, found.dropped) == (["steer"], None, {})
+def test_they_are_about_the_files_that_they_name(folder: Path) -> None:
+    (folder / "other.yml").write_text("services: {steer: {image: steer, command: --cid=111}}")
+    assert load([folder / "tests" / "network.dodo.yml"], [Path("other.yml")]).ok
 
 
 def test_a_service_has_the_keys_of_x_dodo() -> None:

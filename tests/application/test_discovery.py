@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.read import read_application
+from tests.application.compiled import compiled, repository
 from tests.emit.readers import compose
 
 BASE = "services: {a: {image: x, command: --cid=111}}\n"
@@ -20,48 +20,50 @@ NAMES = ("compose.yaml", "compose.yml", "docker-compose.yml", "docker-compose.ya
 
 def named(folder: Path, *files: str) -> list[str]:
     """The messages about files that compose reads beside these."""
-    _, found = read_application([folder / file for file in files])
-    return [p.message.split("'")[3] for p in found if p.rule == "application-override"]
+    found = compiled(folder, application=list(files)).told
+    return [told.text.split("'")[3] for told in found if told.rule == "application-override"]
 
 
-def write(folder: Path, *files: str) -> None:
+def write(tmp_path: Path, *files: str) -> Path:
+    folder = repository(tmp_path)
     for file in files:
-        (folder / file).write_text(f"services: {{a: {{image: x, command: --cid=111, labels: {{read.{file}: x}}}}}}\n")
+        (folder / file).write_text(f"services: {{a: {{image: x, command: --cid=111, environment: {{read.{file}: x}}}}}}\n")
+    return folder
 
 
 @pytest.mark.slow
 def test_they_are_those_that_compose_reads(tmp_path: Path) -> None:
     command = compose()
-    write(tmp_path, *NAMES, *OVERRIDES)
+    root = write(tmp_path, *NAMES, *OVERRIDES)
     for base in NAMES:
-        assert (tmp_path / base).is_file()
+        assert (root / base).is_file()
         for override in OVERRIDES:
-            result = subprocess.run([*command, "config"], cwd=tmp_path, capture_output=True, text=True, check=True)
+            result = subprocess.run([*command, "config"], cwd=root, capture_output=True, text=True, check=True)
             read = {file for file in (*NAMES, *OVERRIDES) if f"read.{file}:" in result.stdout}
-            assert {base, *named(tmp_path, base)} == read
-            (tmp_path / override).unlink()
-        (tmp_path / base).unlink()
+            assert {base, *named(root, base)} == read
+            (root / override).unlink()
+        (root / base).unlink()
         write(tmp_path, *OVERRIDES)
 
 
 def test_a_file_that_compose_does_not_find_stands_alone(tmp_path: Path) -> None:
-    write(tmp_path, "docker-compose.yml", "docker-compose.ci.yml", "docker-compose.override.yml")
-    assert named(tmp_path, "docker-compose.ci.yml") == []
-    assert named(tmp_path, "docker-compose.yml") == ["docker-compose.override.yml"]
-    assert named(tmp_path, "docker-compose.yml", "docker-compose.override.yml") == []
+    root = write(tmp_path, "docker-compose.yml", "docker-compose.ci.yml", "docker-compose.override.yml")
+    assert named(root, "docker-compose.ci.yml") == []
+    assert named(root, "docker-compose.yml") == ["docker-compose.override.yml"]
+    assert named(root, "docker-compose.yml", "docker-compose.override.yml") == []
 
 
 def test_a_file_that_includes_the_base_is_the_way_to_do_without(tmp_path: Path) -> None:
-    write(tmp_path, "docker-compose.yml", "docker-compose.override.yml")
-    (tmp_path / "tested.yml").write_text("include: [docker-compose.yml]\nservices: {}\n")
-    source, found = read_application(tmp_path / "tested.yml")
-    assert (source is not None and sorted(source.services), found) == (["a"], [])
+    root = write(tmp_path, "docker-compose.yml", "docker-compose.override.yml")
+    (root / "tested.yml").write_text("include: [docker-compose.yml]\nservices: {}\n")
+    test = compiled(root, application="tested.yml")
+    assert (list(test.services), test.told) == (["a"], ())
 
 
 @pytest.mark.parametrize("separator", [":", ","])
 def test_compose_file_in_env_replaces_what_it_would_find(tmp_path: Path, separator: str) -> None:
-    write(tmp_path, "docker-compose.yml", "docker-compose.override.yml", "sim.yml")
+    root = write(tmp_path, "docker-compose.yml", "docker-compose.override.yml", "sim.yml")
     words = [f"COMPOSE_FILE=docker-compose.yml{separator}sim.yml", f"COMPOSE_PATH_SEPARATOR={separator}"]
-    (tmp_path / ".env").write_text("\n".join(words) + "\n")
-    assert named(tmp_path, "docker-compose.yml") == ["sim.yml"]
-    assert named(tmp_path, "docker-compose.yml", "sim.yml") == []
+    (root / ".env").write_text("\n".join(words) + "\n")
+    assert named(root, "docker-compose.yml") == ["sim.yml"]
+    assert named(root, "docker-compose.yml", "sim.yml") == []

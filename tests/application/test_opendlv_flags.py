@@ -1,42 +1,8 @@
 """Flags in commands: split as compose does, with a test's CID and memories."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.interpolation import interpolate
-from tests.application.composed import config
-
-COMMANDS = {
-    "--cid=111 --name=video0.argb": ["--cid=111", "--name=video0.argb"],
-    r"""prog a\tb "c\td\e" 'x\y' --x="1 2"y "" end""": ["prog", "atb", "ctde", r"x\y", "--x=1 2y", "", "end"],
-    "one --two=${A:-${B:-x}} $A ${C:-c d}e $$A '$$A'": ["one", "--two=a", "a", "ce", "$A", "$A"],
-    r"nice -n -5 /usr/bin/camera --camera=http://host/video.cgi\\?channel=0": [
-        *("nice", "-n", "-5", "/usr/bin/camera"),
-        r"--camera=http://host/video.cgi\?channel=0",
-    ],
-    'sh -c "prog --cid=111 && other; last" more': ["sh", "-c", "prog --cid=111 && other; last", "more"],
-    "prog > file": ["prog"],
-    "  spaces   around\tand tabs  ": ["spaces", "around", "and", "tabs"],
-    "first\nsecond": ["first", "second"],
-}
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_commands_are_split(command: str) -> None:
-    assert [interpolate(word, {"A": "a", "C": "c"}) for word in opendlv_flags.split(command)] == COMMANDS[command]
-
-
-@pytest.mark.slow
-def test_compose_splits_them_equally(tmp_path: Path) -> None:
-    services = {f"s{n}": {"image": "x", "command": command} for n, command in enumerate(COMMANDS)}
-    (tmp_path / "c.yml").write_text(yaml.safe_dump({"services": services}))
-    (tmp_path / ".env").write_text("A=a\nC=c\n")
-    found = config(tmp_path, "-f", "c.yml")
-    words = [[word.replace("$$", "$") for word in found[name]["command"]] for name in services]
-    assert words == list(COMMANDS.values())
 
 
 @pytest.mark.parametrize("command", ["prog 'open", 'prog "open', "(prog)"])

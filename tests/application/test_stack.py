@@ -1,9 +1,10 @@
 """Which services belong to the stack around an application, and what takes their place."""
 
+from pathlib import Path
+
 import pytest
 
-from dodo_dsl.application import stack
-from tests.application.applications import application
+from tests.application.compiled import Compiled, compiled, repository
 
 _CASES = {
     "image: registry.opendlv.org/testing/opendlv-vehicle-view-multi:v0.0.60": "report",
@@ -36,10 +37,16 @@ _CASES = {
 }
 
 
+def beside(written: str, folder: Path) -> Compiled:
+    root = repository(folder, {"opendlv-video-h264-decoder/ours/x": "", "opendlv-video-h264-decoder-0.0.5/x": ""})
+    return compiled(root, f"services:\n  driver: {{image: team/driver, command: --cid=111}}\n  part: {{{written}}}\n")
+
+
 @pytest.mark.parametrize(("written", "instead"), _CASES.items())
-def test_a_service_of_the_stack_is_named_with_what_takes_its_place(written: str, instead: str) -> None:
-    found = stack.parts(application(f"services: {{part: {{{written}}}}}"))
-    assert instead in found["part"][1].instead
+def test_a_service_of_the_stack_is_named_with_what_takes_its_place(written: str, instead: str, tmp_path: Path) -> None:
+    (told,) = (told for told in beside(written, tmp_path).told if told.rule == "application-stack")
+    assert instead in told.text
+    assert told.line == 3
 
 
 @pytest.mark.parametrize(
@@ -55,5 +62,5 @@ def test_a_service_of_the_stack_is_named_with_what_takes_its_place(written: str,
         "image: chalmersrevere/opendlv-logic-distance-voltage, x-dodo: {out: [opendlv.proxy.DistanceReading]}",
     ],
 )
-def test_others_are_the_application_s_own(written: str) -> None:
-    assert stack.parts(application(f"services: {{part: {{{written}}}}}")) == {}
+def test_others_are_the_application_s_own(written: str, tmp_path: Path) -> None:
+    assert not [told for told in beside(written, tmp_path).told if told.rule == "application-stack"]

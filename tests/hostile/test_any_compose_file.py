@@ -165,6 +165,7 @@ FILES = st.fixed_dictionaries(
     odd=st.none() | st.tuples(st.sampled_from(["privileged", "volumes", "build", "command", "ulimits", "x"]), ANY),
 )
 def test_it_is_judged(document: dict[str, Any], odd: tuple[str, Any] | None, tmp_path: Path) -> None:
+    """A file of any of compose's keys and values is refused, or harmless."""
     if odd:
         document["services"]["a"][odd[0]] = odd[1]
     root = tmp_path / "team"

@@ -6,14 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.model import Access
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.application.read import read_application
 from dodo_dsl.plan.model import Application, Plan, PlannedService
-from dodo_dsl.plan.application import plan_application
-from dodo_dsl.application.construction import Setting
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
+from tests.application.compiled import FILE, compiled, repository
 from tests.run import scripted
 
 COMPOSE = """\
@@ -38,28 +35,25 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *passed: str) -> Co
     """The command of the compose file above."""
     for name in ("FROM_OUTSIDE", "CI_JOB_TOKEN", "LICENSE_KEY", "UNNAMED"):
         monkeypatch.setenv(name, "here")
-    (tmp_path / "docker-compose.yml").write_text(COMPOSE)
-    (tmp_path / ".env").write_text("CID=111\nRATE=20\nGREETING='costs $5'\n")
-    (tmp_path / "car.env").write_text("WHEELBASE=0.257\nLEVEL=info\nOD4SESSION_CID=111\nTWICE=${RATE}${RATE}\n")
-    (tmp_path / "raw.env").write_text('RAW="$RATE" # all\nLEVEL=raw\n')
-    (tmp_path / "last.env").write_text(
-        "SAID=${LEVEL} ${WHEELBASE} ${RAW}\nNOTE=   # of the service, and earlier files\n"
-    )
-    source, problems = read_application(tmp_path / "docker-compose.yml")
-    assert source is not None, problems
-    folder = tmp_path / "generated" / "t"
-    application = replace(plan_application(source, Setting(140, "host", folder)), access=Access(passed=passed))
-    common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox", ())
-    plan = Plan("t", "t", "t.dodo.yml", *common, application, import_paths=("../..",))
-    commands = Commands(plan, folder, tmp_path / "report", Slot(150))
-    (made,) = [commands.of(service) for service in application.services]
+    files = {
+        FILE: COMPOSE,
+        "planner.py": "",
+        ".env": "CID=111\nRATE=20\nGREETING='costs $5'\n",
+        "car.env": "WHEELBASE=0.257\nLEVEL=info\nOD4SESSION_CID=111\nTWICE=${RATE}${RATE}\n",
+        "raw.env": 'RAW="$RATE" # all\nLEVEL=raw\n',
+        "last.env": "SAID=${LEVEL} ${WHEELBASE} ${RAW}\nNOTE=   # of the service, and earlier files\n",
+    }
+    test = compiled(repository(tmp_path, files), way="host", environment=list(passed))
+    assert test.plan is not None, test.told
+    commands = Commands(test.plan, test.folder, tmp_path / "report", Slot(150))
+    (made,) = [commands.of(service) for service in test.plan.application.services]
     return made
 
 
 def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = command(tmp_path, monkeypatch)
     assert made.argv == (
-        *("python", "planner.py", "run", "--cid=150", "--rate=20", "--greeting=costs $5"),
+        *("python", "planner.py", "run", "--cid=150", "--rate=20", "--greeting=costs", "$5"),
         "session=150",
     )
     expected = {
@@ -78,7 +72,7 @@ def test_words_and_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "FROM_OUTSIDE" not in made.environment
     assert command(tmp_path, monkeypatch, "FROM_OUTSIDE").environment["FROM_OUTSIDE"] == "here"
     assert not {"NOWHERE", "CI_JOB_TOKEN", "UNNAMED"} & set(made.environment)
-    assert made.folder == tmp_path
+    assert made.folder == tmp_path / "team"
 
 
 def test_variables_that_the_deployment_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
