@@ -14,7 +14,7 @@ from dodo_dsl.application import compose_paths, secret_variables
 from dodo_dsl.application.container import TOP_LEFT_OUT, Container
 from dodo_dsl.application.interpolation import interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, is_true
-from dodo_dsl.application.mounts import COPY, nested, own_name, volume
+from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
 from dodo_dsl.application.part import Part
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.source import Mapping, Node, Scalar
@@ -71,6 +71,12 @@ class Construction:
         self.copies: dict[str, str] = {}
         self._copied: dict[str, str] = {}
         self.volumes = {name: volume(self, name, node, span) for name, node, span in self._named("volumes")}
+        found = len(self.problems)
+        for service in application.services.values():  # those that only read a folder see the copy of others, too
+            if node := service.node.get("volumes"):
+                mounts(Container(self, service), node)
+        self.shown.clear()
+        del self.problems[found:]
 
     def _named(self, key: str) -> Iterator[tuple[str, Node, Span]]:
         top = self.application.top.get(key)
@@ -89,6 +95,10 @@ class Construction:
     def show(self, source: str, span: Span, writer: str = "") -> None:
         if source:
             self.shown.append((source, span, writer))
+
+    def copied(self, source: str) -> str:
+        """The volume with the copy of a folder to which a service writes; empty for all others."""
+        return self._copied.get(self.paths.names(source)[-1], "")
 
     def copy_of(self, source: str, name: str = "") -> str:
         """The volume with the test's copy of a folder of the repository; empty for files and other paths.

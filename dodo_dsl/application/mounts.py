@@ -222,7 +222,7 @@ def _of_repository(of: "Container", mount: Mount) -> Mount | None:
         of.bad(mount.span, message, "create it, or remove 'create_host_path'; paths are relative to this file")
         return None
     project.show(source, mount.span, "" if mount.read_only else of.name)
-    if not mount.read_only and (name := project.copy_of(source)):
+    if name := project.copied(source) if mount.read_only else project.copy_of(source):
         return replace(mount, kind="volume", source=name, nocopy=True, is_required=False, selinux="")
     read_only = mount.read_only or not project.paths.is_writable(source)
     return replace(mount, source=project.rebased(source), read_only=read_only)

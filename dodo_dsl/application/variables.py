@@ -66,22 +66,23 @@ def variables_of(
 
     It has what its files of variables name of the environment, and those that are ``given`` by the test.
     """
-    made: dict[str, str | None] = {}
-    known = {**_literals(service.file_variables), **values}
-    for name, value in service.file_variables.items():
-        if value is None and not is_late(name):
-            made[name] = values.get(name, "").replace("$", "$$")
-        elif value is not None and literal(value) is None:
-            made[name] = filled(value, known, is_late)
+    own: dict[str, str | None] = {}
     raw = service.raw.get("environment")
     for name, value in environment(plain(raw) if raw is not None else None).items():
         if value is not None:
-            made[name] = filled(value, values, is_late)
+            own[name] = filled(value, values, is_late)
         elif is_late(name):
-            made[name] = None
+            own[name] = None
         elif name in values:
-            made[name] = values[name].replace("$", "$$")
-    return {**made, **{name: values[name].replace("$", "$$") for name in given}}
+            own[name] = values[name].replace("$", "$$")
+    of_files: dict[str, str] = {}
+    known = {**_literals(service.file_variables), **_literals(own), **values}
+    for name, value in service.file_variables.items():
+        if value is None and not is_late(name):
+            of_files[name] = values.get(name, "").replace("$", "$$")
+        elif value is not None and literal(value) is None:
+            of_files[name] = filled(value, known, is_late)
+    return {**of_files, **own, **{name: values[name].replace("$", "$$") for name in given}}
 
 
 def _literals(variables: Mapping[str, str | None]) -> dict[str, str]:

@@ -27,7 +27,8 @@ def named(folder: Path, *files: str) -> list[str]:
 def write(tmp_path: Path, *files: str) -> Path:
     folder = repository(tmp_path)
     for file in files:
-        (folder / file).write_text(f"services: {{a: {{image: x, command: --cid=111, environment: {{read.{file}: x}}}}}}\n")
+        own = f"environment: {{read.{file}: x}}"
+        (folder / file).write_text(f"services: {{a: {{image: x, command: --cid=111, {own}}}}}\n")
     return folder
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.model import Access
 from dodo_dsl.application.interpolation import EnvironmentProblem
+from dodo_dsl.application.model import Access
 from dodo_dsl.plan.model import Application, ApplicationService
 from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_paths, secrets_of
 
