@@ -146,7 +146,8 @@ def load(
         source, of_application = read_application(
             files, access(deployment), deployment.sandbox, reader, deployment.declarations
         )
-        found = [*found, *of_application, *(unseen_problems(source, deployment) if source else ())]
+        roots = {location.root for location in locations}
+        found = [*found, *of_application, *(unseen_problems(source, deployment, roots) if source else ())]
     if settings.emulate:
         rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
         deployment = replace(deployment, rigs=rigs)

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import package_data, source
-from dodo_dsl.application import mounts
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounts import large_folders
 from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.baseline import resolved_baseline
+from dodo_dsl.check.file_rules import MAP
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.plan import added_services, addresses
+from dodo_dsl.plan import added_services, addresses, hidden_paths
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.rewrite.rewrite import plan_application
@@ -29,7 +29,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import VIRTUAL
+from dodo_dsl.spec.model import VIRTUAL, RecordedValue
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.values import Value, default_value
@@ -70,7 +70,8 @@ def build(
         span = Span(str(deployment.file)) if deployment.file else ordered[-1].spec.span("name")
         problem = Diagnostic(span, "out-of-cids", str(error), "widen 'cids' in dodo.yml")
         return Compiled(Suite(()), {}), [problem]
-    hidden = mounts.below(application, deployment)
+    specs = [test.spec for test in ordered]
+    hidden = hidden_paths.folders(application, deployment, specs)
     shared = _Shared(
         manifests,
         deployment,
@@ -89,12 +90,14 @@ def build(
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
-    if more := mounts.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
+    named = itertools.chain.from_iterable(builder.named for builder in builders)
+    if more := hidden_paths.files(application, deployment, specs, named):
         plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
     of_copies = large_folders(application, [*deployment.registry, *deployment.services])
     of_volumes = (found for plan in plans if (found := _long_name(plan, application)))
     problems = [
         *of_copies,
+        *hidden_paths.too_many(more, Span(str(deployment.file)) if deployment.file else specs[0].span("name")),
         *itertools.islice(of_volumes, 1),
         *itertools.chain.from_iterable(b.problems for b in builders),
     ]
@@ -198,7 +201,7 @@ class _Builder:
         self.manifests, self.deployment, self.application = shared.manifests, shared.deployment, shared.application
         self.files: set[FileCopy] = set()
         self.named: set[Path] = set()
-        """Files that the spec names, or a folder does that it names."""
+        """What the spec names, and what that names: files of tests among the application's own, if it lies there."""
         self.problems: list[Diagnostic] = []
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
@@ -272,7 +275,7 @@ class _Builder:
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
-            baseline=resolved_baseline(spec).values,
+            baseline=self._baseline(),
             import_paths=self.shared.imports,
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),
@@ -288,6 +291,11 @@ class _Builder:
             span = Span(str(self.deployment.file)) if self.deployment.file else self.spec.span("name")
             self.problems.append(Diagnostic(span, "out-of-range", str(error), hint))
             return ""
+
+    def _baseline(self) -> tuple[RecordedValue, ...]:
+        found = resolved_baseline(self.spec)
+        self.named |= {found.path.resolve()} if found.path else set()
+        return found.values
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)
@@ -388,8 +396,10 @@ class _Builder:
             self.problems.append(Diagnostic(span, "path-escape", str(error)))
         else:
             self.files.update(found)
-            if not self.application.folder.resolve().is_relative_to(path.resolve()):
-                self.named.update(copy.source for copy in found)
+            if self.application.folder.resolve().is_relative_to(needed.resolve()):
+                self.named.update((path.resolve(), needed.resolve() / MAP))
+            else:
+                self.named.update((needed.resolve(), *(copy.source for copy in found)))
         return Flag(parameter.name, path.relative_to(root).as_posix(), "path")
 
 

@@ -25,9 +25,9 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def _found(root: Path, written: str) -> list[str]:
+def _found(root: Path, written: str, *specs: Path) -> list[str]:
     (root / "docker-compose.yml").write_text(_SERVICE + written)
-    found = [d for d in compiler.load((), sources=compiler.Sources(root)).diagnostics if d.severity == "error"]
+    found = [d for d in compiler.load(specs, sources=compiler.Sources(root)).diagnostics if d.severity == "error"]
     return [f"{Path(d.span.file).name}:{d.span.line}: {d.message}" for d in found]
 
 
@@ -53,6 +53,15 @@ def test_it_gets_none(holder: str, written: str, source: str, line: int, root: P
 def test_nor_by_a_symlink(root: Path) -> None:
     assert _found(root, 'volumes: ["./link/x:/x"]') == [
         "docker-compose.yml:5: './link/x' lies in '.git', where Git keeps its own, which no application sees"
+    ]
+
+
+def test_nor_from_beside_a_test_outside_of_the_registries(root: Path) -> None:
+    spec = root / "data" / "a.dodo.yml"
+    spec.write_text("dodo: 1\n")
+    found = _found(root, 'volumes: ["./data/x:/x"]', spec)
+    assert [
+        one for one in found if one.startswith("docker-compose.yml:5: './data/x' lies in 'data', a folder of tests")
     ]
 
 
