@@ -158,7 +158,7 @@ def load(
         )
         found = [*found, *of_application]
         if source:
-            found += unseen_problems(source, deployment)
+            found += unseen_problems(source, deployment, {location.root for location in locations})
     if settings.emulate:
         rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
         deployment = replace(deployment, rigs=rigs)

@@ -31,6 +31,7 @@ class ResolvedBaseline:
 
     values: tuple[RecordedValue, ...] = ()
     problems: tuple[Diagnostic, ...] = ()
+    path: Path | None = None
 
 
 class _WrongBaseline(Exception):
@@ -52,7 +53,7 @@ def resolved_baseline(spec: Spec) -> ResolvedBaseline:
         tolerance = _tolerance(written.get("tolerance") if isinstance(written, Mapping) else None)
         recorded = _recorded(spec, place, path or Path())
         names = written.get("checks") if isinstance(written, Mapping) else None
-        return ResolvedBaseline(tuple(_values(recorded, place, names, tolerance)))
+        return ResolvedBaseline(tuple(_values(recorded, place, names, tolerance)), path=path)
     except (ValueProblem, _WrongBaseline) as wrong:
         return ResolvedBaseline(problems=(wrong.diagnostic,))
 

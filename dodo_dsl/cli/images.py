@@ -24,8 +24,8 @@ from dodo_dsl.diagnostics import format_text, has_errors, shown_path
 from dodo_dsl.images import build_context, docker_command, sbom
 from dodo_dsl.images import names as images_names
 from dodo_dsl.images.names import DODO, PLATFORM, Image, choose, known, of_platforms, tagged
-from dodo_dsl.run.application_files import files_of_tests
 from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
+from dodo_dsl.run.hidden_paths import of_repository
 from dodo_dsl.spec.deployment import Deployment, build_command
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -195,30 +195,36 @@ def _show_builds(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) ->
         builds = checked_builds(source)
     except EnvironmentProblem as error:
         raise UsageError(f"the application's builds: {error}") from error
-    stdout.write(json.dumps(_own_contexts(builds, source, deployment, options.contexts, stderr), indent=2) + "\n")
+    if options.contexts:
+        builds = _own_contexts(builds, _hidden(source, deployment, files), options.contexts)
+    stdout.write(json.dumps(builds, indent=2) + "\n")
     return Exit.OK
 
 
-def _own_contexts(
-    builds: dict[str, Any], source: ApplicationSource, deployment: Deployment, folder: Path | None, stderr: TextIO
-) -> dict[str, Any]:
+def _own_contexts(builds: dict[str, Any], hidden: Sequence[Path], folder: Path) -> dict[str, Any]:
     """The same builds with their own contexts in a folder; raises UsageError if it cannot be made."""
-    if folder is None:
-        return builds
     try:
         folder.mkdir(parents=True, exist_ok=True)
         own = Path(tempfile.mkdtemp(dir=folder))
         written = compose_paths.unescaped(builds)
-        hidden = unseen.unseen_folders(source, deployment)
-        for root in source.paths.roots:
-            found = files_of_tests(root.resolve(), source.folder.resolve(), hidden)
-            hidden += found.paths
-            stderr.write(f"{found.problem}\n" if found.problem else "")
         written["services"] = own_contexts(written["services"], hidden, own.resolve())
     except (HiddenContext, OSError, shutil.Error) as error:
         raise UsageError(f"--contexts: {error}") from error
     escaped: dict[str, Any] = compose_paths.escaped_values(written)
     return escaped
+
+
+def _hidden(source: ApplicationSource, deployment: Deployment, files: Sequence[Path]) -> list[Path]:
+    """What builds do not get; raises UsageError where tests among the application's own files cannot be compiled."""
+    own = source.folder.resolve()
+    roots = [own, *(root.resolve() for root in source.paths.roots)]
+    found = [*unseen.unseen_folders(source, deployment), *of_repository(roots)]
+    if any(own.is_relative_to(folder.resolve()) for folder in deployment.registry):
+        checked = compiler.without_unsatisfied(compiler.load((), files))
+        if not checked.ok or has_errors((made := compiler.plan(checked, own / "generated")).problems):
+            raise UsageError("the tests beside the application cannot be compiled; dodo compile --check says why")
+        found += [own / path for plan in made.compiled.suite.plans[:1] for path in plan.application.hidden]
+    return found
 
 
 def _chosen(options: argparse.Namespace, deployment: Deployment) -> list[Image]:

@@ -8,18 +8,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.application import unseen
 from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.baseline import resolved_baseline
+from dodo_dsl.check.file_rules import MAP
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.needed_files import needed
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.check.suite_rules import containers
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.plan import added_services, addresses
+from dodo_dsl.plan import added_services, addresses, hidden_paths
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.application import plan_application
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
@@ -29,7 +29,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import LAYERS, VIRTUAL
+from dodo_dsl.spec.model import LAYERS, VIRTUAL, RecordedValue
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.values import default_value
@@ -63,7 +63,8 @@ def build(
     """
     ordered = sorted(tests, key=lambda test: test.spec.slug)
     cids = addresses.of_tests(ordered, deployment, application)
-    hidden = unseen.below(application, deployment)
+    specs = [test.spec for test in ordered]
+    hidden = hidden_paths.folders(application, deployment, specs)
     shared = _Shared(
         manifests,
         deployment,
@@ -78,7 +79,8 @@ def build(
     files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
-    if more := unseen.read_by_tests(application, deployment, itertools.chain.from_iterable(b.named for b in builders)):
+    named = itertools.chain.from_iterable(builder.named for builder in builders)
+    if more := hidden_paths.files(application, deployment, specs, named):
         plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
     return Compiled(Suite(tuple(plans), deployment.gates), files, _defaults(plans, manifests))
 
@@ -156,7 +158,7 @@ class _Builder:
         self.manifests, self.deployment, self.application = shared.manifests, shared.deployment, shared.application
         self.files: set[FileCopy] = set()
         self.named: set[Path] = set()
-        """Files that the spec names, or a folder does that it names."""
+        """What the spec names, and what that names: files of tests among the application's own, if it lies there."""
         self.places: dict[str, Place] = {}
         self.shown: dict[str, str] = {}
 
@@ -213,11 +215,16 @@ class _Builder:
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
-            baseline=resolved_baseline(spec).values,
+            baseline=self._baseline(),
             import_paths=self.shared.imports,
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),
         )
+
+    def _baseline(self) -> tuple[RecordedValue, ...]:
+        found = resolved_baseline(self.spec)
+        self.named |= {found.path.resolve()} if found.path else set()
+        return found.values
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)
@@ -307,8 +314,11 @@ class _Builder:
         if isinstance(found, str):
             raise FilesError(found)
         self.files.update(itertools.starmap(FileCopy, found.items()))
-        if not self.application.folder.resolve().is_relative_to(path.resolve()):
-            self.named.update(found.values())
+        folder = path.parent if parameter.format == "map" and path.suffix == ".json" else path
+        is_around = self.application.folder.resolve().is_relative_to(folder.resolve())
+        self.named.update(
+            (path.resolve(), folder.resolve() / MAP) if is_around else (folder.resolve(), *found.values())
+        )
         return Flag(parameter.name, path.relative_to(root.resolve()).as_posix(), "path")
 
 

@@ -90,10 +90,10 @@ class ApplicationService:
 class Application:
     """The application; ``folder`` is its compose file's folder, relative to the compiled test's.
 
-    ``hidden`` are folders of tests within its own, relative to it. ``secrets`` are variables of its ``.env`` that are
-    filled in when it starts, each with the file that sets it, relative to the compiled test's folder as the roots of
-    ``access`` are. ``copies`` are volumes of the test, each with the folder of the
-    repository that is copied into it before the application starts.
+    ``hidden`` is what it never sees of its repository, relative to its folder. ``secrets`` are variables of its
+    ``.env`` that are filled in when it starts, each with the file that sets it, relative to the compiled test's folder
+    as the roots of ``access`` are. ``copies`` are volumes of the test, each with the folder of the repository that is
+    copied into it before the application starts.
     """
 
     folder: str

@@ -113,9 +113,9 @@ class ApplicationCompose(Compose):
         flags = agent_flags(len(self.plan.application.services), self.plan.seed)
         return holder(self.plan.slug, (f"{TIME_MOUNT}/{application_time.AGENT}", *flags), (f"{TIME}:{TIME_MOUNT}",))
 
-    def _masks(self) -> tuple[dict[str, Any], list[str]]:
+    def _masks(self) -> dict[str, Any]:
         """With mounts over the folders in ``/tmp`` where DoDo's processes have theirs: so no container removes them."""
-        masked, problems = super()._masks()
+        masked = super()._masks()
         if self.plan.isolation == "network":
             shown = Entered.with_own(0, *needed_paths(self.plan, self.folder, self.report)).shown
             mounts = covers(shown)
@@ -123,7 +123,7 @@ class ApplicationCompose(Compose):
                 own = {volume["target"] for volume in self.services[name].get("volumes") or ()}
                 given = masked.setdefault(name, {"volumes": []})["volumes"]
                 given += [mount for mount in mounts if mount["target"] not in own]
-        return masked, problems
+        return masked
 
     def _files(self, folder: Path) -> list[str]:
         path = folder / "mixed.compose.yml"

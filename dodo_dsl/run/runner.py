@@ -11,7 +11,6 @@ from typing import Literal, Protocol, Self
 from dodo_dsl.application import secret_variables
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run import application_files
 from dodo_dsl.run.attempts import Attempts, is_undecided
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.outcomes import error_outcome, error_reason
@@ -105,7 +104,6 @@ class Runner:
         passed = [name for job in jobs for name in job.plan.application.access.passed]
         for text in secret_variables.passed_secrets(os.environ, passed):
             self.progress.note(text)
-        application_files.forget()
         await self.backends.prepare([job.plan for job in jobs], self.progress.note)
         self._waiting = self.schedule.ordered(jobs)
         tasks = {job.plan.slug: asyncio.ensure_future(self._one(job)) for job in self._waiting}

@@ -1,33 +1,38 @@
-"""An application that mounts the folder of a compiled test finds it empty."""
+"""An application that mounts the whole repository finds no test in it, and nothing of what tests read and wrote."""
+
+import json
+import shutil
+from pathlib import Path
 
 import pytest
 
-from tests.docker.compose import Crate
-from tests.run.helpers import DRIVES, WAIT
+from tests.docker.compose import IMAGE
+from tests.drive.applications import dodo
+from tests.run.desk import ROOT
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
-LOOK = """
-import os
-folder = f"/scripts/compiled/{os.path.basename(sys.argv[0]).rpartition('-')[0]}"
-print(sorted(os.listdir(folder)), flush=True)
-try:
-    open(f"{folder}/left-behind", "w")
-except OSError as error:
-    print(error.strerror, flush=True)
-print(sorted(os.listdir("/scripts/earlier")), flush=True)
-"""
+TEST = "sil-closed-straight"
+OWN = ("docker-compose.yml", "dodo.yml", f"{TEST}/README.md")
+HIDDEN = (".git/config", "generated/child.gitlab-ci.yml", "dodo-report/old/test.rec", "tests/a/a.json")
+LOOK = "exec 2>&1; touch /read/tests/left-behind; find /app /read ! -size 0 -type f"
 
 
-def test_the_test_is_hidden(crate: Crate) -> None:
-    """And so is an earlier report, whatever its folder is called."""
-    earlier = crate.bench.folder / "earlier"
-    earlier.mkdir()
-    (earlier.parent / "dodo.yml").touch()  # the root of its repository
-    (earlier / "results.json").write_text('{"dodo": "results"}')
-    job = crate.job("hidden", judge=DRIVES, application=LOOK + WAIT)
-    (outcome,) = crate.run(job).values()
-    assert outcome.outcome == "passed", outcome.reason
-    assert crate.log("hidden") == "[]\nRead-only file system\n[]\n"
-    assert (job.folder / "test.json").is_file()
-    assert not (job.folder / "left-behind").exists()
+@pytest.mark.parametrize("backend", ["docker", pytest.param("mixed", marks=pytest.mark.proof)])
+def test_what_is_hidden_is_empty(tmp_path: Path, backend: str) -> None:
+    """Where the registry holds the application, also in the copy that it may change."""
+    for name in (TEST, "maps/straight"):
+        shutil.copytree(ROOT / "tests_registry" / name, tmp_path / name)
+    for name in HIDDEN:
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("hidden")
+    service = {"image": IMAGE, "entrypoint": ["sh", "-c", LOOK], "command": "--cid=111", "user": "0:0"}
+    services = {"looks": {**service, "volumes": [".:/app", "./:/read:ro"]}}
+    (tmp_path / "docker-compose.yml").write_text(json.dumps({"services": services}))
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [., tests]\napplication: docker-compose.yml\n")
+    words = ("run", TEST, "--backend", backend, "--report", "report", "--retry-errors", "2")
+    dodo(*words, code=1, before=("env", "-C", str(tmp_path)))
+    refused, *seen = (tmp_path / "report" / TEST / "logs" / "application.looks.log").read_text().splitlines()
+    assert refused.endswith("Read-only file system")
+    assert set(seen) == {f"/{place}/{name}" for place in ("app", "read") for name in OWN}
+    assert not (tmp_path / "tests" / "left-behind").exists()

@@ -15,6 +15,7 @@ from pathlib import Path
 from tests.hostile import attacks
 from tests.run.helpers import PASS, READY, Bench
 
+HIDDEN = ("tests", "drive.rec", "a.dodo.yml", "map.json")
 JUDGE = READY + "while not os.path.exists('/tmp/attacks-done'): time.sleep(0.05)\n" + PASS
 
 
@@ -30,17 +31,18 @@ def main(argv: list[str]) -> int:
     (own / ".git").mkdir()
     (own / ".git" / "packed").write_text("truths of all versions")
     (own / "data.txt").write_text("as it was")
-    (own / "mixed").mkdir()
-    for name, text in {"drive.rec": "dodo", "a.dodo.yml": "dodo: 1", "results.json": '{"dodo": "results"}'}.items():
-        (own / "mixed" / name).write_text(text)
+    for name, text in {"drive.rec": "dodo", "a.dodo.yml": "dodo: 1", "map.json": '{"model": []}'}.items():
+        (own / "tests" / name).write_text(text)
         (own / name).write_text(text)
+    (own / "dodo-report").mkdir()
+    (own / "dodo-report" / "results.json").write_text('{"dodo": "results"}')
     program = Path(shutil.copy(attacks.__file__, own / "attacks.py"))
     (app,) = plan.application.services
     places |= {"tests-in-its-folder": str(own / "tests" / "truth.json"), "results": str(folder / "report")}
     places["history-of-its-folder"] = str(own / ".git" / "packed")
     guessed = {"ATTACKED": json.dumps(places), "GUESSED": places["folder"]}
     service = replace(app, process=("python", str(program), places["folder"]), environment=guessed)
-    application = replace(plan.application, folder="../application", services=(service,), hidden=("tests",))
+    application = replace(plan.application, folder="../application", services=(service,), hidden=HIDDEN)
     os.environ |= {"CI_JOB_TOKEN": "secret", "MY_SECRET": "secret", "OF_RUNNER": places["folder"]}
     (outcome,) = bench.run(replace(plan, application=application))
     lines = [json.loads(line) for line in bench.log(plan, "application.app").splitlines() if line.startswith("{")]

@@ -1,6 +1,7 @@
 """dodo images: what it says and how it ends when something is missing."""
 
 import json
+import shutil
 from io import StringIO
 from pathlib import Path
 
@@ -187,20 +188,20 @@ def test_a_wrong_platform_says_how_to_write_them(docker: Path, capsys: pytest.Ca
 
 
 def test_builds_have_contexts_of_their_own(docker: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a pipeline builds with bake holds no more than what a run builds."""
+    """What a pipeline builds with bake holds no more than what a run builds, also with tests among its files."""
     root = docker.parent.parent / "a$b"
     for name in (".git/config", "tests/a/map.json", "generated/x", "dodo-report/x", "main.py"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text("x")
-    (root / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
+    for name in ("sil-closed-straight", "maps/straight"):
+        shutil.copytree(ROOT / "tests_registry" / name, root / name)
+    (root / "dodo.yml").write_text("dodo: 1\nregistry: [., tests]\napplication: docker-compose.yml\n")
     (root / "docker-compose.yml").write_text("services: {a: {build: ., command: --cid=111}}\n")
     monkeypatch.chdir(root)
     code, said = run("builds", "--contexts", str(docker.parent / "contexts"))
     assert code == Exit.OK, said
     context = Path(json.loads(said)["services"]["a"]["build"]["context"].replace("$$", "$"))
-    assert (context.name, sorted(p.name for p in context.iterdir())) == (
-        "a$b",
-        ["docker-compose.yml", "dodo.yml", "main.py"],
-    )
+    found = sorted(path.name for path in context.rglob("*") if path.is_file())
+    assert (context.name, found) == ("a$b", ["README.md", "docker-compose.yml", "dodo.yml", "main.py"])
     docker.write_text("a file")
     assert run("builds", "--contexts", str(docker))[0] == Exit.USAGE

@@ -135,37 +135,3 @@ def test_where_own_services_are_found(tmp_path: Path) -> None:
     found = plan(f"evaluation: {{own: {{uses: judge, with: {{wait: 30 s}}}}}}\n{files}", tmp_path)
     assert found.import_paths == ("../..", "../../deep")
     assert plan("", tmp_path).import_paths == ()
-
-
-TARGETS = """\
-matrix: {x: [a, b]}
-evaluation:
-  signal:
-    uses: continuous-signal
-    with:
-      message: opendlv.proxy.GroundSteeringRequest
-      field: groundSteering
-      target: "../targets/${matrix.x}.csv"
-      max-mean: 0.1
-# tests/targets/a.csv
-time,groundSteering
-0,0
-9,0
-# tests/targets/b.csv
-time,groundSteering
-0,1
-9,1
-# my.odvd
-message my.Own [id = 3000] { float x [id = 1]; }
-# dodo.yml
-messages: [my.odvd]
-"""
-
-
-@pytest.mark.parametrize("registry", ["tests", "."])
-def test_what_tests_read_is_hidden_in_a_registry_around_the_application(tmp_path: Path, registry: str) -> None:
-    """From each test what any of them reads, but not the deployment's messages, which are the application's, too."""
-    compiled = built(f"{TARGETS}registry: [{registry}]\n", tmp_path)
-    read = ("tests/maps/plain/map.json", "tests/targets/a.csv", "tests/targets/b.csv")
-    expected = read if registry == "." else ("tests",)
-    assert [plan.application.hidden for plan in compiled.suite.plans] == [expected, expected]

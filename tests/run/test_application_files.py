@@ -1,20 +1,15 @@
 """Files of the application that a compiled test reads where they are."""
 
-from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
-from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import Access
-from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_paths, secrets_of
+from dodo_dsl.plan.model import Application
+from dodo_dsl.run.application_files import application_paths, secrets_of
 
 FOLDER = Path("generated/t")
 
 
-def application(*env_files: str, roots: tuple[str, ...] = ()) -> Application:
-    service = ApplicationService("driver", env_files=env_files)
+def application(roots: tuple[str, ...] = ()) -> Application:
     secrets = {
         "LD_PRELOAD": "../../team/.env",
         "API_KEY": "../../team/.env",
@@ -22,7 +17,7 @@ def application(*env_files: str, roots: tuple[str, ...] = ()) -> Application:
         "OLD_KEY": "../../none/.env",
     }
     access = Access(roots=roots, paths=("/etc/ros",))
-    return Application("../../team", (service,), secrets=secrets, access=access)
+    return Application("../../team", (), secrets=secrets, access=access)
 
 
 def test_paths(tmp_path: Path) -> None:
@@ -37,44 +32,3 @@ def test_secrets_are_read_where_they_are(tmp_path: Path) -> None:
     (tmp_path / "team").mkdir()
     (tmp_path / "team" / ".env").write_text("API_KEY=a-${HOST}\nSPEED=3\nLD_PRELOAD=evil.so\n")
     assert secrets_of(application(), tmp_path / FOLDER, {"HOST": "here"}) == {"API_KEY": "a-here"}
-
-
-def test_environment_files_of_the_host(tmp_path: Path) -> None:
-    (tmp_path / "team").mkdir()
-    (tmp_path / "team" / ".env").write_text("CAR=kiwi\n")
-    made = application("car.env", "${CAR}.env", "${X}", "/etc/passwd")
-    paths = application_paths(made, tmp_path / FOLDER)
-    assert [f.steps[-1] for f in env_file_findings(made, paths, {"X": "/etc/shadow"})] == [2, 3]
-
-
-def test_a_variable_without_a_value(tmp_path: Path) -> None:
-    made = application("${NOWHERE:?name it}")
-    with pytest.raises(EnvironmentProblem, match="NOWHERE"):
-        list(env_file_findings(made, application_paths(made, tmp_path), {}))
-
-
-@pytest.mark.parametrize("report", ["dodo-report/t", "dodo-report/.next-1a2b/t"])
-def test_the_whole_report_is_hidden_also_while_the_next_one_is_written(tmp_path: Path, report: str) -> None:
-    team = tmp_path / "team"
-    (team / report).mkdir(parents=True)
-    made = Application(".", (ApplicationService("driver"),))
-    assert hidden_paths(made, team, team / report) == [team / "dodo-report"]
-
-
-def test_own_state_and_caches_in_the_repository_are_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    team = tmp_path / "team"
-    for variable, name in (("XDG_STATE_HOME", ".state"), ("XDG_CACHE_HOME", ".cache")):
-        (team / name / "dodo").mkdir(parents=True)
-        monkeypatch.setenv(variable, str(team / name))
-    made = Application(".", (ApplicationService("driver"),))
-    assert hidden_paths(made, team, tmp_path / "report") == [team / ".state" / "dodo", team / ".cache" / "dodo"]
-
-
-def test_files_that_tests_share_are_hidden_with_the_tests(tmp_path: Path) -> None:
-    """Also where the tests are compiled into the application's own folder."""
-    for name in ("dil-a", "_files", "out/dil-a", "out/_files"):
-        (tmp_path / name).mkdir(parents=True)
-    made = Application(folder="..", services=())
-    elsewhere = tmp_path.parent / "report"
-    assert hidden_paths(made, tmp_path / "dil-a", elsewhere) == [tmp_path / "dil-a", tmp_path / "_files"]
-    assert hidden_paths(replace(made, folder="../.."), tmp_path / "out/dil-a", elsewhere) == [tmp_path / "out"]

@@ -11,7 +11,6 @@ import pytest
 from dodo_dsl.application.model import Access
 from dodo_dsl.outcome import NotRun, Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan
-from dodo_dsl.run.application_files import files_of_tests
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import BackendError, Exited, VerdictEvent
 from dodo_dsl.run.runner import Policy, Runner, default_backend
@@ -377,9 +376,3 @@ def test_a_secret_that_is_passed_is_told(scene: Scene, monkeypatch: pytest.Monke
     (text,) = [note for note in scene.progress.notes if "DATABASE" in note]
     assert "'DATABASE', which looks like an address with a password" in text
     assert "s3cr3t" not in text
-
-
-def test_each_run_looks_for_files_of_tests_anew(scene: Scene) -> None:
-    before = files_of_tests(scene.folder, scene.folder)
-    scene.run(*plans("a"))
-    assert files_of_tests(scene.folder, scene.folder) is not before

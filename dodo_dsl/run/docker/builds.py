@@ -47,14 +47,7 @@ def _digest(service: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-_GIT, _SPEC = ".git", ".dodo.yml"
-_OUTPUT = (
-    ("results.json", "index.html"),
-    ("child.gitlab-ci.yml",),
-    ("test.json", "compose.yaml"),
-    ("test.rec", "logs"),
-)
-"""What marks a report, compiled tests, one of them, and a test's part of a report by their content."""
+_GIT = ".git"
 _REMOTE = re.compile(r"[a-z-]+:|git@")
 
 
@@ -121,16 +114,12 @@ class _Contexts:
 
     def _is_left_out(self, folder: str, name: str) -> bool:
         path = os.path.join(folder, name)  # noqa: PTH118  (one of very many)
-        if name == _GIT or name.endswith(_SPEC) or Path(path) in self._hidden:
+        if name == _GIT or Path(path) in self._hidden:
             return True
         kind = os.lstat(path).st_mode
         if stat.S_ISDIR(kind):
-            return not os.access(path, os.R_OK | os.X_OK) or _is_output(path)
+            return not os.access(path, os.R_OK | os.X_OK)
         return not stat.S_ISREG(kind) and not stat.S_ISLNK(kind)
-
-
-def _is_output(folder: str) -> bool:
-    return any(all(os.path.lexists(f"{folder}/{name}") for name in names) for names in _OUTPUT)
 
 
 def _holds_git(place: Path) -> bool:

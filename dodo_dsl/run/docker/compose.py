@@ -1,7 +1,7 @@
 """``docker compose`` for one compiled test: its configuration, images, network, volumes and containers.
 
-Empty folders lie over what an application's mounts would show of the tests: their files, results and history. An error
-message about a generated file leads back to the line of the spec.
+Empty files and folders lie over what an application's mounts would show of the tests: their files, results and history.
+An error message about a generated file leads back to the line of the spec.
 """
 
 import asyncio
@@ -22,23 +22,25 @@ from dodo_dsl.application.model import FILES, image_variable
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Plan
-from dodo_dsl.run.application_files import (
-    application_paths,
-    files_of_tests,
-    hidden_paths,
-    secrets_of,
-)
+from dodo_dsl.run.application_files import application_paths, secrets_of
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
 from dodo_dsl.run.docker.pulls import PullError, Pulls, Say, image_hints
+from dodo_dsl.run.hidden_paths import hidden_paths
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.permission import known_ports
 
 
-def masks(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> list[dict[str, Any]]:
-    """Mounts that hide folders of tests, as ``docker compose config`` shows the service and the file's ``volumes``."""
-    targets = list(dict.fromkeys(map(Path, _targets(service, volumes, hidden))))
-    outer = [target for target in targets if not any(parent in targets for parent in target.parents)]
-    return [{"type": "tmpfs", "target": str(target), "read_only": True} for target in outer]
+def masks(
+    service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path], empty: Path
+) -> list[dict[str, Any]]:
+    """Mounts that hide files and folders, as ``docker compose config`` shows the service and the file's ``volumes``.
+
+    The file that is ``empty`` takes the place of files.
+    """
+    targets = {Path(target): is_file for target, is_file in _targets(service, volumes, hidden)}
+    outer = {target: is_file for target, is_file in targets.items() if targets.keys().isdisjoint(target.parents)}
+    kinds = {True: {"type": "bind", "source": str(empty)}, False: {"type": "tmpfs"}}
+    return [{**kinds[is_file], "target": str(target), "read_only": True} for target, is_file in outer.items()]
 
 
 def absent(service: Mapping[str, Any], paths: HostPaths, always: bool = False) -> list[dict[str, Any]]:
@@ -53,16 +55,19 @@ def absent(service: Mapping[str, Any], paths: HostPaths, always: bool = False) -
     return [{"type": "tmpfs", "target": volume["target"], "read_only": True} for volume in made]
 
 
-def _targets(service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]) -> Iterator[str]:
+def _targets(
+    service: Mapping[str, Any], volumes: Mapping[str, Any], hidden: Sequence[Path]
+) -> Iterator[tuple[str, bool]]:
+    """Places in the container, and whether a file is there."""
     for volume in service.get("volumes") or ():
         source = _source(volume, volumes)
         if source is None:
             continue
         for path in hidden:
             if source == path or source.is_relative_to(path):
-                yield volume["target"]
+                yield volume["target"], path.is_file()
             elif path.is_relative_to(source):
-                yield str(Path(volume["target"], path.relative_to(source)))
+                yield str(Path(volume["target"], path.relative_to(source))), path.is_file()
 
 
 def _source(volume: Mapping[str, Any], volumes: Mapping[str, Any]) -> Path | None:
@@ -82,6 +87,7 @@ def traced(plan: Plan, text: str) -> str:
     return f"{text} ({place.file}:{place.line}:{place.column})" if place else text
 
 
+_EMPTY_FILE = ".hidden"
 _BUILD_PROJECT = "dodo-build"
 _OVERLAP = "overlaps"
 _NO_COMPOSE = "docker --help"
@@ -211,8 +217,6 @@ class Compose:
     def _builds(self, folder: Path) -> Path:
         """Writes a compose file with the application's builds alone, which get nothing that it never sees."""
         hidden = hidden_paths(self.plan.application, self.folder, self.report)
-        for root in self._paths.roots:
-            hidden += files_of_tests(root, self._paths.folder, hidden).paths
         services = own_contexts({n: s for n, s in self.services.items() if is_built(s)}, hidden, folder)
         for name, service in services.items():
             if image := self._images.get(image_variable(name)):
@@ -229,9 +233,10 @@ class Compose:
         so do the application's services what hides the tests from them.
         """
         code, problem = 1, "no subnet is free"
-        masked, unsearched = await asyncio.to_thread(self._masks)
-        for text in unsearched:
-            self._say(text)
+        try:
+            masked = await asyncio.to_thread(self._masks)
+        except OSError as error:
+            raise BackendError(f"the tests' files cannot be hidden from the application: {error}") from error
         with tempfile.TemporaryDirectory(prefix="dodo-key-") as folder:
             keys = Path(folder) / "keys.compose.json"
             given: dict[str, Any] = {
@@ -255,28 +260,22 @@ class Compose:
         """The project's compose files; others than the compiled ones may be written into a private folder."""
         return [f"{layer}.compose.yml" for layer in LAYERS]
 
-    def _masks(self) -> tuple[dict[str, Any], list[str]]:
-        """What hides the tests from the application's services, and stands for what is not there.
-
-        With it, sentences on folders that are too large to be searched.
-        """
-        problems: list[str] = []
+    def _masks(self) -> dict[str, Any]:
+        """What hides the tests from the application's services, and stands for what is not there; raises OSError."""
         hidden = hidden_paths(self.plan.application, self.folder, self.report)
-        for root in self._paths.roots:
-            ours = files_of_tests(root, self._paths.folder, hidden)
-            hidden += ours.paths
-            problems += [ours.problem] if ours.problem else []
-        hidden = [path for path in hidden if path.is_dir()]  # the engine masks no single file
+        empty = self.folder / _EMPTY_FILE
+        if any(path.is_file() for path in hidden):
+            empty.touch()
         every = (*(service.name for service in self.plan.application.services), FILES)
         names = [name for name in every if name in self.services]
         found = {
             name: [
-                *masks(self.services[name], self._volumes, hidden),
+                *masks(self.services[name], self._volumes, hidden, empty),
                 *absent(self.services[name], self._paths, always=name == FILES),
             ]
             for name in names
         }
-        return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}, problems
+        return {name: {"volumes": mounts} for name, mounts in found.items() if mounts}
 
     async def _run(
         self, *words: str, subnet: str = "", log: Path | None = None, project: str = "", files: str = ""

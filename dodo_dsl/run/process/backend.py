@@ -17,7 +17,8 @@ from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run import application_time, service_protocol
 from dodo_dsl.run.announce import begin_frame, hearers
-from dodo_dsl.run.application_files import Found, application_paths, files_of_tests, hidden_paths, in_few
+from dodo_dsl.run.application_files import application_paths
+from dodo_dsl.run.hidden_paths import hidden_paths, own_data
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
 from dodo_dsl.run.outcomes import how_it_ended
@@ -36,8 +37,6 @@ from dodo_dsl.spec.model import VIRTUAL
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
-MOST_NAMED = 5
-"""Hidden files that a note names."""
 _OF_SANDBOX = ("bwrap:", "setpriv:")
 """How lines of the programs begin that confine an application's."""
 
@@ -81,7 +80,6 @@ class ProcessBackend:
         self._conditions = Conditions(plan.application.services, has_health=False)
         self._starts: dict[str, list[Command]] = {}
         """The commands by which each service of the application was started, several where a mount went meanwhile."""
-        self._is_noted = False
         self._turns: dict[str, asyncio.Task[None]] = {}
         """The services of the application that wait for the end of others."""
         self._time_ready: asyncio.Event | None = None
@@ -147,8 +145,6 @@ class ProcessBackend:
             self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
             self._conditions.failed(exited)
             return
-        if code > 0 and exited in {service.name for service in self.plan.application.services}:
-            self._note_hidden()
         if used:
             most = self.plan.application.limits.memory
             text = f"application service '{exited}' used {used / 1e6:,.0f} MB of memory, at most {most / 1e6:,.0f}"
@@ -156,29 +152,9 @@ class ProcessBackend:
         self._events.put_nowait(Exited(exited, code, out_of_memory=used > 0))
         self._conditions.ended(exited, code)
 
-    def _note_hidden(self) -> None:
-        """Notes what the application's folder has and the application did not find there, once."""
-        if self._is_noted or self.is_on_host or not self._is_confined:
-            return
-        self._is_noted = True
-        own = application_paths(self.plan.application, self._folder).folder
-        named = [path for path in self._known if path.is_file()]
-        reads = {(own / Path(path).expanduser()).resolve() for path in self.plan.application.limits.reads}
-        paths = {path for path in (*named, *self._found.paths) if path.is_relative_to(own)} - reads
-        found = sorted(path.relative_to(own).as_posix() for path in paths)
-        if found:
-            more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
-            shown = ", ".join(f"'{name}'" for name in found[:MOST_NAMED])
-            text = f"hidden from the application in its folder, as files of tests: {shown}{more}"
-            self._events.put_nowait(Noted(f"{text}; 'sandbox: read' in dodo.yml shows what is the application's own"))
-
     async def start(self, layer: str) -> dict[str, bool]:
         if layer == "application" and self._lines:
             await self.connect(self._lines)
-        if layer == "application" and self._is_confined and not self.is_on_host:
-            problem = (await asyncio.to_thread(lambda: self._found)).problem
-            if problem:
-                self._events.put_nowait(Noted(problem))
         if layer == "application" and self.plan.clock == VIRTUAL:
             await self._start_time()
         commands = []
@@ -307,19 +283,11 @@ class ProcessBackend:
 
     @functools.cached_property
     def _hidden(self) -> list[Path]:
-        """Files of tests, and what lies around the application's folder: its repository, the folders of this test."""
-        paths = application_paths(self.plan.application, self._folder)
-        ours = in_few([*self._known, *self._found.paths], paths.folder)
-        return [*ours, *paths.roots, self._folder.resolve(), self.report.resolve()]
-
-    @functools.cached_property
-    def _known(self) -> list[Path]:
-        return hidden_paths(self.plan.application, self._folder, self.report)
-
-    @functools.cached_property
-    def _found(self) -> Found:
-        own = application_paths(self.plan.application, self._folder).folder
-        return files_of_tests(own, own, self._known)
+        """What it never sees, and what lies around its folder: its repository, the folders of this test."""
+        application = self.plan.application
+        known = hidden_paths(application, self._folder, self.report)
+        roots = application_paths(application, self._folder).roots
+        return [*known, *own_data(), *roots, self._folder.resolve(), self.report.resolve()]
 
     async def next_event(self) -> Event:
         return await self._events.get()
@@ -364,7 +332,6 @@ class ProcessBackend:
         return [self._sandbox.pid] if self._sandbox.pid and self._is_confined else None
 
     async def close(self, keep: bool) -> list[str]:
-        self._is_noted = True  # what ends now was asked to end
         for turn in self._turns.values():
             turn.cancel()
         if keep and (pid := self._sandbox.pid):

@@ -5,7 +5,6 @@ would otherwise act on the programs that confine it. They come by a file without
 read words of a command line.
 """
 
-import functools
 import os
 import re
 import sys
@@ -13,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dodo_dsl import package_data
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _PACKAGE = Path(__file__).resolve().parents[2]
@@ -21,8 +19,6 @@ INTERPRETER = tuple(dict.fromkeys((sys.prefix, sys.base_prefix)))
 """The folders of this Python, which starts the application's programs."""
 SYSTEM = ("/usr", "/etc", "/opt", "/sys/devices/system")
 """What every application sees of the machine."""
-_OF_TESTS = ("tests_registry", "tests", "templates", "benchmarks", "docs", "generated", "dodo-report", "build", "dist")
-"""Folders of a checkout with tests, or with what was made of them."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +41,10 @@ class Confinement:
 
 
 def confinement(folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
-    """The confinement of an application; of the ``hidden`` paths, and DoDo's own, those matter that it would see."""
+    """The confinement of an application; of the ``hidden`` paths, those matter that it would see."""
     reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
     every = tuple(dict.fromkeys([*INTERPRETER, str(_PACKAGE), *reads]))
-    inside = _inside((*hidden, *own_data()), (*SYSTEM, *every, str(folder)))
+    inside = _inside(hidden, (*SYSTEM, *every, str(folder)))
     return Confinement(str(folder), isolation, cid, every, tuple(dict.fromkeys(inside)), limits)
 
 
@@ -59,28 +55,6 @@ def _inside(hidden: Iterable[Path], shown: Iterable[str]) -> Iterator[str]:
         for name, place in real.items():
             if path != place and path.is_relative_to(place):
                 yield str(name / path.relative_to(place))
-
-
-@functools.cache
-def own_data() -> tuple[Path, ...]:
-    """Where DoDo's tests lie, however it is installed, also next to other Pythons that an application sees."""
-    root = package_data.root()
-    optional = [path for path in _entries(Path("/opt")) if path.is_dir()]
-    prefixes = [*map(Path, (*INTERPRETER, "/usr", "/usr/local")), *optional]
-    found = [data for prefix in prefixes for data in prefix.glob(package_data.INSTALLED)]
-    found += [Path(place, "dodo_dsl", "_data") for place in sys.path]
-    for checkout in (root, *optional):
-        if (checkout / "dodo_dsl").is_dir():
-            found += [checkout, *(checkout / name for name in _OF_TESTS), checkout / ".git"]
-    there = (Path(os.path.realpath(path)) for path in (*found, root / "tests_registry") if path.is_dir())
-    return tuple(dict.fromkeys(there))
-
-
-def _entries(folder: Path) -> Iterator[Path]:
-    try:
-        yield from folder.iterdir()
-    except OSError:
-        return
 
 
 PROGRAM = "bwrap"

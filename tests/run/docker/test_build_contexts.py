@@ -18,9 +18,6 @@ from tests.run.scripted import plan
 _FILES = (
     "Dockerfile", "app.py", "data/a.txt", ".git/config", "sub/.git/config", "tests/a.dodo.yml", "tests/map.json",
     "dodo-report/results.json", "b.dodo.yml", ".dockerignore",
-    "old/results.json", "old/index.html", "out/child.gitlab-ci.yml", "out/a/test.json", "one/test.rec",
-    "one/logs/a.log",
-    "compiled/test.json", "compiled/compose.yaml",
 )  # fmt: skip
 
 
@@ -36,7 +33,7 @@ def repository(tmp_path: Path) -> Path:
 
 
 def _built(root: Path, build: Any, folder: Path) -> dict[str, Any]:
-    hidden = [root / ".git", root / "tests", root / "dodo-report"]
+    hidden = [root / ".git", root / "tests", root / "dodo-report", root / "b.dodo.yml"]
     folder.mkdir(exist_ok=True)
     found: dict[str, Any] = own_contexts({"a": {"image": "a", "build": build, "command": "x"}}, hidden, folder)
     return dict(found["a"])
@@ -103,13 +100,9 @@ def test_a_run_builds_from_the_copy_alone(repository: Path, tmp_path: Path, monk
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     report = repository / "dodo-report" / "sil-first"
     made = plan()
-    made = replace(
-        made, application=replace(made.application, folder="../..", services=(ApplicationService("a", None),))
-    )
+    services, hidden = (ApplicationService("a", None),), ("tests", "b.dodo.yml")
+    made = replace(made, application=replace(made.application, folder="../..", services=services, hidden=hidden))
     monkeypatch.setattr(Pulls, "provide", _nothing)
-    (repository / "mine").mkdir()
-    (repository / "mine" / "map.json").write_text('{"model": []}')
-    (repository / "b.dodo.yml").write_text("a\0b")
     test = Compose(made, repository / "generated" / "sil-first", report, "project", print)
     test.folder.mkdir(parents=True)
     test.services = {"a": {"image": "team/a$b", "build": {"context": str(repository)}}}
@@ -118,6 +111,6 @@ def test_a_run_builds_from_the_copy_alone(repository: Path, tmp_path: Path, monk
     assert Path(seen["services"]["a"]["build"]["context"]).parents[1].parent == report
     files = (tmp_path / "files").read_text()
     assert "/app.py" in files
-    assert not [name for name in ("config", "results.json", "generated", "mine", "dodo.yml") if name in files]
+    assert not [name for name in ("config", "results.json", "generated", "map.json", "dodo.yml") if name in files]
     assert seen["services"]["a"]["image"].startswith("dodo-build:")
     assert [path.name for path in report.iterdir()] == ["logs"]

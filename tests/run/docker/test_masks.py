@@ -6,8 +6,6 @@ from typing import Any
 import pytest
 
 from dodo_dsl.application.host_paths import HostPaths
-from dodo_dsl.plan.model import Application
-from dodo_dsl.run.application_files import hidden_paths
 from dodo_dsl.run.docker.compose import absent, masks
 
 HIDDEN = [Path("/team/tests"), Path("/team/.git")]
@@ -29,30 +27,23 @@ BOUND = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "/t
     ],
 )
 def test_what_is_hidden(volume: dict[str, Any], targets: list[str]) -> None:
-    found = masks({"volumes": [volume]}, BOUND, HIDDEN)
+    found = masks({"volumes": [volume]}, BOUND, HIDDEN, Path())
     assert found == [{"type": "tmpfs", "target": target, "read_only": True} for target in targets]
 
 
 def test_masks_do_not_lie_in_one_another() -> None:
     hidden = [Path("/team/tests/dodo-report"), Path("/team/tests")]
-    found = masks({"volumes": [{"type": "bind", "source": "/team", "target": "/app"}]}, {}, hidden)
+    found = masks({"volumes": [{"type": "bind", "source": "/team", "target": "/app"}]}, {}, hidden, Path())
     assert [mask["target"] for mask in found] == ["/app/tests"]
 
 
-def test_folders_of_the_tests(tmp_path: Path) -> None:
-    for name in ("tests", "generated/t", "dodo-report/t", ".git", "maps"):
-        (tmp_path / name).mkdir(parents=True)
-    application = Application("../..", (), hidden=("tests", "gone"))
-    hidden = hidden_paths(application, tmp_path / "generated" / "t", tmp_path / "dodo-report" / "t")
-    assert hidden == [tmp_path / name for name in ("tests", "generated", "dodo-report", ".git")]
-
-
-def test_a_report_elsewhere_needs_no_mask(tmp_path: Path) -> None:
-    (tmp_path / "team" / "generated" / "t").mkdir(parents=True)
-    application = Application("../..", ())
-    assert hidden_paths(application, tmp_path / "team" / "generated" / "t", tmp_path / "report") == [
-        tmp_path / "team" / "generated"
-    ]
+def test_an_empty_file_lies_over_a_file(tmp_path: Path) -> None:
+    (tmp_path / "truth.json").touch()
+    volumes = [{"type": "bind", "source": str(tmp_path), "target": "/app"}]
+    volumes += [{"type": "bind", "source": str(tmp_path / "truth.json"), "target": "/t"}]
+    found = masks({"volumes": volumes}, {}, [tmp_path / "truth.json"], Path("/empty"))
+    expected = [{"type": "bind", "source": "/empty", "target": t, "read_only": True} for t in ("/app/truth.json", "/t")]
+    assert found == expected
 
 
 def test_what_is_not_there_is_an_empty_folder_and_is_not_made(tmp_path: Path) -> None:

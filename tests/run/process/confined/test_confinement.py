@@ -3,14 +3,11 @@
 import itertools
 import json
 import sys
-from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
 import msgspec
-import pytest
 
-from dodo_dsl import package_data
 from dodo_dsl.run.process import confinement as module
 from dodo_dsl.run.process.confinement import Confinement, Mounts, confinement, sandbox_words
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -29,36 +26,6 @@ def test_what_is_hidden_lies_in_its_folder(tmp_path: Path) -> None:
     found = confinement(tmp_path, "network", 130, SandboxLimits(), hidden)
     assert found.hidden[:2] == (str(tmp_path / "tests"), str(tmp_path / ".git"))
     assert not {str(tmp_path), str(tmp_path.parent / "elsewhere")} & set(found.hidden)
-
-
-@pytest.fixture
-def python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The folder of a Python that runs DoDo; what others have is not looked for."""
-    prefix = tmp_path / "venv"
-    monkeypatch.setattr(module, "INTERPRETER", (str(prefix),))
-    monkeypatch.setattr(sys, "path", [])
-    module.own_data.cache_clear()
-    yield prefix
-    module.own_data.cache_clear()
-
-
-@pytest.mark.parametrize("layout", ["wheel", "editable", "checkout", "image"])
-def test_tests_of_dodos_own_installation_are_hidden(
-    tmp_path: Path, python: Path, monkeypatch: pytest.MonkeyPatch, layout: str
-) -> None:
-    data = python / "lib" / "python3.11" / "site-packages" / "dodo_dsl" / "_data"
-    checkout = tmp_path / "dodo"
-    for folder in (checkout / "dodo_dsl", checkout / "tests_registry", data / "tests_registry"):
-        folder.mkdir(parents=True)
-    shown, hidden = {
-        "wheel": (python, data),
-        "editable": (python, data),
-        "checkout": (checkout, checkout / "tests_registry"),
-        "image": (tmp_path, checkout),
-    }[layout]
-    monkeypatch.setattr(package_data, "root", lambda: data if layout == "wheel" else checkout)
-    found = confinement(tmp_path / "app", "network", 130, SandboxLimits(reads=(str(shown),)), ())
-    assert str(hidden) in found.hidden
 
 
 def test_what_is_hidden_is_hidden_by_each_name_of_its_folder(tmp_path: Path) -> None:
