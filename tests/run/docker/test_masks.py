@@ -54,8 +54,8 @@ def test_what_is_not_there_is_an_empty_folder_and_is_not_made(tmp_path: Path) ->
     binds = [{"type": "bind", "source": f"{tmp_path}/{name}", "target": f"/{name}"} for name in names]
     made = [{**volume, "bind": {"create_host_path": True}} for volume in binds]
     volumes = [*made, {**binds[0], "target": "/asked", "bind": {}}, {"type": "volume", "source": "v", "target": "/v"}]
-    paths = HostPaths(tmp_path, (tmp_path,), (tmp_path / "allowed",), literal=True)
-    allowed = HostPaths(tmp_path / "x", (tmp_path / "x",), (tmp_path,), literal=True)
+    paths = HostPaths(tmp_path, (tmp_path,), (tmp_path / "allowed",))
+    allowed = HostPaths(tmp_path / "x", (tmp_path / "x",), (tmp_path,))
     targets = [[mask["target"] for mask in absent({"volumes": volumes}, seen)] for seen in (paths, allowed)]
     assert targets == [["/gone", "/allowed/gone"], []]
     assert [mask["target"] for mask in absent({"volumes": volumes}, paths, always=True)] == [
