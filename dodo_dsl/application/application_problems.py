@@ -12,6 +12,7 @@ from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.construction import Construction, Setting
 from dodo_dsl.application.interpolation import filled, literal
 from dodo_dsl.application.model import (
+    COMMANDS,
     KEYS,
     SANDBOX,
     ApplicationSource,
@@ -21,8 +22,9 @@ from dodo_dsl.application.model import (
     is_true,
     plain,
     references,
+    words_of,
 )
-from dodo_dsl.application.slips import COMMANDS, cid_slips, is_cid, missing_program, words, words_of
+from dodo_dsl.application.slips import cid_slips, is_cid, missing_program
 from dodo_dsl.application.variables import variables_of
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
@@ -190,7 +192,7 @@ def written_cids(service: ComposeService, application: ApplicationSource) -> set
     """The CIDs of a service: built in, or by commands, variables and files of variables, as far as they are known."""
     every = {**service.file_variables, **variables_of(service, application.known, application.is_late)}
     given = {name: literal(value) or "" for name, value in every.items() if value}
-    text = " ".join(filled(literal(word) or "", given) for word, _ in words(service))
+    text = " ".join(filled(literal(word) or "", given) for word, _ in service.words)
     flags = (match["cid"] for part in (text, *given.values()) for match in opendlv_flags.NUMBER.finditer(part))
     built_in = declared_cid(service.node)
     found = (*flags, *map(given.get, opendlv_flags.CID_VARIABLES), str(built_in.value) if built_in else None)

@@ -13,7 +13,7 @@ from typing import Any
 from dodo_dsl import source
 from dodo_dsl.application.compose_files import is_late, variables_of
 from dodo_dsl.application.host_paths import HostPaths, repository
-from dodo_dsl.application.opendlv_flags import CID_VARIABLES
+from dodo_dsl.application.opendlv_flags import CID_VARIABLES, split
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -24,6 +24,7 @@ FILES = "dodo-files"
 KEYS = ("x-dodo", "x-dodo-process")
 OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
 """The variable by which programs that draw with Qt need no display."""
+COMMANDS = ("x-dodo-process", "entrypoint", "command")
 NAMESPACES = ("network_mode", "ipc", "pid")
 _FALSE = ("false", "f", "0", "no", "n", "off", "")
 
@@ -110,6 +111,11 @@ class ComposeService:
     env_files: tuple[EnvFile, ...] = ()
     file_variables: Mapping[str, str | None] = field(default_factory=dict)
     raw: Mapping[str, Node] = field(default_factory=dict)
+
+    @functools.cached_property
+    def words(self) -> tuple[tuple[str, Scalar], ...]:
+        """The words of its commands, each with the value in which it is written."""
+        return tuple(word for key in COMMANDS for word in words_of(self.node.get(key)))
 
     @property
     def cid_variables(self) -> tuple[str, ...]:
@@ -275,6 +281,17 @@ def environment(raw: Any) -> dict[str, str | None]:
         pairs = (str(item).partition("=") for item in raw)
         return {name: value if sign else None for name, sign, value in pairs}
     return {str(k): None if v is None else text(v) for k, v in (raw or {}).items()}
+
+
+def words_of(node: Node | None) -> Iterator[tuple[str, Scalar]]:
+    """The words of one command; none of a text that compose cannot split."""
+    for item in node.items if isinstance(node, source.Sequence) else (node,):
+        if isinstance(item, Scalar):
+            try:
+                words = (text(item.value),) if item is not node else split(item.text)
+            except ValueError:
+                words = ()
+            yield from ((word, item) for word in words)
 
 
 def declared_cid(node: source.Mapping) -> Scalar | None:

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from dodo_dsl.application import slips
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 
 FORMATS = {"argb": 4.0, "bgr": 3.0, "rgb": 3.0, "i420": 1.5}
@@ -34,7 +33,7 @@ def pictures_of(application: ApplicationSource) -> list[AskedPictures]:
 
 def _of(service: ComposeService) -> AskedPictures:
     formats, sizes = dict[str, str](), {"width": 0, "height": 0}
-    for flag, format_, value in _flags([word for word, _ in slips.words(service)]):
+    for flag, format_, value in _flags([word for word, _ in service.words]):
         if flag == "name" and "$" not in value:
             name = value.removeprefix("/")
             ending = name.rpartition(".")[2]

@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.model import ComposeService, text
+from dodo_dsl.application.model import ComposeService
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
-from dodo_dsl.source import Node, Scalar
+from dodo_dsl.source import Scalar
 
 _FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
 _IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
@@ -19,31 +18,9 @@ _LITERAL = re.compile(r"--cid=(?P<value>[\w.+-]+)")
 _HIGHEST = 254
 _SHORT = 3
 """Letters of a flag that others differ from by one, such as ``--pid`` and ``--id``."""
-COMMANDS = ("x-dodo-process", "entrypoint", "command")
 
-Word = tuple[str, Scalar]
 INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 _SCRIPTS = {".py": "python", ".sh": "sh", ".js": "node", ".pl": "perl", ".rb": "ruby"}
-
-
-def words(service: ComposeService) -> Iterator[Word]:
-    """The words of a service's commands, each with the value in which it is written."""
-    for key in COMMANDS:
-        yield from words_of(service.node.get(key))
-
-
-def words_of(node: Node | None) -> Iterator[Word]:
-    """The words of one command."""
-    for item in node.items if isinstance(node, source.Sequence) else (node,):
-        if isinstance(item, Scalar):
-            yield from ((word, item) for word in ((text(item.value),) if item is not node else _split(item.text)))
-
-
-def _split(command: str) -> tuple[str, ...]:
-    try:
-        return opendlv_flags.split(command)
-    except ValueError:
-        return ()  # reported with the application
 
 
 def meant(word: str, flag: str) -> str:
@@ -71,7 +48,7 @@ def _shorter(word: str) -> set[str]:
 
 def cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
     """Words that are meant to give a CID, and give none; a service that ``takes_cid`` may have flags that are alike."""
-    for word, item in words(service):
+    for word, item in service.words:
         one, literal = _IN_ONE_WORD.fullmatch(word), _LITERAL.fullmatch(word)
         if one:
             yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")

@@ -10,8 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from dodo_dsl import source
-from dodo_dsl.application.model import ApplicationSource, ComposeService
-from dodo_dsl.application.slips import COMMANDS, words_of
+from dodo_dsl.application.model import COMMANDS, ApplicationSource, ComposeService, words_of
 from dodo_dsl.diagnostics import Diagnostic, Severity
 from dodo_dsl.source import Scalar
 

@@ -81,6 +81,7 @@ def forget_files() -> None:
     read = (
         file_rules.entries,
         file_rules.problems,
+        file_rules.course_of,
         file_rules.fault_of_start,
         file_rules.table_span,
         file_rules.pictures,

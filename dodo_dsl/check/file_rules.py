@@ -205,11 +205,19 @@ def fault_of_start(flags: tuple[tuple[str, str, str], ...], x: float, y: float, 
     """What is wrong with a vehicle's start (m, deg) by its judge's parameters; None if these are wrong themselves."""
     from dodo_dsl.opendlv.assets import track
 
+    course = course_of(flags)
+    return track.fault_of_start(course[0], track.VehiclePose(x, y, math.radians(yaw)), course[1]) if course else None
+
+
+@functools.lru_cache(maxsize=64)
+def course_of(flags: tuple[tuple[str, str, str], ...]) -> tuple[Any, Any] | None:
+    """The track and the vehicle's box that a judge's parameters make; None if they are wrong."""
+    from dodo_dsl.opendlv.assets import track
+
     read: Mapping[str, Callable[[str], Any]] = {"list": lambda text: text.split(",") if text else [], "number": float}
     values = defaultdict[str, Any](lambda: None, {name: read.get(kind, str)(text) for name, kind, text in flags})
     try:
-        course, box = track.track(values), track.VehicleBox(values["length"], values["width"])
-        return track.fault_of_start(course, track.VehiclePose(x, y, math.radians(yaw)), box)
+        return track.track(values), track.VehicleBox(values["length"], values["width"])
     except ValueError:
         return None
 

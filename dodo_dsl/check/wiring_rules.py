@@ -283,7 +283,7 @@ def _missing(service: str, name: str, span: Span, made: set[str], offer: str) ->
 
 def _slips(service: ComposeService, made: set[str]) -> Iterator[Diagnostic]:
     """Flags that are almost ``--name=``, with a memory of the test."""
-    for word, item in slips.words(service):
+    for word, item in service.words:
         flag = slips.meant(word, "--name")
         if flag.partition("=")[2].removeprefix("/") in made:
             message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
@@ -292,7 +292,7 @@ def _slips(service: ComposeService, made: set[str]) -> Iterator[Diagnostic]:
 
 def _asked(service: ComposeService) -> Asked:
     found: Asked = {}
-    for word, item in slips.words(service):
+    for word, item in service.words:
         names = opendlv_flags.memories([word])
         found.update((name, item.span) for name in names if "$" not in name)
     return found

@@ -7,7 +7,7 @@ the vehicle's centre has to cross in order. A vehicle is a rectangle on the grou
 import difflib
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -150,6 +150,8 @@ class Track:
     max_speed: float | None = None
     min_body_margin: float = 0.0
     min_distance: float = 0.0
+    reaches: dict[float, shapely.Geometry] = field(default_factory=dict, compare=False)
+    """The ground within a distance (m) of walls, as far as it is known."""
 
 
 THIN = 1e-6
@@ -160,8 +162,11 @@ def _free_ground(track: Track, pose: VehiclePose, box: VehicleBox) -> tuple[shap
     """Where the centre may be, half the vehicle's width from walls: with a way around all of the map, and without."""
     known = [outline(pose, box), *track.walls.values(), *track.goal.values(), *(lines for _, lines in track.gates)]
     hull = shapely.convex_hull(shapely.union_all(known))
-    parts = shapely.get_parts([*track.walls.values()])
-    walls = shapely.union_all(shapely.buffer(parts, min(box.length, box.width) / 2, quad_segs=2))  # at once is slow
+    reach = min(box.length, box.width) / 2
+    if reach not in track.reaches:
+        parts = shapely.get_parts([*track.walls.values()])
+        track.reaches[reach] = shapely.union_all(shapely.buffer(parts, reach, quad_segs=2))  # at once is slow
+    walls = track.reaches[reach]
     around = shapely.box(*hull.bounds).buffer(box.length + box.width, quad_segs=1)
     return shapely.difference(around, walls), shapely.difference(hull, walls)
 
