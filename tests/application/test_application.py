@@ -264,7 +264,7 @@ def test_what_a_compiled_test_has_of_the_variables(line: str, named: bool, root:
 
 
 def test_variables_that_a_compiled_file_names(root: Path) -> None:
-    """Those that ``dodo.yml`` passes, secrets that stay in their file, and images; today all, which compose fills in."""
+    """Those that ``dodo.yml`` passes, secrets of ``.env``, and images; today all others, too, for compose."""
     (root / ".env").write_text("A=1\nAPI_KEY=s3cr3t\n")
     command = "--cid=111 ${A} ${API_KEY} ${PASSED} ${D:-x}"
     test = compiled(root, {"services": {"a": car(command=command)}}, environment=["PASSED"])

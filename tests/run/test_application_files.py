@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.access.model import Access
-from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.application_files import application_paths, env_file_findings, hidden_paths, secrets_of
+from dodo_dsl.run.application_files import application_paths, hidden_paths, secrets_of
 
 FOLDER = Path("generated/t")
 
@@ -37,20 +36,6 @@ def test_secrets_are_read_where_they_are(tmp_path: Path) -> None:
     (tmp_path / "team").mkdir()
     (tmp_path / "team" / ".env").write_text("API_KEY=a-${HOST}\nSPEED=3\nLD_PRELOAD=evil.so\n")
     assert secrets_of(application(), tmp_path / FOLDER, {"HOST": "here"}) == {"API_KEY": "a-here"}
-
-
-def test_environment_files_of_the_host(tmp_path: Path) -> None:
-    (tmp_path / "team").mkdir()
-    (tmp_path / "team" / ".env").write_text("CAR=kiwi\n")
-    made = application("car.env", "${CAR}.env", "${X}", "/etc/passwd")
-    paths = application_paths(made, tmp_path / FOLDER)
-    assert [f.steps[-1] for f in env_file_findings(made, paths, {"X": "/etc/shadow"})] == [2, 3]
-
-
-def test_a_variable_without_a_value(tmp_path: Path) -> None:
-    made = application("${NOWHERE:?name it}")
-    with pytest.raises(EnvironmentProblem, match="NOWHERE"):
-        list(env_file_findings(made, application_paths(made, tmp_path), {}))
 
 
 @pytest.mark.parametrize("report", ["dodo-report/t", "dodo-report/.next-1a2b/t"])

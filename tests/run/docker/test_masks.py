@@ -1,42 +1,71 @@
-"""What an application's mounts do not show of the tests."""
+"""What an application's mounts do not show of the tests, and what stands for folders that are not there."""
 
+import asyncio
+import json
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from dodo_dsl.application.access.host_paths import HostPaths
 from dodo_dsl.plan.model import Application
 from dodo_dsl.run.application_files import hidden_paths
-from dodo_dsl.run.docker.compose import absent, masks
+from dodo_dsl.run.docker.compose import Compose
+from tests.application.compiled import compiled, repository
 
-HIDDEN = [Path("/team/tests"), Path("/team/.git")]
-BOUND = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "/team"}}, "own": {}}
+CREATES = '#!/bin/sh\nfor file in $(echo "$COMPOSE_FILE" | tr ":" " "); do last=$file; done\ncat "$last" > "$SEEN"\n'
+"""A docker program that keeps the last of the files that it makes containers of."""
+
+
+def masked(volumes: list[dict[str, Any]], folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The targets of empty folders that a service with mounts gets; ``{}`` in a source is the repository."""
+    root = repository(folder, {"testsuite/x": "", "tests/truths/a.json": ""})
+    (root / "link").symlink_to("nowhere")
+    test = compiled(root, {"services": {"a": {"image": "x", "command": "--cid=111"}}}, paths=[str(folder / "allowed")])
+    assert test.plan is not None, test.told
+    program = folder / "bin" / "docker"
+    program.parent.mkdir()
+    program.write_text(CREATES.replace("$SEEN", str(folder / "seen")))
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}:{os.environ['PATH']}")
+    made = Compose(test.plan, test.write(), root / "dodo-report" / "network", "dodo-t", print)
+    made.services = {"a": {"volumes": [{**v, "source": v.get("source", "").format(root)} for v in volumes]}}
+    asyncio.run(made.create(["10.213.0.0/28"], b"key"))
+    mounts = json.loads((folder / "seen").read_text())["services"].get("a", {}).get("volumes", ())
+    assert all((mount["type"], mount["read_only"]) == ("tmpfs", True) for mount in mounts)
+    return [mount["target"] for mount in mounts]
+
+
+def bind(source: str, target: str, made: bool = False) -> dict[str, Any]:
+    return {
+        "type": "bind",
+        "source": source,
+        "target": target,
+        **({"bind": {"create_host_path": True}} if made else {}),
+    }
 
 
 @pytest.mark.parametrize(
     ("volume", "targets"),
     [
-        ({"type": "bind", "source": "/team", "target": "/app"}, ["/app/tests", "/app/.git"]),
-        ({"type": "bind", "source": "/", "target": "/host"}, ["/host/team/tests", "/host/team/.git"]),
-        ({"type": "bind", "source": "/team/tests", "target": "/t"}, ["/t"]),
-        ({"type": "bind", "source": "/team/tests/truths/a.json", "target": "/a.json"}, ["/a.json"]),
-        ({"type": "bind", "source": "/team/testsuite", "target": "/t"}, []),
-        ({"type": "volume", "source": "bound", "target": "/b"}, ["/b/tests", "/b/.git"]),
-        ({"type": "volume", "source": "own", "target": "/b"}, []),
-        ({"type": "volume", "target": "/b"}, []),
-        ({"type": "tmpfs", "target": "/b"}, []),
+        (bind("{}", "/app"), {"/app/tests", "/app/.git", "/app/generated"}),
+        (bind("{}/..", "/host"), {"/host/team/tests", "/host/team/.git", "/host/team/generated"}),
+        (bind("{}/tests", "/t"), {"/t"}),
+        (bind("{}/tests/truths/a.json", "/a.json"), {"/a.json"}),
+        (bind("{}/testsuite", "/t"), set()),
+        ({"type": "volume", "source": "own", "target": "/b"}, set()),
+        ({"type": "tmpfs", "target": "/b"}, set()),
+        (bind("{}/gone", "/gone", made=True), {"/gone"}),
+        (bind("{}/gone", "/gone"), set()),
+        (bind("{}/link", "/link", made=True), set()),
+        (bind("{}/../allowed/gone", "/allowed", made=True), set()),
     ],
 )
-def test_what_is_hidden(volume: dict[str, Any], targets: list[str]) -> None:
-    found = masks({"volumes": [volume]}, BOUND, HIDDEN)
-    assert found == [{"type": "tmpfs", "target": target, "read_only": True} for target in targets]
-
-
-def test_masks_do_not_lie_in_one_another() -> None:
-    hidden = [Path("/team/tests/dodo-report"), Path("/team/tests")]
-    found = masks({"volumes": [{"type": "bind", "source": "/team", "target": "/app"}]}, {}, hidden)
-    assert [mask["target"] for mask in found] == ["/app/tests"]
+def test_what_is_hidden(
+    volume: dict[str, Any], targets: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also what is not there, which the engine would make as root; but not what it is told not to make."""
+    assert set(masked([volume], tmp_path, monkeypatch)) == targets
 
 
 def test_folders_of_the_tests(tmp_path: Path) -> None:
@@ -52,23 +81,4 @@ def test_a_report_elsewhere_needs_no_mask(tmp_path: Path) -> None:
     application = Application("../..", ())
     assert hidden_paths(application, tmp_path / "team" / "generated" / "t", tmp_path / "report") == [
         tmp_path / "team" / "generated"
-    ]
-
-
-def test_what_is_not_there_is_an_empty_folder_and_is_not_made(tmp_path: Path) -> None:
-    """But for what the engine is told not to make, and what dodo.yml lets an application write to."""
-    (tmp_path / "there").mkdir()
-    (tmp_path / "link").symlink_to("nowhere")
-    names = ("gone", "there", "link", "allowed/gone")
-    binds = [{"type": "bind", "source": f"{tmp_path}/{name}", "target": f"/{name}"} for name in names]
-    made = [{**volume, "bind": {"create_host_path": True}} for volume in binds]
-    volumes = [*made, {**binds[0], "target": "/asked", "bind": {}}, {"type": "volume", "source": "v", "target": "/v"}]
-    paths = HostPaths(tmp_path, (tmp_path,), (tmp_path / "allowed",), literal=True)
-    allowed = HostPaths(tmp_path / "x", (tmp_path / "x",), (tmp_path,), literal=True)
-    targets = [[mask["target"] for mask in absent({"volumes": volumes}, seen)] for seen in (paths, allowed)]
-    assert targets == [["/gone", "/allowed/gone"], []]
-    assert [mask["target"] for mask in absent({"volumes": volumes}, paths, always=True)] == [
-        "/gone",
-        "/allowed/gone",
-        "/asked",
     ]
