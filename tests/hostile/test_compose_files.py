@@ -48,7 +48,7 @@ def test_it_is_refused_or_harmless(attack: dict[str, Any], tmp_path: Path) -> No
 @pytest.mark.xfail(reason="until services are constructed", strict=False)
 @pytest.mark.parametrize("attack", attacks("not stopped before"))
 def test_what_was_not_stopped(attack: dict[str, Any], tmp_path: Path) -> None:
-    """Numbers that compose takes for none, a mount without a source, and a path that looks like an address."""
+    """Not stopped yet: numbers that compose takes for none, a mount of nothing, and a path like an address."""
     test_it_is_refused_or_harmless(attack, tmp_path)
 
 
