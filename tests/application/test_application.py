@@ -2,14 +2,16 @@
 
 import itertools
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from dodo_dsl import compiler
 from dodo_dsl.plan.model import ApplicationService
-from tests.application.compiled import FILE, Compiled, compiled, repository
+from tests.application.compiled import FILE, Compiled, compiled, filled, repository
 
 FILES = {"here.py": "", "a.txt": "x", "b.env": "# the other car's\nOD4SESSION_CID=112\n", "data/x": "A=1\n"}
 
@@ -257,6 +259,34 @@ def test_what_a_compiled_test_has_of_the_variables(line: str, named: bool, root:
         if one.endswith((f"={value}", f":{value}", f'"{value}"', f":{value}}}"))
     ]
     assert bool(lines) == named
+
+
+def test_variables_that_a_compiled_file_names(root: Path) -> None:
+    """Those that ``dodo.yml`` passes, secrets of ``.env``, and images; today all others, too, for compose."""
+    (root / ".env").write_text("A=1\nAPI_KEY=s3cr3t\n")
+    command = "--cid=111 ${A} ${API_KEY} ${PASSED} ${D:-x}"
+    test = compiled(root, {"services": {"a": car(command=command)}}, environment=["PASSED"])
+    named = set(re.findall(r"(?<!\$)\$\{?([A-Za-z_]+)", test.files["application.compose.yml"]))
+    then = {"API_KEY", "PASSED", "DODO_IMAGE_A"}
+    assert named in (then, then | {"A", "D"})
+    assert test.services["a"]["command"] == ["--cid=140", "1", "x"]
+
+
+def test_a_pipeline_sets_images(root: Path) -> None:
+    services = {"my-eyes.v2": car(), "built": {"build": ".", "command": "--cid=111"}}
+    text = of_services(root, **services).files["application.compose.yml"]
+    given = {"DODO_IMAGE_MY_EYES_V2": "other@sha256:0", "DODO_IMAGE_BUILT": "built:2"}
+    for variables, images in (({}, ["x", ""]), (given, ["other@sha256:0", "built:2"])):
+        made = filled(yaml.safe_load(text), variables)["services"]
+        assert [made[name]["image"] for name in services] == images
+
+
+def test_what_is_left_out_is_named_once(root: Path) -> None:
+    """In one warning a service, at the first of the keys; today without one."""
+    keys = {"ports": ["80:80"], "restart": "always", "labels": {"a": "b"}, "container_name": "c"}
+    test = of_services(root, a=car(**keys), b=car(**keys))
+    assert rules(test) in ([], [("warning", "application-key", line) for line in (5, 12)])
+    assert not [key for service in test.services.values() for key in keys if key in service]
 
 
 @pytest.mark.parametrize(

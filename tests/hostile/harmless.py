@@ -46,6 +46,7 @@ BUILD = {
     ),
     *("no_cache_filter", "platforms", "provenance", "pull", "sbom", "secrets", "shm_size", "target", "ulimits"),
 }
+MOUNT = {"bind", "consistency", "image", "read_only", "source", "target", "tmpfs", "type", "volume"}
 TOP = {"services", "volumes", "secrets", "configs", "networks"}
 MEMORY, FILES = 2_000_000_000, 1_000_000_000
 LIMITS = {"pids_limit": 1024, "mem_limit": MEMORY, "memswap_limit": 2 * MEMORY, "shm_size": MEMORY, "cpu_shares": 1024}
@@ -189,6 +190,7 @@ def _tmpfs(options: str) -> Iterator[str]:
 def _mount(mount: Any, volumes: Document, folder: Path, repository: Path) -> Iterator[str]:
     if isinstance(mount, dict):
         kind, source, is_read = mount.get("type"), str(mount.get("source") or ""), bool(mount.get("read_only"))
+        yield from _others(mount, MOUNT, "of a mount")
         options = {**(mount.get("bind") or {}), **(mount.get("volume") or {})}
         if mount.get("tmpfs") or kind == "tmpfs":
             yield from _tmpfs(f"size={_at(mount, 'tmpfs', 'size') or 0}")
@@ -213,7 +215,7 @@ def _mount(mount: Any, volumes: Document, folder: Path, repository: Path) -> Ite
             yield f"volume '{source}' of nobody"
         if _is_external(volumes.get(source)) and not is_read:
             yield f"mount {mount} could be written to"
-    elif kind not in ("volume", "tmpfs", "image"):
+    elif kind not in ("volume", "tmpfs", "image", None):
         yield f"mount {mount}"
 
 
@@ -270,7 +272,11 @@ def _volume(volume: Document, folder: Path, repository: Path) -> Iterator[str]:
     words = [word for word in options.get("o", "").split(",") if word]
     if volume.get("driver") not in (None, "", "local"):
         yield f"driver: {volume['driver']}"
-    if re.match("/|dodo-", str(volume.get("name") or "")) or isinstance(volume.get("external"), dict):
+    external = volume.get("external")
+    name = external.get("name") if isinstance(external, dict) else volume.get("name")
+    if _is_external(volume) and not re.fullmatch("[a-zA-Z0-9][a-zA-Z0-9_.-]*", str(name or "a")):
+        yield f"external: {volume}"
+    if str(name or "").startswith("dodo-"):
         yield f"external: {volume}"
     if {"bind", "rbind"} & {word.strip() for word in words}:
         is_read = [word for word in words if word in ("ro", "rw")][-1:] == ["ro"]
@@ -286,7 +292,7 @@ def _volume(volume: Document, folder: Path, repository: Path) -> Iterator[str]:
 
 
 def _is_external(volume: Any) -> bool:
-    return bool((volume or {}).get("external"))
+    return (volume or {}).get("external") not in (None, False, "")
 
 
 def _is_own(path: str, folder: Path, repository: Path) -> bool:

@@ -43,6 +43,13 @@ def test_it_is_refused_or_harmless(attack: dict[str, Any], tmp_path: Path) -> No
     assert [word for word in (SECRET, *attack.get("gone", ())) if word in "".join(test.files.values())] == []
 
 
+@pytest.mark.xfail(reason="until services are constructed", strict=False)
+@pytest.mark.parametrize("attack", attacks("not stopped before"))
+def test_what_was_not_stopped(attack: dict[str, Any], tmp_path: Path) -> None:
+    """Not stopped yet: numbers that compose takes for none, a mount of nothing, and a path like an address."""
+    test_it_is_refused_or_harmless(attack, tmp_path)
+
+
 @pytest.mark.parametrize("home", ["/", ""])
 @pytest.mark.parametrize("mount", ["/etc:/h", "/etc:/h:ro", "~/.ssh:/h:ro", "~:/h", "/tmp/x:/h", "/opt:/h"])
 def test_what_is_no_home(mount: str, home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
