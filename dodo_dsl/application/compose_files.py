@@ -157,19 +157,23 @@ class ComposeFiles:
 
     def gather(self, file: Path | None, span: Span) -> None:
         """Adds the variables of an ``.env`` file, if there is one."""
-        self.problems.extend(dotenv_problems(file) if file else ())
-        for name, value in variables_of(file).items() if file else ():
+        if file is None:
+            return
+        self.problems.extend(dotenv_problems(file))
+        own: dict[str, str] = {}
+        for name, value in dotenv(text_of(file))[0]:
             if value is None or self.is_late(name):
                 continue
-            text = literal(filled(value, self.known, self.is_late))
-            if file and (text is None or holds_secret(name, text)):
-                self.secrets.update({} if is_steering(name) else {name: file})
-            elif text is not None and self.known.get(name, text) != text:
-                message = (
-                    f"variable '{name}' has another value in '{file.name if file else ''}' than in an earlier file"
-                )
+            text = literal(filled(value, {**self.known, **own}, self.is_late))
+            if text is not None and not holds_secret(name, text):
+                own[name] = text
+            elif not is_steering(name):
+                self.secrets[name] = file
+        for name, text in own.items():
+            if self.known.get(name, text) != text:
+                message = f"variable '{name}' has another value in '{file.name}' than in an earlier file"
                 self.problem(span, message, "a test has one .env file, so give the variable one value")
-            elif file and text is not None:
+            else:
                 self.known[name], self._of[name] = text, file
 
     def keep_secret(self, name: str) -> None:

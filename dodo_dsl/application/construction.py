@@ -90,7 +90,10 @@ class Construction:
 
     def rebased(self, path: str) -> str:
         """A path of the application as seen from the compiled test's folder, as compose reads it."""
-        return compose_paths.rebased(compose_paths.escaped(path), self.base)
+        if path.startswith(("/", "~")):
+            return compose_paths.escaped(path)
+        joined = os.path.normpath(f"{self.base}/{compose_paths.escaped(path)}")
+        return joined if joined.startswith(".") else f"./{joined}"
 
     def show(self, source: str, span: Span, writer: str = "") -> None:
         if source:

@@ -87,15 +87,10 @@ class Container(Part):
 
     def number(self, node: Node, most: float, what: str, key: str, measure: Any = limits.number) -> Any:
         """A limit of at most ``most``."""
-        written = self.literal(node)
-        value = most
-        if written is not None:
-            value, is_cut = limits.cut(written, most, measure)
-            if is_cut:
-                self.cut(node.span, what, most, key)
-            else:
-                value = int(measure(value)) if float(measure(value)).is_integer() else float(measure(value))
-        return value
+        value, is_cut = limits.cut(self.literal(node), most, measure)
+        if is_cut:
+            self.cut(node.span, what, most, key)
+        return int(value) if float(value).is_integer() else value
 
 
 _WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"

@@ -29,9 +29,9 @@ LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
 def size(value: object) -> float:
     """Bytes of a size as compose reads it, ``8g``; infinite where it is none."""
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return value if value >= 0 else math.inf
+        return math.floor(value) if 0 <= value < math.inf else math.inf
     found = _SIZE.fullmatch(str(value))
-    return float(found[1]) * 1024.0 ** " kmgtp".index(found[2].lower() or " ") if found else math.inf
+    return math.floor(float(found[1]) * 1024.0 ** " kmgtp".index(found[2].lower() or " ")) if found else math.inf
 
 
 def number(value: object) -> float:
@@ -43,11 +43,17 @@ def number(value: object) -> float:
     return found if found >= 0 else math.inf
 
 
-def cut(value: object, most: float, measure: "Any" = number) -> tuple[Any, bool]:
+def whole(value: object) -> float:
+    """A whole number, as compose reads it."""
+    found = number(value)
+    return math.floor(found) if math.isfinite(found) else found
+
+
+def cut(value: object, most: float, measure: Callable[[object], float] = number) -> tuple[float, bool]:
     """A limit of at most ``most``, and whether it was cut; 0 and below are no limit."""
     found = measure(value)
-    if 0 < found <= most:
-        return value, False
+    if 0 < found <= most and math.isfinite(found):
+        return found, False
     return most, math.isfinite(found) and found > most
 
 
@@ -162,6 +168,6 @@ def own_limits(c: "Container") -> None:
 LIMITS: dict[str, Callable[["Container", Node], Any]] = {
     "cpus": cpus,
     "mem_limit": lambda c, n: c.number(n, c.limits.memory, "mem_limit", "memory", size),
-    "pids_limit": lambda c, n: c.number(n, c.limits.processes, "pids_limit", "processes"),
+    "pids_limit": lambda c, n: c.number(n, c.limits.processes, "pids_limit", "processes", whole),
     "shm_size": lambda c, n: c.number(n, c.limits.memory, "shm_size", "memory", size),
 }

@@ -191,7 +191,9 @@ def _carried(of: "Container", mount: Mount) -> Mount | None:
 
 def _bound(of: "Container", mount: Mount) -> Mount | None:
     paths, source, setting = of.project.paths, mount.source, of.project.setting
-    if "\0" in source:
+    if not source:
+        of.bad(mount.span, f"a folder that '{of.name}' mounts has no 'source'", "name it, or write 'type: volume'")
+    elif "\0" in source:
         of.refuse(mount.span, *paths.mount_problem(source))
     elif source == MEMORY or source.startswith(f"{MEMORY}/"):
         return None if setting.own_network else mount

@@ -150,7 +150,7 @@ class Track:
     max_speed: float | None = None
     min_body_margin: float = 0.0
     min_distance: float = 0.0
-    reaches: dict[float, shapely.Geometry] = field(default_factory=dict, compare=False)
+    reaches: dict[float, shapely.Geometry] = field(default_factory=dict, init=False, compare=False)
     """The ground within a distance (m) of walls, as far as it is known."""
 
 
