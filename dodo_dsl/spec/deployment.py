@@ -20,7 +20,8 @@ from dodo_dsl.spec import rig
 from dodo_dsl.spec.quantity import convert
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.validation import validate
+from dodo_dsl.spec.slips import mended
+from dodo_dsl.spec.validation import schema_of, validate
 
 _LEAST = {"memory": "6 MB", "file-size": "1 kB", "copies": "1 MB", "disk": "1 MB"}
 """The least sizes; Docker takes no limit of memory below 6 MB."""
@@ -192,7 +193,8 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
-        found = [*found, *validate(node, "deployment")]
+        node, slipped = mended(node, schema_of("deployment"))
+        found = [*found, *slipped, *validate(node, "deployment")]
     fallback = Deployment(path.parent, path, registry=(package_data.registry(),))
     if not isinstance(node, Mapping) or has_errors(found):
         return fallback, found

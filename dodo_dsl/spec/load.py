@@ -16,7 +16,7 @@ from dodo_dsl.spec.model import LAYERS, VIRTUAL, Pool, Spec, spec_of
 from dodo_dsl.spec.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
-from dodo_dsl.spec.validation import validate
+from dodo_dsl.spec.validation import schema_of, validate
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
 """The instances of a file, and its problems."""
@@ -32,9 +32,10 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         if not found:
             found = [extends.nothing_in(location.path)]
         return [Spec(location)], found
-    node, problems = extends.resolve(slips.joined(node), location.path, location.root, reader)
+    node, slipped = slips.mended(node, schema_of("dodo"))
+    node, problems = extends.resolve(node, location.path, location.root, reader)
     is_whole = not has_errors(problems)
-    found = [*found, *problems]
+    found = [*found, *slipped, *problems]
     if extends.is_open(node):
         return [_by_name(location, node)], [*found, *_surely_wrong(node)]
     choices, problems = matrix.choices(node)

@@ -321,8 +321,8 @@ SLIPS = {
     ),
     "indent-missing-body": Wrong(
         {9: "camera: {uses: virtual-camera, with: {map-path: maps/plain, freq: 10 Hz}}"},
-        "9:1 unknown-key: 'camera' is next to 'environment', which is empty",
-        "indent what belongs to 'environment'",
+        "9:1 unknown-key: 'camera' stands beside 'environment'; indent it by 2 spaces",
+        "it belongs to 'environment'",
     ),
     "indent-one-too-few": Wrong(
         {21: "     walls: [left, right]"},

@@ -195,15 +195,6 @@ def test_no_key_has_another_case(key: str, repository: Path) -> None:
     assert line.strip().startswith(upper.key)
 
 
-@pytest.mark.parametrize(("number", "meant"), [(0, "false"), (1, "true")])
-def test_a_number_is_no_switch(number: int, meant: str, repository: Path) -> None:
-    """Compose takes none either."""
-    _, problems = compiled([Case("service", "privileged", Form("number", number), 1)], repository)
-    (told,) = problems
-    assert told.message == "'privileged' is a whole number, expected true or false"
-    assert told.hint == f"write {meant}; compose takes no number here"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("hil", [False, pytest.param(True, marks=pytest.mark.proof)])
 def test_what_compose_makes_of_the_copies(hil: bool, repository: Path) -> None:
