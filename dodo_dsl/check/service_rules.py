@@ -64,7 +64,7 @@ def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
         if use.layer not in manifest.layers:
             message = f"service '{manifest.name}' does not fit layer {use.layer}"
             hint = f"move it to {' or '.join(manifest.layers)}"
-            yield Diagnostic(use.uses.span, "wrong-layer", message, hint, about=tuple(manifest.layers))
+            yield Diagnostic(use.uses.span, "wrong-layer", message, hint)
 
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:

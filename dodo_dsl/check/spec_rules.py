@@ -13,13 +13,12 @@
 ``rig-isolation``: hardware is on the host's network.
 ``rig-device``: a test moves the rig that it names and no other, and only the service that moves it opens its port.
 ``unknown-check``: a goal names a check of an evaluator. ``goal-values``: its values fit its direction: a goal that
-scores nothing, or the wrong way, would rank applications by mistake. ``wrong-file``: a baseline has the test.
+scores nothing, or the wrong way, would rank applications by mistake.
 """
 
 import os
 from collections.abc import Iterator
 
-from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.lockstep import answers, rates, rates_fit, step_hz
@@ -246,7 +245,3 @@ def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[D
 
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
     yield from resolved_goals(context.test).problems
-
-
-def check_baseline(context: RuleContext) -> Iterator[Diagnostic]:
-    yield from resolved_baseline(context.spec).problems

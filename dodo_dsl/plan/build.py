@@ -12,7 +12,6 @@ from dodo_dsl.application import mounts
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.application.mounts import large_folders
 from dodo_dsl.check import senders as check_senders
-from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
@@ -226,7 +225,6 @@ class _Builder:
             "response",
             "resources",
             "goals",
-            "baseline",
         ):
             if key in spec.spans:
                 self._place(key, spec.span(key))
@@ -272,7 +270,6 @@ class _Builder:
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
-            baseline=resolved_baseline(spec).values,
             import_paths=self.shared.imports,
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),

@@ -2,9 +2,8 @@
 
 import dataclasses
 import json
-import math
 import re
-from dataclasses import replace
+from dataclasses import astuple, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
@@ -26,10 +25,10 @@ from dodo_dsl.plan.model import (
 from dodo_dsl.plan.test_files import is_shared_name
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.matrix import SLUG
-from dodo_dsl.spec.model import LEVELS, is_goal, is_valid
+from dodo_dsl.spec.model import LEVELS, is_goal
 
 FORMAT = 1
-_RARE = frozenset({"lines", "baseline", "timed", "emulated", "raw_files"})
+_RARE = frozenset({"lines", "timed", "emulated", "raw_files"})
 """Keys that are written if there is a value."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
@@ -97,6 +96,10 @@ def _with_settings(plan: Plan, settings: Settings) -> Plan:
     return plan
 
 
+def _limits(plan: Plan) -> tuple[float | None, ...]:
+    return astuple(plan.resources) if plan.resources else ()
+
+
 def _problem(plan: Plan) -> str:
     """The first value that is wrong, or an empty string; its type is right."""
     texts = (plan.name, plan.spec, plan.description, plan.kind, plan.tag, *plan.more_tags, plan.rig)
@@ -116,14 +119,13 @@ def _problem(plan: Plan) -> str:
         "shared file": all(_is_inside(path) and is_shared_name(name) for path, name in plan.shared.items()),
         "import path": not any("\0" in path for path in plan.import_paths),
         "goal": all(map(is_goal, plan.goals)),
-        "baseline": all(math.isfinite(each.value) and each.tolerance >= 0 for each in plan.baseline),
         "service name": all(_NAME.fullmatch(s.name) for s in services),
         "service layer": all(s.layer in LAYERS for s in plan.services),
         "flag": all(f.kind not in ("path", "report") or _is_inside(f.value) for s in plan.services for f in s.flags),
         "set-up time": all(0 <= s.setup_s <= 86_400 for s in plan.services),
         "port": not any("\0" in s.port for s in plan.services),
         "device": all(is_device(d) for s in plan.services for d in s.devices),
-        "resources": plan.resources is None or is_valid(plan.resources),
+        "resources": all(limit is None or 0 <= limit < float("inf") for limit in _limits(plan)),
         "line": all(
             0 <= line.sender < 1 << 32 and _is_pattern(line.match) for s in application.services for line in s.lines
         ),

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv.assets import map_file
-from dodo_dsl.source import Entry
+from dodo_dsl.source import Entry, walk
 from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter, Ports, holds
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import Rig
@@ -92,6 +92,8 @@ def argument(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Arg
     entry = written(spec, use, parameter, rig)
     if entry is None:
         return Argument(parameter, None, default_value(parameter))
+    if any(node.tag for node in walk(entry.value)):
+        return Argument(parameter, entry)  # which is a problem of its own
     try:
         return Argument(parameter, entry, convert(parameter, entry.value, spec.location.root))
     except ValueProblem as problem:

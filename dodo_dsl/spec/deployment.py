@@ -14,29 +14,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import __version__, package_data
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, has_errors
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read, walk
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.quantity import convert
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.slips import mended
-from dodo_dsl.spec.validation import schema_of, validate
-
-_LEAST = {"memory": "6 MB", "file-size": "1 kB", "copies": "1 MB", "disk": "1 MB"}
-"""The least sizes; Docker takes no limit of memory below 6 MB."""
-_MOST = "1000000 GB"
-
-
-def size_problems(node: object) -> Iterator[Diagnostic]:
-    """Sizes in ``sandbox`` or a rig that are too small or beyond any computer; ``node`` is a valid one, or None."""
-    if not isinstance(node, Mapping):
-        return
-    for key, least in _LEAST.items():
-        size = node.get(key)
-        if isinstance(size, Scalar) and not convert(least, "B") <= convert(size.text, "B") <= convert(_MOST, "B"):
-            message = f"'{key}' is {size.text}, expected {least} to {_MOST}"
-            yield Diagnostic(size.span, "out-of-range", message)
+from dodo_dsl.spec.validation import schema_of, valid_part
 
 
 def sandbox_limits(entry: Entry | None) -> SandboxLimits:
@@ -103,6 +88,8 @@ _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<t
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
+_NO_CID = 0
+"""Of a rig whose own is not valid."""
 _FROM_HERE = "paths are relative to the folder of dodo.yml"
 _NOT_YET = f"dodo new NAME makes it, with a first test; {_FROM_HERE}"
 _OF_GANTRY = ("serial", "limits", "axes")
@@ -194,13 +181,13 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
         node, slipped = mended(node, schema_of("deployment"))
-        found = [*found, *slipped, *validate(node, "deployment")]
-    fallback = Deployment(path.parent, path, registry=(package_data.registry(),))
-    if not isinstance(node, Mapping) or has_errors(found):
-        return fallback, found
+        node, problems, _ = valid_part(node, "deployment")
+        found = [*found, *slipped, *problems]
+    if not isinstance(node, Mapping):
+        return Deployment(path.parent, path, registry=(package_data.registry(),)), found
     raw = plain(node)
     images = raw.get("images", {})
-    problems: list[Diagnostic] = []
+    problems = []
     rigs = _rigs(node.entries.get("rigs"), problems)
     reserved = {r.cid for r in rigs.values()}
     registry, absent = _registry(path.parent, node.entries.get("registry"), problems)
@@ -228,7 +215,7 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
         sandbox=sandbox_limits(node.entries.get("sandbox")),
     )
     _odvd(node.entries.get("messages"), deployment.messages, problems)
-    problems += [*size_problems(node.get("sandbox")), *service_folder_problems(path.parent, node.get("services"))]
+    problems += service_folder_problems(path.parent, node.get("services"))
     return deployment, [*found, *problems]
 
 
@@ -310,12 +297,12 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
         if not isinstance(written.value, Mapping):
             continue
         raw = plain(written.value)
-        cid = None if raw.get("emulated") else raw["cid"]
-        found = rigs[name] = Rig(name, raw["kind"], cid, written.value)
+        cid = None if raw.get("emulated") else raw.get("cid", _NO_CID)
+        found = rigs[name] = Rig(name, raw.get("kind", "dynamic"), cid, written.value)
         if cid is not None and name in rig.EMULATED_RIGS:
             message = f"the name '{name}' is reserved for the built-in rig"
             problems.append(Diagnostic(written.key, "rig-name", message, "choose another name"))
-        elif cid is not None and (cid in taken or cid in RESERVED_CIDS):
+        elif cid not in (None, _NO_CID) and (cid in taken or cid in RESERVED_CIDS):
             owner = f"rig '{taken[cid]}'" if cid in taken else "real cars"
             message = f"CID {cid} is taken by {owner}, expected one that only this rig has"
             problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
@@ -323,7 +310,6 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
         taken.setdefault(cid, name)
         problems.extend(_tags(found))
         problems.extend(_unused(found))
-        problems.extend(size_problems(written.value))
     return rigs
 
 

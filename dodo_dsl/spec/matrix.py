@@ -114,6 +114,6 @@ def problems(node: Mapping) -> Iterator[Diagnostic]:
             yield Diagnostic(dimension.key, "matrix-unused", message, severity="warning")
 
 
-def substitute(node: Node, choice: Choice) -> Node:
+def substitute(node: Mapping, choice: Choice) -> Mapping:
     """The node with the choice's values for the placeholders; nodes without placeholders stay the same objects."""
     return PLACEHOLDERS.filled(node, dict(choice.values))

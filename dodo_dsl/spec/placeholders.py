@@ -57,7 +57,12 @@ class Placeholders:
 
     def names(self, node: Node) -> set[str]:
         """The names that placeholders below a node have."""
-        return {m["name"] for n in walk(node) if isinstance(n, Scalar) for m in self._one.finditer(n.text)}
+        return {name for below in walk(node) for name in self.names_in(below)}
+
+    def names_in(self, node: Node) -> set[str]:
+        """The names that placeholders in a scalar have."""
+        text = node.text if isinstance(node, Scalar) and "${" in node.text else ""
+        return {match["name"] for match in self._one.finditer(text)}
 
     def used(self, node: Mapping) -> set[str]:
         """The names that a spec uses outside the key itself."""
@@ -96,18 +101,16 @@ class Placeholders:
                 hint = did_you_mean(match["name"], known) if known else self.advice
                 yield Diagnostic(scalar.span, rule, self.lacks.format(match["name"]), hint)
 
-    def filled(self, node: Node, values: Values[str, Scalar]) -> Node:
+    def filled(self, node: Mapping, values: Values[str, Scalar]) -> Mapping:
         """The node with values for the placeholders; nodes without placeholders stay the same objects.
 
         A spec's matrix, which may be large, stays as it is: its values are filled where they are used.
         """
-        if not values or not isinstance(node, Mapping) or MATRIX not in node.entries:
-            return self._filled(node, values) if values else node
-        rest = without(node, MATRIX)
-        filled = self._filled(rest, values)
+        filled = self._filled(without(node, MATRIX), values) if values else node
         assert isinstance(filled, Mapping)
-        entries = {key: filled.entries.get(key, entry) for key, entry in node.entries.items()}
-        return node if filled is rest else Mapping(node.span, entries, node.tag)
+        return Mapping(
+            node.span, {key: filled.entries.get(key, entry) for key, entry in node.entries.items()}, node.tag
+        )
 
     def _filled(self, node: Node, values: Values[str, Scalar]) -> Node:
         if isinstance(node, Scalar):

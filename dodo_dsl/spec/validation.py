@@ -3,6 +3,7 @@
 An error is explained by the keyword of the schema that it violates, and by the schema around that keyword.
 """
 
+import contextlib
 import functools
 import json
 import math
@@ -23,8 +24,10 @@ from dodo_dsl.spec.registry import SUFFIX, as_file
 from dodo_dsl.spec.slips import boolean_meant, repaired, slip_in_key
 
 OF_COMPOSE = "application"
-UNIT, WORDS, EXPECT = "x-unit", "x-words", "x-expect"
-"""The unit of a quantity, words that may stand in place of it, and in words what a pattern asks for."""
+TOLD = "!told"
+"""The tag of values of which a problem is known already."""
+UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
+"""The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
 _WHOLE = "x-whole"
 """Beside ``type: integer``, for JSON Schema takes 1.0 for a whole number."""
 _OF_TYPE = ("type", UNIT, _WHOLE)
@@ -68,6 +71,21 @@ class _Quantity:
             quantity.convert(instance, self._unit)
 
 
+class _Range:
+    def __init__(self, schema: dict[str, Any], bounds: list[str], _: object) -> None:
+        self._unit = schema[UNIT]
+        self._low, self._high = (quantity.convert(bound, self._unit) for bound in bounds)
+
+    def validate(self, instance: object) -> None:
+        with contextlib.suppress(quantity.QuantityError):  # which is told by its unit
+            if not self._low <= quantity.convert(instance, self._unit) <= self._high:
+                raise _OutOfRange
+
+
+class _OutOfRange(Exception):
+    """A quantity is beyond its bounds."""
+
+
 class _Whole:
     def __init__(self, *_: object) -> None: ...
 
@@ -79,7 +97,9 @@ class _Whole:
 def _validator(schema: dict[str, Any]) -> Any:
     import jsonschema_rs
 
-    return jsonschema_rs.Draft202012Validator(schema, keywords={UNIT: _Quantity, _WHOLE: _Whole}, retriever=_by_address)
+    return jsonschema_rs.Draft202012Validator(
+        schema, keywords={UNIT: _Quantity, RANGE: _Range, _WHOLE: _Whole}, retriever=_by_address
+    )
 
 
 def _by_address(address: str) -> dict[str, Any]:
@@ -152,19 +172,19 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
     return valid_part(node, schema)[1]
 
 
-def valid_part(
-    node: Node, schema: str, unread: Collection[Path] = ()
-) -> tuple[Node | None, list[Diagnostic], set[Path]]:
+def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], set[Path]]:
     """What of a document its schema allows, what is wrong with the rest, and where that is.
 
-    Values at ``unread`` places are neither judged nor part of the result.
+    Values with the tag TOLD are not judged. A service's parameters stay, as they are read by its manifest.
     """
-    found, places = list[Diagnostic](), set(unread)
+    found, places = list[Diagnostic](), set[Path]()
     for path, tagged in _tags(node, ()):
-        places.add(path)
-        tag = tagged.tag.replace("tag:yaml.org,2002:", "!!")
-        hint = "remove the tag, or write a text in quotes"
-        found.append(Diagnostic(tagged.span, "yaml-tag", f"tag '{tag}' is not supported", hint))
+        if "with" not in path:
+            places.add(path)
+        if tagged.tag != TOLD:
+            tag = tagged.tag.replace("tag:yaml.org,2002:", "!!")
+            hint = "remove the tag, or write a text in quotes"
+            found.append(Diagnostic(tagged.span, "yaml-tag", f"tag '{tag}' is not supported", hint))
     known = set(places)
     for violation in _violations(_document(node), schema):
         missing = {(*violation.path, violation.wanted)} if violation.keyword == "required" else set()
@@ -172,7 +192,7 @@ def valid_part(
             continue
         found += _TRANSLATORS.get(violation.keyword, _other)(violation, _Place(node, violation, schema))
         places |= {*violation.places}
-    return _without(node, (), places) if places else node, found, places
+    return _without(node, (), places), found, places
 
 
 def _document(node: Node) -> Any:
@@ -196,7 +216,15 @@ def _tags(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
             yield from _tags(item, (*path, number))
 
 
+def without_places(node: Mapping, places: Collection[Path]) -> Mapping:
+    """The same without what is at these places."""
+    rest = _without(node, (), places)
+    return rest if isinstance(rest, Mapping) else Mapping(node.span, {})
+
+
 def _without(node: Node, path: Path, places: Collection[Path]) -> Node | None:
+    if not places:
+        return node
     if path in places:
         return None
     if isinstance(node, Mapping):
@@ -384,7 +412,8 @@ def _pattern(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
 
 
 def _bounds(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    low, high = violation.schema.get("minimum"), violation.schema.get("maximum")
+    schema = violation.schema
+    low, high = schema.get(RANGE) or (schema.get("minimum"), schema.get("maximum"))
     shown = place.text if len(place.text) <= 60 else f"{place.text[:57]}..."
     yield Diagnostic(place.span, "out-of-range", f"{place.name} is {shown}, expected {low} to {high}")
 
@@ -415,6 +444,7 @@ _TRANSLATORS: dict[str, Callable[[Violation, _Place], Iterator[Diagnostic]]] = {
     "type": _type,
     _WHOLE: _type,
     UNIT: _quantity,
+    RANGE: _bounds,
     "enum": _choices,
     "const": _const,
     "pattern": _pattern,
