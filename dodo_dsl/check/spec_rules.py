@@ -5,7 +5,6 @@
 ``level-kind``: recorded data cannot react, so no closed loop at level dil (thesis, Table 4.3).
 ``clock-level``: lockstep needs an environment that can wait, so hardware runs in real time.
 ``clock-rate``: in lockstep a test steps from frame to frame, so all rates have to fit the camera's.
-``clock-answers``: in lockstep a message has to complete the application's answer to a frame.
 ``clock-timed``: in lockstep only time that frames bring goes on, and not that of an application's own timers.
 ``clock-virtual``: where the application's time is the test's, no answer is slow, and no printed line has a time.
 ``rig-pool``: any rig of a pool can run the test: there are some, of one kind, and they can be distinguished.
@@ -21,7 +20,7 @@ from collections.abc import Iterator
 
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.goals import resolved_goals
-from dodo_dsl.check.lockstep import answers, rates, rates_fit, step_hz
+from dodo_dsl.check.lockstep import rates, rates_fit, step_hz
 from dodo_dsl.check.resolve import isolation
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean, shown_path
 from dodo_dsl.source import Scalar
@@ -67,14 +66,9 @@ def check_levels(context: RuleContext) -> Iterator[Diagnostic]:
 def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
     if not context.spec.is_stepped or not context.spec.is_whole:
         return
-    wiring = context.wiring
     yield from _rates(context)
     if context.spec.clock == VIRTUAL:
         yield from _own_time(context)
-    elif wiring.has_application and not wiring.done and not answers(wiring):
-        message = "no declared message completes a frame: the application's answer ends when it waits for the next one"
-        hint = "declare x-dodo.answers, or x-dodo.done, at the application's service that sends last"
-        yield Diagnostic(context.spec.span("clock"), "clock-answers", message, hint, severity="warning")
     timed = context.application.timed if context.application and context.spec.clock != VIRTUAL else ()
     for name, span in timed:
         message = f"this application acts by its own clock: '{name}' has timers, which in lockstep do not wait"

@@ -1,7 +1,6 @@
 """Service manifests: a service with its layers, parameters and ports, and rules that the schema cannot express.
 
-``wrong-manifest``: what concerns two places of a manifest. ``manifest-name``: the service and its folder have the same
-name.
+``wrong-manifest``: what concerns two places of a manifest.
 """
 
 import functools
@@ -66,15 +65,6 @@ def _conditions(node: Node | None, types: dict[str, str]) -> Iterator[Diagnostic
     for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
         if name not in types:
             yield Diagnostic(entry.key, RULE, f"'when' names the unknown parameter '{name}'", did_you_mean(name, types))
-
-
-def name_inconsistencies(name: str, path: Path) -> Iterator[Diagnostic]:
-    """A warning if the service of a manifest has another name than its folder; ``my-name`` may be in ``my_name``."""
-    folder = path.parent.name
-    if folder.replace("_", "-") != name.replace("_", "-"):
-        message = f"the service is named '{name}', and its folder '{folder}'"
-        hint = f"tests use the name: 'uses: {name}'; give both the same"
-        yield Diagnostic(Span(str(path)), "manifest-name", message, hint, severity="warning")
 
 
 def _all_ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:
@@ -345,5 +335,4 @@ def load_manifests(
                 found.append(Diagnostic(Span(str(path)), "name-taken", message, "choose another name"))
             elif manifest:
                 manifests[manifest.name] = manifest
-                found.extend(name_inconsistencies(manifest.name, path))
     return manifests, tuple(found)
