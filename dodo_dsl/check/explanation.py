@@ -101,7 +101,7 @@ def explain(test: ResolvedTest) -> Explanation:
         spec.level or "?",
         spec.kind or "?",
         spec.rig or "",
-        spec.pool.text if spec.pool else "",
+        spec.pool,
         tuple(_service(test, use) for use in spec.uses),
         tuple(_variable(name, entry) for name, entry in spec.variables.items()),
         tuple(RangeExplained(one.name, one.nominal.text, one.text, _place(one.nominal.span)) for one in spec.ranges),

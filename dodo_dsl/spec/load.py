@@ -1,7 +1,7 @@
 """A file's tests: read, merged over what it extends, set by the command line, and made into instances.
 
-Settings of the command line override the specs before anything is checked or built. ``rig: {any: dynamic}``, a test
-that any rig of a kind, or any of some, may run, is an instance for each of them, as is ``rig: dynamic`` for several.
+Settings of the command line override the specs before anything is checked or built. ``rig: dynamic``, a test that any
+rig of a kind may run, is an instance for each of them.
 """
 
 from collections.abc import Collection, Iterator
@@ -12,7 +12,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, read
 from dodo_dsl.spec import extends, matrix, slips, vary
 from dodo_dsl.spec.matrix import Choice
-from dodo_dsl.spec.model import LAYERS, VIRTUAL, Pool, Spec, spec_of
+from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
 from dodo_dsl.spec.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
@@ -190,23 +190,18 @@ def applied(spec: Spec, settings: Settings) -> Spec:
 DIMENSION = "rig"
 
 
-def members(pool: Pool, rigs: Known[str, Rig]) -> list[Rig]:
-    """The rigs of a pool that the deployment has, in its order or the test's; of a kind, real ones or one emulated."""
-    if pool.kind:
-        found = [rig for rig in rigs.values() if rig.kind == pool.kind.text]
-        return [rig for rig in found if not rig.is_emulated] or found[:1]
-    return [rigs[name] for name in dict.fromkeys(word.text for word in pool.names) if name in rigs]
+def members(kind: str, rigs: Known[str, Rig]) -> list[Rig]:
+    """The rigs of a kind, in the deployment's order: real ones, or one that is emulated."""
+    found = [rig for rig in rigs.values() if rig.kind == kind and rig.is_whole]
+    return [rig for rig in found if not rig.is_emulated] or found[:1]
 
 
 def on_each(spec: Spec, rigs: Known[str, Rig]) -> list[Spec]:
-    """A spec with a pool on each of its rigs, any other as it is; rigs of another kind than the first are mistakes."""
-    pool = spec.pool
-    if spec.rig in KIND_TAGS and spec.rig not in rigs:
-        pool = Pool(Scalar(spec.span(DIMENSION), spec.rig, spec.rig))
-        rigs = {name: rig for name, rig in rigs.items() if rig.is_whole}
-    found = members(pool, rigs) if pool else []
-    pool = pool if spec.pool or len(found) > 1 else None
-    return [_on(spec, rig, pool) for rig in found if rig.kind == found[0].kind] or [spec]
+    """A spec that names a kind of rigs on each of them, any other as it is."""
+    if spec.rig is None or spec.rig not in KIND_TAGS or spec.rig in rigs:
+        return [spec]
+    found = members(spec.rig, rigs)
+    return [_on(spec, rig, spec.rig if len(found) > 1 else "") for rig in found] or [spec]
 
 
 def of_test(spec: Spec) -> Spec:
@@ -218,7 +213,7 @@ def of_test(spec: Spec) -> Spec:
     return replace(spec, choice=replace(spec.choice, values=(*values[:place], *values[place + 1 :])))
 
 
-def _on(spec: Spec, rig: Rig, pool: Pool | None) -> Spec:
+def _on(spec: Spec, rig: Rig, pool: str) -> Spec:
     name = Scalar(spec.span(DIMENSION), rig.name, rig.name)
     corners = tuple(_on(corner, rig, pool) for corner in spec.corners)
     choice = Choice((*spec.choice.values, (DIMENSION, name))) if pool else spec.choice

@@ -1,8 +1,7 @@
-"""A spec as it was written, with its goals, its pool of rigs, and the resources that it allows.
+"""A spec as it was written, with its goals and the resources that it allows.
 
-Fields that are missing or of a wrong type are None, and diagnostics report them. Soft goals are scores of checks, by
-which ``dodo rank`` compares applications. A pool is ``{any: dynamic}`` or ``{any: [kiwi-1, kiwi-2]}``. ``resources``
-are what each service of the application may use of the machine.
+Fields that are missing or not valid are None. Soft goals are scores of checks, by which ``dodo rank`` compares
+applications. ``resources`` are what each service of the application may use of the machine.
 """
 
 import math
@@ -12,34 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence
+from dodo_dsl.source import Entry, Mapping, Node, Scalar
 from dodo_dsl.spec import quantity, vary
 from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.registry import Location
-
-ANY = "any"
-
-
-@dataclass(frozen=True)
-class Pool:
-    """A kind of rigs, all of which will do, or the names of those that will."""
-
-    kind: Scalar | None = None
-    names: tuple[Scalar, ...] = ()
-
-    @property
-    def text(self) -> str:
-        return self.kind.text if self.kind else f"[{', '.join(word.text for word in self.names)}]"
-
-
-def pool_of(node: Node | None) -> Pool | None:
-    """The pool that the value of ``rig`` is; None for a rig's name, and for what the schema refuses."""
-    written = node.get(ANY) if isinstance(node, Mapping) else None
-    if isinstance(written, Scalar) and isinstance(written.value, str):
-        return Pool(kind=written)
-    if isinstance(written, Sequence):
-        return Pool(names=tuple(item for item in written.items if isinstance(item, Scalar)))
-    return None
 
 
 @dataclass(frozen=True)
@@ -95,7 +70,7 @@ STEPPED_CLOCKS = ("lockstep", VIRTUAL)
 class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
-    ``pool`` shows which rigs will do where the spec names none, and the deployment shows which ones these are.
+    ``pool`` is the kind of several rigs, any of which will do, and ``rig`` one of them.
     ``isolation`` is None if the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
     to take what only a simulation knows. ``frames`` is one of FRAMES, ``frames_hz`` None for the cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
@@ -115,7 +90,7 @@ class Spec:
     timeout_s: float | None = None
     clock: str = "realtime"
     rig: str | None = None
-    pool: Pool | None = None
+    pool: str = ""
     isolation: str | None = None
     pose: str = "declared"
     seed: int = 0
@@ -179,7 +154,6 @@ def spec_of(location: Location, node: Mapping, choice: Choice, spans: dict[str, 
         timeout_s=_number(node.get("timeout"), "s"),
         clock=text("clock", "realtime"),
         rig=text("rig"),
-        pool=pool_of(node.get("rig")),
         isolation=text("isolation"),
         pose=text("pose", "declared"),
         seed=int(str(seed.value)) if isinstance(seed, Scalar) else 0,
