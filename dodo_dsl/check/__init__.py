@@ -80,8 +80,7 @@ def forget_files() -> None:
         file_rules.entries,
         file_rules.problems,
         file_rules.fault_of_start,
-        file_rules.table_span,
-        file_rules.pictures,
+        file_rules.table_begin,
     )
     for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()

@@ -9,12 +9,11 @@ Parameters fit the manifest: known, complete, of the right type and unit, within
 ``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
 ``wrong-messages``: the deployment's do not give what DoDo's services use another meaning.
 ``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
-``camera-source``: what a rig's computer can take frames from, in which sizes, and how often.
+``camera-source``: what a rig's computer can take frames from, in which sizes.
 ``camera-size``: a camera's optics, as they were measured, are those of frames of one size. ``out-of-range``: sizes
 are even.
 """
 
-import math
 from collections.abc import Collection, Iterator
 from pathlib import PurePath
 
@@ -144,6 +143,8 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
             continue  # a rig that is unknown or missing may give it, too
         if parameter.shared and not context.spec.is_whole:
             continue  # a service that could not be read may give it
+        if parameter.shared and _lacks_first(context, service, parameter.name):
+            continue  # what is written there would be given here, too
         givers = _givers(context, parameter.name) if parameter.shared else {}
         if len(givers) == 1:
             continue
@@ -154,6 +155,19 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
         if len(givers) > 1:
             hint = f"{' and '.join(givers.values())} give different values, so write the one to use"
         yield Diagnostic(use.span, "missing-parameter", message, hint)
+
+
+def _lacks_first(context: RuleContext, service: ResolvedService, name: str) -> bool:
+    """Whether another service that shares the parameter needs it as well, and comes first."""
+    needing = (
+        each
+        for each in context.services
+        if (one := each.manifest.parameters.get(name))
+        and one.required
+        and name not in each.use.parameters
+        and not _misspelt(each) & {name}
+    )
+    return next(needing, service) is not service
 
 
 def _wants_rig(context: RuleContext) -> bool:
@@ -259,7 +273,6 @@ def check_camera_sources(context: RuleContext) -> Iterator[Diagnostic]:
         for argument in service.arguments.values():
             if argument.parameter.rig == CAMERA_SOURCE and argument.text:
                 yield from _problems(context, service, argument)
-                yield from _exposure(service, argument.text)
 
 
 def _problems(context: RuleContext, service: ResolvedService, argument: Argument) -> Iterator[Diagnostic]:
@@ -289,23 +302,6 @@ def _odd(service: ResolvedService) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 _span(service, argument), "out-of-range", message, f"write for example {max(int(text) - 1, 2)}"
             )
-
-
-def _exposure(service: ResolvedService, source: str) -> Iterator[Diagnostic]:
-    """Frames of a real camera that would come faster than it can expose them."""
-    if source != RPICAM and not source.startswith("/dev/"):
-        return
-    try:
-        rate, exposure = (float(service.texts[name]) for name in ("freq", "exposure"))
-    except (KeyError, ValueError):
-        return
-    if rate * exposure > 1 + 1e-9:
-        places = (service.use.parameters.get(name) for name in ("exposure", "freq"))
-        span = next((entry.value.span for entry in places if entry), service.use.span)
-        message = f"an exposure of {exposure * 1e3:g} ms does not fit into the {1e3 / rate:.3g} ms between two frames"
-        most, fastest = math.floor(1e4 / rate) / 10, math.floor(10 / exposure) / 10
-        hint = f"write an exposure of at most {most:g} ms, or a freq of at most {fastest:g} Hz"
-        yield Diagnostic(span, "camera-source", message, hint)
 
 
 def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:

@@ -26,12 +26,11 @@ from dodo_dsl.application.variables import owner, split_by
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
-from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring, message
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.values import default_value
 
 SENSORS = "opendlv.proxy."
 """Prefix of the messages that a car's devices send."""
@@ -78,30 +77,13 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
-        hint = _otherwise(context, end) or (
-            "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
-        )
+        hint = "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
         hint = _who_could(context, wiring, end)
     if rule == "no-sample":
         message += ", so it could never judge"
     return Diagnostic(end.span, rule, message, hint)
-
-
-def _otherwise(context: RuleContext, end: End) -> str:
-    """A hint: with which parameters the service takes what the application sends."""
-    sent = [each.port for each in context.wiring.application_produces]
-    service = next(each for each in context.services if each.use.name == end.service)
-    manifest, defaults = service.manifest, (default_value(each) for each in service.manifest.parameters.values())
-    texts = {n: v.text for n, v in zip(manifest.parameters, defaults, strict=True) if v} | dict(service.texts)
-    for when in (case.when for case in manifest.cases if case.ports.inputs):
-        other = {n: next(filter(None, values), "") for n, values in when.items() if texts.get(n, "") not in values}
-        taken = [message(text, None) for text in manifest.messages_with(texts | other).inputs if text[-1] not in "?!"]
-        if other and all(any(port.consumes(each) for each in sent) for port in taken):
-            written = " and ".join(f"'{name}: {value}'" for name, value in other.items())
-            return f"write {written} for an application that sends {' and '.join(map(str, taken))}"
-    return ""
 
 
 def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
@@ -122,26 +104,6 @@ def _names_of(manifest: Manifest, port: str) -> tuple[str, ...]:
     name = port.partition("/")[0]
     parameter = manifest.parameters.get(name.strip("{}")) if name.startswith("{") else None
     return parameter.choices if parameter else (name,)
-
-
-def _sensor_line(context: RuleContext, port: Port) -> str:
-    """A hint for a reading of the car's sensors: the line of a service that sends it; empty without one."""
-    sensors = [m for _, m in sorted(context.manifests.items()) if "environment" in m.layers and _sends(m, port.name)]
-    if not port.name.startswith(SENSORS) or not sensors:
-        return ""
-    manifest = sensors[0]
-    given = {name for use in context.spec.uses for name in use.parameters}
-    needed = [p for p in manifest.parameters.values() if p.required and not (p.shared and p.name in given)]
-    written = {p.name: "..." if p.example is None else str(p.example) for p in needed}
-    for output in manifest.all_messages.outputs:
-        name, _, stamp = output.partition("/")
-        if port.name in _names_of(manifest, output):
-            for each, value in ((name, port.name), (stamp, "" if port.stamp is None else str(port.stamp))):
-                parameter = manifest.parameters.get(each.strip("{}")) if each.startswith("{") else None
-                if parameter and value and value != str(parameter.default):
-                    written[parameter.name] = f"[{value}]" if parameter.type == "list" else value
-    values = ", ".join(f"{name}: {value}" for name, value in written.items())
-    return f"add under 'environment': {manifest.name}: {{uses: {manifest.name}, with: {{{values}}}}}"
 
 
 def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
@@ -173,7 +135,7 @@ def _unsatisfied_application(context: RuleContext, wiring: Wiring) -> Iterator[D
         own = any(end.port.consumes(other.port) for other in wiring.application_produces)
         if not own and not wiring.producers(end.port) and not wiring.undeclared:
             message = f"the application's '{end.service}' consumes {end.port}, which no service of the test sends"
-            hint = _sensor_line(context, end.port)
+            hint = _who_could(context, wiring, end) if end.port.name.startswith(SENSORS) else ""
             yield Diagnostic(end.span, "application-input", message, hint, severity="warning")
 
 
@@ -189,8 +151,6 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
     known = {**context.application.known, **set_here}
-    for service in context.application.services.values():
-        yield from _slips(service, known, made)
     asked = {service.name: _asked(service, known) for service in context.application.services.values()}
     players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
     shown = {end.port.name for end in ends if end.service not in players}
@@ -280,15 +240,6 @@ def _missing(service: str, name: str, span: Span, made: set[str], offer: str) ->
     alike = {each.rpartition(".")[0] for each in made if each.endswith(f".{format_}")}
     hint = hint if closest(stem, alike) else offer or hint
     return Diagnostic(span, "application-memory", message, hint, "warning")
-
-
-def _slips(service: ComposeService, known: dict[str, str], made: set[str]) -> Iterator[Diagnostic]:
-    """Flags that are almost ``--name=``, with a memory of the test."""
-    for word, item in slips.words(service):
-        flag = slips.meant(interpolated(word, known), "--name")
-        if flag.partition("=")[2].removeprefix("/") in made:
-            message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
-            yield Diagnostic(item.span, "application-memory", message, f"did you mean '{flag}'?", "warning")
 
 
 def _asked(service: ComposeService, known: dict[str, str]) -> Asked:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import __version__, package_data
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span
+from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read, walk
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.quantity import convert
@@ -306,18 +306,10 @@ def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
             owner = f"rig '{taken[cid]}'" if cid in taken else "real cars"
             message = f"CID {cid} is taken by {owner}, expected one that only this rig has"
             problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
-        problems.extend(_octal(written.value.get("cid")))
         taken.setdefault(cid, name)
         problems.extend(_tags(found))
         problems.extend(_unused(found))
     return rigs
-
-
-def _octal(cid: Node | None) -> Iterator[Diagnostic]:
-    if isinstance(cid, Scalar) and cid.text.startswith("0") and cid.text.isdecimal():
-        message = f"'cid' is {cid.text}, which other readers of YAML take for an octal number"
-        hint = f"write {cid.value}"
-        yield Diagnostic(cid.span, "wrong-value", message, hint, fix=Fix(cid.text, str(cid.value)))
 
 
 def _unused(found: Rig) -> Iterator[Diagnostic]:
