@@ -35,7 +35,7 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
     first_layer: dict[str, str] = {}
     for use in context.spec.uses:
         if use.uses.text not in context.manifests and not _is_broken(context, use.uses.text):
-            hint = did_you_mean(use.uses.text, context.manifests) or f"see 'dodo list --services {use.layer}'"
+            hint = did_you_mean(use.uses.text, context.manifests) or "'dodo list --services' shows those that there are"
             message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
             yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
         if use.name == "sandbox" or use.name.startswith("dodo-"):

@@ -31,6 +31,7 @@ from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
+from dodo_dsl.spec.values import default_value
 
 SENSORS = "opendlv.proxy."
 """Prefix of the messages that a car's devices send."""
@@ -77,13 +78,30 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
-        hint = "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
+        hint = _otherwise(context, end) or (
+            "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
+        )
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
         hint = _who_could(context, wiring, end)
     if rule == "no-sample":
         message += ", so it could never judge"
     return Diagnostic(end.span, rule, message, hint)
+
+
+def _otherwise(context: RuleContext, end: End) -> str:
+    """A hint: with which parameters the service takes what the application sends."""
+    sent = [each.port for each in context.wiring.application_produces]
+    service = next(each for each in context.services if each.use.name == end.service)
+    manifest, defaults = service.manifest, (default_value(each) for each in service.manifest.parameters.values())
+    texts = {n: v.text for n, v in zip(manifest.parameters, defaults, strict=True) if v} | dict(service.texts)
+    for when in (case.when for case in manifest.cases if case.ports.inputs):
+        other = {n: next(filter(None, values), "") for n, values in when.items() if texts.get(n, "") not in values}
+        taken = [message(text, None) for text in manifest.messages_with(texts | other).inputs if text[-1] not in "?!"]
+        if other and all(any(port.consumes(each) for each in sent) for port in taken):
+            written = " and ".join(f"'{name}: {value}'" for name, value in other.items())
+            return f"write {written} for an application that sends {' and '.join(map(str, taken))}"
+    return ""
 
 
 def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
