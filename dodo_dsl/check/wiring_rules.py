@@ -26,7 +26,7 @@ from dodo_dsl.application.variables import owner, split_by
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
-from dodo_dsl.check.wiring import ANYTHING, End, Wiring
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring, message
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import ResolvedService
