@@ -39,12 +39,16 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     if not isinstance(node, Mapping):
         return [Spec(location)], [*found, *validate(node, "dodo")]
     choices, problems = matrix.choices(node)
-    unknown = [*matrix.problems(node), *vary.problems(node)]
+    of_matrix = list(matrix.PLACEHOLDERS.unknown(node, "matrix-unknown"))
+    of_ranges = list(vary.PLACEHOLDERS.unknown(node, "vary-unknown"))
+    unknown = [*of_matrix, *of_ranges]  # which may be meant to use any name
+    found += [] if of_matrix else matrix.PLACEHOLDERS.idle(node, "matrix-unused")
+    found += [] if of_ranges else vary.PLACEHOLDERS.idle(node, "vary-unused")
     found += [*problems, *unknown]
     spans = {key: entry.value.span for key, entry in node.entries.items()}
     are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
     is_broken = len(choices[0].values) < len(getattr(node.get(MATRIX), "entries", ()))
-    told = {problem.span for problem in unknown if problem.severity == "error"}
+    told = {problem.span for problem in unknown}
     specs = []
     for choice in choices:
         if wrong >= _MOST_WRONG:

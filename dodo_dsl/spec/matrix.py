@@ -13,7 +13,12 @@ KEY = MATRIX
 MAX_INSTANCES = 2_000
 MAX_SLUG = 180
 
-PLACEHOLDERS = Placeholders(KEY, "the matrix has no dimension '{}'", "add it with its values under 'matrix'")
+PLACEHOLDERS = Placeholders(
+    KEY,
+    "the matrix has no dimension '{}'",
+    "add it with its values under 'matrix'",
+    "so its instances are all the same",
+)
 _NOT_SLUG = re.compile(r"[^a-z0-9]+")
 SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 """The slug of any test or instance."""
@@ -97,21 +102,6 @@ def _otherwise(text: str) -> str:
     return (
         f"names have letters and digits only: write one of them otherwise, such as '{whole[0]}.0{text[whole.end() :]}'"
     )
-
-
-def problems(node: Mapping) -> Iterator[Diagnostic]:
-    """Placeholders of unknown dimensions, and dimensions without placeholders."""
-    entry = node.entries.get(KEY)
-    dimensions = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
-    wrong = list(PLACEHOLDERS.unknown(node, dimensions, "matrix-unknown"))
-    yield from wrong
-    if wrong:
-        return  # which may be meant to use any dimension
-    used = PLACEHOLDERS.used(node)
-    for name, dimension in dimensions.items():
-        if name not in used:
-            message = f"nothing uses ${{matrix.{name}}}, so its instances are all the same"
-            yield Diagnostic(dimension.key, "matrix-unused", message, severity="warning")
 
 
 def substitute(node: Mapping, choice: Choice) -> Mapping:

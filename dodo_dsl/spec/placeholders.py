@@ -33,13 +33,15 @@ class Placeholders:
     """Those of one ``key`` of specs.
 
     ``lacks`` is the message about a name that the key does not have, with ``{}`` for the name, and ``advice`` the hint
-    if it has no names at all. With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so
+    if it has no names at all; ``why_idle`` is what a name is for that nothing uses.
+    With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so
     that problems are shown there and not at the placeholder.
     """
 
     key: str
     lacks: str
     advice: str
+    why_idle: str
     points_at_value: bool = False
 
     @functools.cached_property
@@ -69,8 +71,21 @@ class Placeholders:
         others = (entry.value for key, entry in node.entries.items() if key != self.key)
         return {name for value in others for name in self.names(value)}
 
-    def unknown(self, node: Mapping, known: Collection[str], rule: str) -> Iterator[Diagnostic]:
-        """Placeholders of a spec with names that are not ``known``, or without one."""
+    def _known(self, node: Mapping) -> dict[str, Entry]:
+        written = node.get(self.key)
+        return written.entries if isinstance(written, Mapping) else {}
+
+    def idle(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
+        """Names without placeholders, unless ranges come from an extended test."""
+        used = self.used(node)
+        for name, entry in self._known(node).items():
+            if name not in used and (self.key == MATRIX or entry.key.file == node.span.file):
+                message = f"nothing uses ${{{self.key}.{name}}}, {self.why_idle}"
+                yield Diagnostic(entry.key, rule, message, severity="warning")
+
+    def unknown(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
+        """Placeholders of a spec with names that are not known, or without one."""
+        known = self._known(node)
         for key, part in node.entries.items():
             for one in walk(part.value) if key != self.key else ():
                 if name := self._meant(one, known):
