@@ -9,11 +9,10 @@ from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.diagnostics import Span, shown_path
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.arguments import Argument
+from dodo_dsl.spec.arguments import Argument, default_value
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import EMULATED_FILE
-from dodo_dsl.spec.values import default_value
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,8 @@ from dodo_dsl.check.senders import HIDDEN, told
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring, message
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import ResolvedService
+from dodo_dsl.spec.arguments import ResolvedService, default_value
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.values import default_value
 
 SENSORS = "opendlv.proxy."
 """Prefix of the messages that a car's devices send."""

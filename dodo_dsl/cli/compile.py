@@ -10,11 +10,10 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 from urllib.parse import quote
 
 from dodo_dsl import __version__, atomic, package_data
-from dodo_dsl.check import catalogue
 from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
 from dodo_dsl.cli.errors import NO_APPLICATION, Exit, UsageError
@@ -38,6 +37,9 @@ from dodo_dsl.emit.pipeline import SearchJobs
 from dodo_dsl.emit.pipeline_jobs import JobOptions
 from dodo_dsl.plan.model import Suite
 from dodo_dsl.terminal import WIDE, json_text, printable
+
+if TYPE_CHECKING:
+    from dodo_dsl.check.catalogue import Page
 
 Fixes = dict[Span, Fix]
 
@@ -84,6 +86,8 @@ _SARIF = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 
 def format_sarif(diagnostics: Sequence[Diagnostic]) -> str:
     """A SARIF log, as code scanning and editors read it; columns count characters."""
+    from dodo_dsl.check import catalogue
+
     pages = catalogue.pages()
     rules = sorted({d.rule for d in diagnostics})
     marks = fingerprints(diagnostics)
@@ -93,7 +97,7 @@ def format_sarif(diagnostics: Sequence[Diagnostic]) -> str:
     return json_text({"$schema": _SARIF, "version": "2.1.0", "runs": [run]})
 
 
-def _rule(page: catalogue.Page) -> dict[str, Any]:
+def _rule(page: "Page") -> dict[str, Any]:
     return {
         "id": page.name,
         "shortDescription": {"text": page.summary},

@@ -24,14 +24,13 @@ from dodo_dsl.plan.rewrite.service_copy import Setting
 from dodo_dsl.plan.rewrite.volumes import too_long
 from dodo_dsl.plan.test_files import FileCopy, FilesError, copies, standing_once
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import Argument, ResolvedService
+from dodo_dsl.spec.arguments import Argument, ResolvedService, Value, default_value
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
 from dodo_dsl.spec.model import VIRTUAL
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.values import Value, default_value
 
 
 @dataclass(frozen=True)

@@ -226,19 +226,19 @@ class _Reading:
     def _check_services(self) -> None:
         """Folders that are a service themselves, that hold none, and that DoDo's packages hide."""
         for item in _texts(self.node.get("services")):
-            folder, rule = path_of(self.root, item.text), "service-folder"
+            folder = path_of(self.root, item.text)
             if folder is None or not folder.is_dir():
                 continue
             if (folder / MANIFEST).is_file():
                 hint = "name the folder above it, which holds a folder for each service"
-                self._tell(item.span, rule, f"'{item.text}' is the folder of one service", hint)
+                self._tell(item.span, "service-folder", f"'{item.text}' is the folder of one service", hint)
             elif not any(folder.glob(f"*/{MANIFEST}")):
                 hint = f"a service is a folder in it with a {MANIFEST}: {item.text.rstrip('/')}/NAME/{MANIFEST}"
-                self._tell(item.span, rule, f"'{item.text}' holds no service", hint, "warning")
+                self._tell(item.span, "service-folder", f"'{item.text}' holds no service", hint, "warning")
             elif folder.name in _TAKEN:
                 message = f"Python finds DoDo's own package '{folder.name}' before this folder"
                 hint = f"give it another name, such as my_{folder.name}, also in 'process' of its services"
-                self._tell(item.span, rule, message, hint, "warning")
+                self._tell(item.span, "service-folder", message, hint, "warning")
 
     def _rigs(self) -> dict[str, Rig]:
         rigs: dict[str, Rig] = {}

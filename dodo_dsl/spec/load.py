@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, read
 from dodo_dsl.spec import extends, matrix, slips, vary
-from dodo_dsl.spec.matrix import Choice
+from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
-from dodo_dsl.spec.placeholders import MATRIX, Placeholders, without
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
 from dodo_dsl.spec.validation import TOLD, schema_of, valid_part, validate, without_places

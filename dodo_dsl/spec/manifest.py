@@ -98,7 +98,7 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
     if kind == "path" and "default" in raw:
         yield wrong("default", f"'{name}' is a path in a test, so it cannot have a default")
     elif "default" in raw:
-        from dodo_dsl.spec.values import ValueProblem, convert
+        from dodo_dsl.spec.arguments import ValueProblem, convert
 
         try:
             convert(replace(_read(name, raw), unit=""), node.entries["default"].value, Path())

@@ -10,7 +10,7 @@ from decimal import Decimal
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.placeholders import Placeholders
+from dodo_dsl.spec.matrix import Placeholders
 
 KEY = "vary"
 PLACEHOLDERS = Placeholders(

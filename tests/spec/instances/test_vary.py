@@ -85,8 +85,10 @@ def unknown(written: str) -> list[str]:
 
 @pytest.mark.parametrize(
     "written",
-    ["${light}", "{vary.light}", "'{vary.light}'", "$(vary.light)", "${{ vary.light }}", "${vary.light", "$vary.light"]
-    + ["vary.light", "\u201c${vary.light}\u201d"],
+    [
+        *("${light}", "{vary.light}", "'{vary.light}'", "$(vary.light)", "${{ vary.light }}", "${vary.light"),
+        *("$vary.light", "vary.light", "\u201c${vary.light}\u201d"),
+    ],
 )
 def test_what_is_meant_as_a_placeholder(written: str) -> None:
     assert unknown(written) == ['write "${vary.light}"']

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Scalar
+from dodo_dsl.spec.arguments import Value, ValueProblem, convert, default_value
 from dodo_dsl.spec.manifest import Parameter
-from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
 from tests.source.nodes import mapping, value
 
 ROOT = Path("/registry")
