@@ -276,8 +276,9 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
              "write the text in single quotes, where a backslash is a backslash"),
     _Pattern(_SUSPECTS, "suspect", r" *(?P<at>-)(?P<value>[^-\s].*)",
              "a space is missing after '-'", "write '- {value}'", "- "),
-    _Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{_NAME}(?P<at>:)(?P<value>(?!//)[^\s:#].*)",
-             "a space is missing after the colon of '{key}'", _WRITE, ": "),
+    *(_Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{name}(?P<at>:)(?P<value>(?!//)[^\s:#].*)",
+               "a space is missing after the colon of '{key}'", _WRITE, fix)
+      for name, fix in ((r"(?P<key>[a-z][a-z0-9-]*)", ": "), (_NAME, ""))),
     _Pattern("colon", "mark", r"\s*(?:- )?(?P<key>[^:]*): .*(?P<at>\0).*",
              "a second colon in the value of '{key}', which must be one string",
              "put the text in quotes, or write a mapping in braces or into the next lines"),

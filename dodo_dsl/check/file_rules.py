@@ -1,14 +1,4 @@
-"""Rules on the files that parameters name, and on the limits by which evaluators judge.
-
-``wrong-file``: what is in a file, read as the services read it, at the position in the file. A file whose parameter
-has no format is JSON of the shape that the manifest names.
-``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
-``short-timeout``: the test's timeout leaves room for the longest time that an evaluator waits.
-``wrong-start``: the vehicle starts clear of the walls and on their side of the goal.
-``input-limit``: what the test shows can meet the limits, and is judged until its end.
-``no-limit``: an evaluator has something to judge by; ``empty-file``: so has the file that it judges by. A test that can
-only pass shows nothing about the application.
-"""
+"""Rules on the files that parameters name, and on the limits by which evaluators judge."""
 
 import functools
 import json

@@ -1,18 +1,4 @@
-"""Rules on the services of a test: their names and layers, parameters, messages and cameras.
-
-``unknown-service``: ``uses`` names a service with a manifest; ``service-taken``: names in a test are unique.
-``service-reserved``: DoDo adds its own services to every test.
-``wrong-layer``: a service is in a layer that its manifest lists.
-Parameters fit the manifest: known, complete, of the right type and unit, within bounds, files in place:
-``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
-``missing-file``, ``path-escape``. ``unused-parameter``: those that are set have an effect beside the others.
-``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
-``wrong-messages``: the deployment's do not give what DoDo's services use another meaning.
-``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
-``camera-source``: what a rig's computer can take frames from, in which sizes.
-``camera-size``: a camera's optics, as they were measured, are those of frames of one size. ``out-of-range``: sizes
-are even.
-"""
+"""Rules on the services of a test: their names and layers, parameters, messages and cameras."""
 
 from collections.abc import Collection, Iterator
 from pathlib import PurePath

@@ -1,19 +1,4 @@
-"""Rules on a test itself: its names, its level and clock, its rig or pool of rigs, and its goals.
-
-``name-differs``: a test's name equals its file's; ``name-taken``: it is unique.
-``name-reserved``: a test is a job of its name, and GitLab reads some names as keywords.
-``level-kind``: recorded data cannot react, so no closed loop at level dil (thesis, Table 4.3).
-``clock-level``: lockstep needs an environment that can wait, so hardware runs in real time.
-``clock-rate``: in lockstep a test steps from frame to frame, so all rates have to fit the camera's.
-``clock-timed``: in lockstep only time that frames bring goes on, and not that of an application's own timers.
-``clock-virtual``: where the application's time is the test's, no answer is slow, and no printed line has a time.
-``rig-pool``: the rigs of a kind can be distinguished.
-``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
-``rig-isolation``: hardware is on the host's network.
-``rig-device``: a test moves the rig that it names and no other, and only the service that moves it opens its port.
-``unknown-check``: a goal names a check of an evaluator. ``goal-values``: its values fit its direction: a goal that
-scores nothing, or the wrong way, would rank applications by mistake.
-"""
+"""Rules on a test itself: its names, its level and clock, its rig, and its goals."""
 
 import os
 from collections.abc import Iterator
