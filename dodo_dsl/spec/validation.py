@@ -5,6 +5,7 @@ An error is explained by the keyword of the schema that it violates, and by the 
 
 import contextlib
 import functools
+import itertools
 import json
 import math
 import re
@@ -281,7 +282,7 @@ def _in_line(value: object) -> str:
 
 def _additional(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
     known = violation.schema.get("properties", {})
-    for *_, name in violation.places:
+    for *_, name in itertools.islice(violation.places, MAX_PROBLEMS):
         key, message, hint, fix = place.entries[str(name)].key, f"unknown key {_shown(name)}", "", None
         if slip := slip_in_key(str(name), known, is_empty=violation.instance[name] is None):
             message, hint, fix = slip.message, slip.hint, slip.fix
