@@ -11,6 +11,7 @@ from typing import Any
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
+from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import formats, map_file
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
@@ -82,75 +83,46 @@ def check_references(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _among(context: RuleContext, service: ResolvedService, argument: Argument, entry: Entry) -> Iterator[Diagnostic]:
-    source, keys = sources(argument.parameter.among)
-    file, key = _file(service.arguments[source]), " and ".join(_PLURAL.get(key, key) for key in keys)
-    if file is None:
-        return
-    names = _names(file, keys)
-    if has_errors(file_problems(context, service, service.arguments[source])):
+    """``map-path.obstacles|block`` names a parameter with a JSON file, and lists of that file."""
+    source, _, lists = argument.parameter.among.partition(".")
+    keys, path = lists.split("|"), argument.value and service.arguments[source].value
+    if not path or not path.path or has_errors(file_problems(context, service, service.arguments[source])):
         return  # reported with the file
-    if isinstance(names, str):
-        yield Diagnostic(
-            entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(keys[0], "")
-        )
+    file = path.path / MAP if path.path.is_dir() else path.path
+    shown = f"{file.parent.name}/{file.name}"
+    try:
+        names = [*filter(None, (name for key in keys for name in entries(file, key))), *argument.parameter.words]
+    except ValueError as error:
+        yield Diagnostic(entry.value.span, "wrong-file", f"{shown}: {error}", _HELP.get(keys[0], ""))
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
-    names += argument.parameter.words
     for item in items[:MAX_PROBLEMS]:
         if isinstance(item, Scalar) and item.text not in names:
-            message = f"'{item.text}' is not among the {key} of {file.parent.name}/{file.name}"
-            hint, fix = did_you_mean(item.text, names), only_fix(item.text, names)
-            yield Diagnostic(item.span, "unknown-name", message, hint, fix=fix)
-
-
-def _file(argument: Argument) -> Path | None:
-    path = argument.value.path if argument.value else None
-    if path is None:
-        return None
-    return path / MAP if path.is_dir() else path
-
-
-def sources(among: str) -> tuple[str, list[str]]:
-    """The parameter that names a JSON file, and the lists of it, as ``map-path.obstacles|block`` says."""
-    source, _, keys = among.partition(".")
-    return source, keys.split("|")
-
-
-def _names(file: Path, keys: list[str]) -> tuple[str, ...] | str:
-    """The names of the entries of lists in a JSON file, or the problem of the file."""
-    found: list[str] = []
-    for key in keys:
-        listed = entries(file, key)
-        if isinstance(listed, str):
-            return listed
-        found += [name for name in listed if name]
-    return tuple(dict.fromkeys(found))
+            of = " and ".join(_PLURAL.get(key, key) for key in keys)
+            message, hint = f"'{item.text}' is not among the {of} of {shown}", did_you_mean(item.text, names)
+            yield Diagnostic(item.span, "unknown-name", message, hint, fix=only_fix(item.text, names))
 
 
 @functools.lru_cache(maxsize=256)
-def entries(file: Path, key: str) -> tuple[str, ...] | str:
-    """The entries of a list in a JSON file by name, empty for those that have none, or the problem of the file.
+def entries(file: Path, key: str) -> tuple[str, ...]:
+    """The entries of a list in a JSON file by name, empty for those that have none; raises ValueError.
 
     A class may be written with ``color:`` before its name, as in messages.
     """
     try:
-        if file.exists() and not file.is_file():
-            return "not a regular file"
-        if file.stat().st_size > _MAX_BYTES:
-            return f"larger than {_MAX_BYTES >> 20} MiB"
         is_walls = file.suffix == map_file.WALLS
-        document = map_file.load(file).value if is_walls else json.loads(file.read_text(encoding="utf-8"))
-        found = document.get(key, []) if isinstance(document, dict) else None
-        if not isinstance(found, list):
-            return f"expected an object with a list '{key}'"
-        plain, unnamed = _plain if key == _CLASSES else str, map_file.numbered if key == _OBSTACLES else lambda _: ""
-        return tuple(
-            plain(e["name"]) if isinstance(e, dict) and "name" in e else unnamed(n) for n, e in enumerate(found, 1)
-        )
+        document = map_file.load(file).value if is_walls else json.loads(regular_file.text(file, _MAX_BYTES))
     except OSError as error:
-        return f"cannot be read: {error.strerror}"
+        raise ValueError(f"cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        return f"not JSON: {str(error)[:120]}"
+        raise ValueError(f"not JSON: {str(error)[:120]}") from error
+    found = document.get(key, []) if isinstance(document, dict) else None
+    if not isinstance(found, list):
+        raise ValueError(f"expected an object with a list '{key}'")  # noqa: TRY004  (of the file)
+    plain, unnamed = _plain if key == _CLASSES else str, map_file.numbered if key == _OBSTACLES else lambda _: ""
+    return tuple(
+        plain(e["name"]) if isinstance(e, dict) and "name" in e else unnamed(n) for n, e in enumerate(found, 1)
+    )
 
 
 def _plain(name: object) -> str:
@@ -265,23 +237,21 @@ def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
 
 def _limits(service: ResolvedService) -> Iterator[Diagnostic]:
     for names in service.manifest.one_of:
-        given = [name for name in names if name in service.use.parameters or service.texts.get(name)]
-        if not given:
-            message = f"'{service.use.name}' has nothing to judge by"
-            yield Diagnostic(
-                service.use.span, "no-limit", message, f"write one or more of {', '.join(names)} under 'with'"
-            )
+        if not any(name in service.use.parameters or service.texts.get(name) for name in names):
+            message, hint = f"'{service.use.name}' has nothing to judge by", f"write one or more of {', '.join(names)}"
+            yield Diagnostic(service.use.span, "no-limit", message, f"{hint} under 'with'")
 
 
 def _files(service: ResolvedService) -> Iterator[Diagnostic]:
     for argument in service.arguments.values():
         entry, file = argument.entry, argument.value.path if argument.value else None
         for key in argument.parameter.not_empty if entry and file else ():
-            found = entries(file, key) if file else ""
-            if isinstance(found, str) and argument.parameter.format:
-                continue  # reported with the file
-            if entry and file and isinstance(found, str):
-                yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {found}")
-            elif entry and file and not found:
-                message = f"{file.parent.name}/{file.name} has no {key}, so there is nothing to judge by"
-                yield Diagnostic(entry.value.span, "empty-file", message)
+            assert entry and file
+            shown = f"{file.parent.name}/{file.name}"
+            try:
+                if not entries(file, key):
+                    message = f"{shown} has no {key}, so there is nothing to judge by"
+                    yield Diagnostic(entry.value.span, "empty-file", message)
+            except ValueError as error:
+                if not argument.parameter.format:  # which is reported with the file
+                    yield Diagnostic(entry.value.span, "wrong-file", f"{shown}: {error}")
