@@ -21,7 +21,7 @@ from dodo_dsl.spec.quantity import convert
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.slips import mended
-from dodo_dsl.spec.validation import schema_of, valid_part
+from dodo_dsl.spec.validation import schema_of_keys, valid_part
 
 MANIFEST = "service.yml"
 _TAKEN = ("services", "dodo_dsl")
@@ -119,7 +119,7 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
-        node, slipped = mended(node, schema_of("deployment"))
+        node, slipped = mended(node, schema_of_keys("deployment"))
         node, problems, _ = valid_part(node, "deployment")
         found = [*found, *slipped, *problems]
     if not isinstance(node, Mapping):

@@ -15,7 +15,7 @@ from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
-from dodo_dsl.spec.validation import TOLD, schema_of, valid_part, validate, without_places
+from dodo_dsl.spec.validation import TOLD, schema_of_keys, valid_part, validate, without_places
 from dodo_dsl.spec.validation import Path as ValuePath
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
@@ -30,7 +30,7 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     node, found = reader(location.path)
     if node is None:
         return [Spec(location)], found or [extends.nothing_in(location.path)]
-    node, slipped = slips.mended(node, schema_of("dodo"))
+    node, slipped = slips.mended(node, schema_of_keys("dodo"))
     node, problems = extends.resolve(node, location.path, location.root, reader)
     found, is_whole = [*found, *slipped, *problems], not has_errors(problems)
     if extends.is_open(node):
@@ -88,7 +88,7 @@ def _told(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
 
 def _hides_services(node: Mapping, places: Collection[ValuePath]) -> bool:
     """Whether services may be in what is not valid: in a layer, or in an unknown key, most likely a misspelt layer."""
-    known = schema_of("dodo")["properties"]
+    known = schema_of_keys("dodo")["properties"]
     for first, *rest in places:
         if first in LAYERS and (len(rest) < 2 or rest[1] in ("uses", "with")) and len(rest) <= 2:
             return True
@@ -131,7 +131,8 @@ def _at(spec: Spec, values: vary.Values) -> Spec:
 def _corners(spec: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
     """The spec at the ends of its ranges, and what its schema says of these."""
     corners, found = [], []
-    assert spec.template is not None
+    if not spec.ranges or spec.template is None:
+        return (), []
     are_alike = not spec.is_whole or _only_in_parameters(spec.template, vary.PLACEHOLDERS)
     for values in vary.corners(spec.ranges):
         corner = replace(spec, choice=Choice((*spec.choice.values, *values.items())))

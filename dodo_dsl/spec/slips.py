@@ -25,7 +25,6 @@ _MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014"
 _WHOLE = re.compile(r"[-+]?[0-9]{1,20}")
 _REST = re.compile(r"[0-9]{1,20}( ?[A-Za-z%][^ ]{0,10})?")
 _CLOSING = {"{": "}", "[": "]"}
-_OWN = "#/$defs/"
 
 
 def repaired(text: str, fits: Callable[[str], bool]) -> tuple[str, Fix | None]:
@@ -123,21 +122,23 @@ def meant(word: str, known: Collection[str], *, is_empty: bool) -> str:
 
 
 def mended(node: Node, schema: dict[str, Any]) -> tuple[Node, list[Diagnostic]]:
-    """The node as it is meant, and what is said about keys that are indented one level too little or too much."""
+    """The node as it is meant, and what is said about keys that are indented one level too little or too much.
+
+    The schema has no references.
+    """
     found: list[Diagnostic] = []
-    return _indented(joined(node), schema, schema, found), found
+    return _indented(joined(node), schema, found), found
 
 
-def _indented(node: Node, schema: dict[str, Any], root: dict[str, Any], found: list[Diagnostic]) -> Node:
+def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> Node:
     if not isinstance(node, Mapping):
         return node
-    known, more = schema.get("properties", {}), schema.get("additionalProperties")
-    written = dict(_raised(node, schema, root, found))
+    written = dict(_raised(node, schema, found))
     entries: dict[str, Entry] = {}
     home, told = "", ""
     for key, entry in written.items():
         above = entries.get(home)
-        if above and _is_stray(key, entry, above, schema, _resolved(known.get(home, more), root), root):
+        if above and _is_stray(key, entry, above, schema, _of(schema, home)):
             own = _children(above.value)
             if told != home:
                 deep = next((e.key.column for e in own.values() if e.key.line > above.key.line), entry.key.column + 2)
@@ -147,25 +148,20 @@ def _indented(node: Node, schema: dict[str, Any], root: dict[str, Any], found: l
             told = home
         else:
             entries[key], home = entry, key
-    below = {
-        key: Entry(entry.key, _indented(entry.value, _resolved(known.get(key, more), root), root, found))
-        for key, entry in entries.items()
-    }
+    below = {key: Entry(entry.key, _indented(entry.value, _of(schema, key), found)) for key, entry in entries.items()}
     return Mapping(node.span, below, node.tag)
 
 
-def _raised(
-    node: Mapping, schema: dict[str, Any], root: dict[str, Any], found: list[Diagnostic]
-) -> Iterator[tuple[str, Entry]]:
+def _raised(node: Mapping, schema: dict[str, Any], found: list[Diagnostic]) -> Iterator[tuple[str, Entry]]:
     """The entries, and those of this mapping's own keys that stand in one of them, which has no such key."""
-    known, more = schema.get("properties", {}), schema.get("additionalProperties")
+    known = schema.get("properties", {})
     for key, entry in node.entries.items():
-        home = _resolved(known.get(key, more), root)
+        home = _of(schema, key)
         deep = {}
         for name, inner in _children(entry.value).items():
-            is_known = name in known and _resolved(known[name], root).get("type") == "object"
+            is_known = name in known and known[name].get("type") == "object"
             is_free = is_known and name not in node.entries and inner.key.line > entry.key.line
-            if is_free and isinstance(inner.value, Mapping) and not _takes(home, name, inner.value, root):
+            if is_free and isinstance(inner.value, Mapping) and not _takes(home, name, inner.value):
                 deep[name] = inner
                 message = f"'{name}' stands below '{key}'; indent it by {entry.key.column - 1} spaces"
                 found.append(Diagnostic(inner.key, "unknown-key", message, f"it belongs beside '{key}'"))
@@ -176,7 +172,7 @@ def _raised(
         yield from deep.items()
 
 
-def _takes(schema: dict[str, Any], key: str, value: Node, root: dict[str, Any]) -> bool:
+def _takes(schema: dict[str, Any], key: str, value: Node) -> bool:
     """Whether a mapping with this schema may have the key, with a value such as this one."""
     own, more = schema.get("properties", {}), schema.get("additionalProperties", True)
     if "object" not in schema.get("type", "object"):
@@ -184,32 +180,28 @@ def _takes(schema: dict[str, Any], key: str, value: Node, root: dict[str, Any]) 
     if key in own or more is True:
         is_mapping = own.get(key, {}).get("type", "object") == "object" and "enum" not in own.get(key, {})
         return is_mapping or not isinstance(value, Mapping)
-    inner = _resolved(more, root).get("properties", {})
+    inner = (more if isinstance(more, dict) else {}).get("properties", {})
     return more is not False and not inner.keys().isdisjoint(_children(value))
 
 
-def _resolved(schema: Any, root: dict[str, Any]) -> dict[str, Any]:
-    """A schema that is a mapping, with what it refers to in its own file."""
-    if not isinstance(schema, dict):
-        return {}
-    name = str(schema.get("$ref", ""))
-    return {**root["$defs"][name.removeprefix(_OWN)], **schema} if name.startswith(_OWN) else schema
+def _of(schema: dict[str, Any], key: str) -> dict[str, Any]:
+    """The schema of the value at a key."""
+    found = schema.get("properties", {}).get(key) or schema.get("additionalProperties")
+    return found if isinstance(found, dict) else {}
 
 
 def _children(node: Node) -> dict[str, Entry]:
     return node.entries if isinstance(node, Mapping) else {}
 
 
-def _is_stray(
-    key: str, entry: Entry, above: Entry, schema: dict[str, Any], home: dict[str, Any], root: dict[str, Any]
-) -> bool:
+def _is_stray(key: str, entry: Entry, above: Entry, schema: dict[str, Any], home: dict[str, Any]) -> bool:
     """Whether a key belongs into the mapping above, which begins in its own column."""
     is_empty = isinstance(above.value, Scalar) and above.value.value is None and not above.value.text
     if not (is_empty or isinstance(above.value, Mapping)) or key in _children(above.value):
         return False
     if entry.key.line == above.key.line or (entry.key.column, entry.key.file) != (above.key.column, above.key.file):
         return False
-    if _takes(schema, key, entry.value, root) or not _takes(home, key, entry.value, root):
+    if _takes(schema, key, entry.value) or not _takes(home, key, entry.value):
         return False
     is_any = home.get("additionalProperties", True) is True
     return not is_any or not closest(key, schema.get("properties", {}))

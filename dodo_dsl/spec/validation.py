@@ -42,6 +42,7 @@ _TYPE_NAMES = {
     "null": "no value",
 }
 _MOST_READ = 200
+_DEFS = "#/$defs/"
 
 Path = tuple[str | int, ...]
 
@@ -59,6 +60,24 @@ def schema_of(name: str) -> dict[str, Any]:
     return schema
 
 
+@functools.cache
+def schema_of_keys(name: str) -> dict[str, Any]:
+    """The same without references within it."""
+    schema = schema_of(name)
+
+    def inlined(part: Any) -> Any:
+        if isinstance(part, list):
+            return [inlined(each) for each in part]
+        if not isinstance(part, dict):
+            return part
+        reference = str(part.get("$ref", ""))
+        base = inlined(schema["$defs"][reference.removeprefix(_DEFS)]) if reference.startswith(_DEFS) else {}
+        return {**base, **{key: inlined(value) for key, value in part.items() if key != "$ref"}}
+
+    found: dict[str, Any] = inlined({key: value for key, value in schema.items() if key != "$defs"})
+    return found
+
+
 def _exact(part: dict[str, Any]) -> dict[str, Any]:
     return part | {_WHOLE: True} if part.get("type") == "integer" else part
 
@@ -68,7 +87,7 @@ class _Quantity:
         self._words, self._unit = schema.get(WORDS, ()), unit
 
     def validate(self, instance: object) -> None:
-        if isinstance(instance, str) and instance not in self._words:
+        if isinstance(instance, str | int | float) and instance not in self._words:
             quantity.convert(instance, self._unit)
 
 
@@ -178,16 +197,17 @@ def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], 
 
     Values with the tag TOLD are not judged. A service's parameters stay, as they are read by its manifest.
     """
-    found, places = list[Diagnostic](), set[Path]()
-    for path, tagged in _tags(node, ()):
+    found, places, tagged = list[Diagnostic](), set[Path](), list[tuple[Path, Node]]()
+    document = _document(node, schema, (), tagged)
+    for path, one in tagged:
         if "with" not in path:
             places.add(path)
-        if tagged.tag != TOLD:
-            tag = tagged.tag.replace("tag:yaml.org,2002:", "!!")
+        if one.tag != TOLD:
+            tag = one.tag.replace("tag:yaml.org,2002:", "!!")
             hint = "remove the tag, or write a text in quotes"
-            found.append(Diagnostic(tagged.span, "yaml-tag", f"tag '{tag}' is not supported", hint))
+            found.append(Diagnostic(one.span, "yaml-tag", f"tag '{tag}' is not supported", hint))
     known = set(places)
-    for violation in _violations(_document(node), schema):
+    for violation in _violations(document, schema):
         missing = {(*violation.path, violation.wanted)} if violation.keyword == "required" else set()
         if violation.path in known or missing & known:
             continue
@@ -196,25 +216,20 @@ def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], 
     return _without(node, (), places), found, places
 
 
-def _document(node: Node) -> Any:
-    """As ``plain``, with the largest number in place of those that JSON does not have."""
-    if isinstance(node, Mapping):
-        return {key: _document(entry.value) for key, entry in node.entries.items()}
-    if isinstance(node, Sequence):
-        return [_document(item) for item in node.items]
-    is_endless = isinstance(node.value, float) and not math.isfinite(node.value)
-    return sys.float_info.max if is_endless else node.value
+def _document(node: Node, schema: str, path: Path, tagged: list[tuple[Path, Node]]) -> Any:
+    """As ``plain``, but for numbers that JSON does not have: their texts, or for compose the largest one.
 
-
-def _tags(node: Node, path: Path) -> Iterator[tuple[Path, Node]]:
+    What is ``tagged`` is added to the list.
+    """
     if node.tag:
-        yield path, node
+        tagged.append((path, node))
     if isinstance(node, Mapping):
-        for key, entry in node.entries.items():
-            yield from _tags(entry.value, (*path, key))
-    elif isinstance(node, Sequence):
-        for number, item in enumerate(node.items):
-            yield from _tags(item, (*path, number))
+        return {key: _document(entry.value, schema, (*path, key), tagged) for key, entry in node.entries.items()}
+    if isinstance(node, Sequence):
+        return [_document(item, schema, (*path, number), tagged) for number, item in enumerate(node.items)]
+    if isinstance(node.value, float) and not math.isfinite(node.value):
+        return sys.float_info.max if schema == OF_COMPOSE else node.text
+    return node.value
 
 
 def without_places(node: Mapping, places: Collection[Path]) -> Mapping:

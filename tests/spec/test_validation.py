@@ -7,7 +7,7 @@ import pytest
 
 from dodo_dsl.source import Node, parse, plain
 from dodo_dsl.spec.slips import joined, mended
-from dodo_dsl.spec.validation import schema_of, valid_part, validate
+from dodo_dsl.spec.validation import schema_of_keys, valid_part, validate
 from tests.source.nodes import mapping
 
 BLOCK = """\
@@ -65,7 +65,7 @@ CHANGES = [
 
 def said(text: str, schema: str = "dodo") -> tuple[str, str]:
     """Places and rules, and the first hint."""
-    node, slipped = mended(mapping(text), schema_of(schema))
+    node, slipped = mended(mapping(text), schema_of_keys(schema))
     found = sorted([*slipped, *validate(node, schema)])
     return ", ".join(f"{d.span.line}:{d.span.column} {d.rule}" for d in found), found[0].hint if found else ""
 
@@ -95,7 +95,7 @@ def test_lines_that_are_indented_one_level_off_are_one_error(first: int, last: i
     lines = BLOCK.splitlines()
     for number in range(first - 1, last):
         lines[number] = " " * deep + lines[number] if deep > 0 else lines[number][-deep:]
-    node, (slip,) = mended(mapping("\n".join(lines)), schema_of("dodo"))
+    node, (slip,) = mended(mapping("\n".join(lines)), schema_of_keys("dodo"))
     assert f"{slip.span.line}:{slip.span.column} {slip.rule}: {slip.message}" == expected
     assert validate(node, "dodo") == []
     assert plain(node) == plain(mapping(BLOCK))
@@ -163,7 +163,7 @@ VALUES = (
 
 @pytest.mark.parametrize("schema", ["dodo", "deployment", "machine", "service", "application"])
 def test_whatever_stands_at_a_key_the_rest_is_valid(schema: str) -> None:
-    chosen, known = random.Random(1), [*schema_of(schema)["properties"], "other"]
+    chosen, known = random.Random(1), [*schema_of_keys(schema)["properties"], "other"]
     for _ in range(60):
         text = "".join(f"{key}: {chosen.choice(VALUES)}\n" for key in chosen.sample(known, min(3, len(known))))
         node: Node | None = parse(text, "x.yml")[0]
