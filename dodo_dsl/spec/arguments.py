@@ -195,8 +195,8 @@ def _near(text: str, target: Path, folder: Path, root: Path) -> Iterator[str]:
     for name in closest(target.name, beside):
         yield Path(os.path.relpath(target.parent / name, folder)).as_posix()
     for above in ("..", "../.."):
-        path = (folder / above / text).resolve()
-        if path.exists() and path.is_relative_to(root):
+        path = path_of(folder, f"{above}/{text}")
+        if path is not None and path.exists() and path.is_relative_to(root):
             yield f"{above}/{text}"
 
 
