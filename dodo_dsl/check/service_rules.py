@@ -248,14 +248,12 @@ _NAMES = (RPICAM, _FILE, EMULATED)
 _ALIGNED = 64
 """Rows of other widths are padded in the pipe of ``rpicam-vid``."""
 
-_I420 = "name.i420"
 _OPTICS = "camera.intrinsics"
 
 
 def check_camera_sources(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         yield from _size(context.rig, service)
-        yield from _odd(service)
         for argument in service.arguments.values():
             if argument.parameter.rig == CAMERA_SOURCE and argument.text:
                 yield from _problems(context, service, argument)
@@ -277,17 +275,6 @@ def _problems(context: RuleContext, service: ResolvedService, argument: Argument
         message = f"rpicam-vid gives frames whose width is a multiple of {_ALIGNED}, not {width}"
         hint = f"write a width of {max(int(width) // _ALIGNED, 1) * _ALIGNED}"
         yield Diagnostic(span, "camera-source", message, hint)
-
-
-def _odd(service: ResolvedService) -> Iterator[Diagnostic]:
-    """Sizes that frames in I420 cannot have, where a colour is that of two by two pixels."""
-    for name in ("width", "height") if _I420 in service.arguments else ():
-        argument, text = service.arguments.get(name), service.texts.get(name, "")
-        if argument and text.isdigit() and int(text) % 2 and (name, service.texts.get("source")) != ("width", RPICAM):
-            message = f"parameter '{name}' is {text}, expected an even number"
-            yield Diagnostic(
-                _span(service, argument), "out-of-range", message, f"write for example {max(int(text) - 1, 2)}"
-            )
 
 
 def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:

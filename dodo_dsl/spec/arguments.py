@@ -117,6 +117,9 @@ def _bare_number(parameter: Parameter, scalar: Scalar) -> Decimal:
 def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:
     low, high = parameter.minimum, parameter.maximum
     if (low is None or number >= Decimal(str(low))) and (high is None or number <= Decimal(str(high))):
+        if parameter.multiple_of > 1 and number % parameter.multiple_of:
+            text = f" is {scalar.text}, expected a multiple of {parameter.multiple_of}"
+            raise ValueProblem(parameter, scalar, "out-of-range", text, f"write for example {int(number) - 1}")
         return Value(quantity.decimal_text(number))
     unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
     if low is not None and high is not None:

@@ -28,6 +28,7 @@ _OF_TYPES = {
     "driving": ("list",),
     "choices": ("string", "list"),
     "or-share": ("amount",),
+    "multiple-of": ("integer",),
     "not-empty": ("path",),
     "format": ("path",),
     "unit": ("number",),
@@ -152,6 +153,7 @@ class Parameter:
     shared: bool | str = False
     minimum: float | None = None
     maximum: float | None = None
+    multiple_of: int = 1
     choices: tuple[str, ...] = ()
     rig: str = ""
     among: str = ""
