@@ -37,10 +37,9 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
 def _is_broken(context: RuleContext, name: str) -> bool:
     """Whether there is the user's own service in a folder of this name, whose manifest is reported itself."""
     read = {manifest.folder for manifest in context.manifests.values()}
-    parts = (name, name.replace("-", "_"))
-    named = context.deployment.services
-    folders = [*(above / part for above in named for part in parts), *(own for own in named if own.name in parts)]
-    return any(folder not in read and (folder / MANIFEST).is_file() for folder in folders)
+    patterns = (MANIFEST, f"*/{MANIFEST}")
+    found = (file.parent for above in context.deployment.services for each in patterns for file in above.glob(each))
+    return name.replace("_", "-") in {folder.name.replace("_", "-") for folder in found if folder not in read}
 
 
 def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
