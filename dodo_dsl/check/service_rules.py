@@ -14,7 +14,7 @@ from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
 from dodo_dsl.spec.deployment import MANIFEST
 from dodo_dsl.spec.manifest import holds
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
-from dodo_dsl.spec.slips import meant, slip_in_key
+from dodo_dsl.spec.slips import meant, unknown_key
 
 
 def check_services(context: RuleContext) -> Iterator[Diagnostic]:
@@ -76,10 +76,8 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
         argument = service.arguments.get(name)
         if argument is None:
             known = service.manifest.parameters
-            slip = slip_in_key(name, known, is_empty=_is_empty(entry))
-            message = slip.message if slip else f"service '{service.manifest.name}' has no parameter '{name}'"
-            hint = slip.hint if slip else did_you_mean(name, known)
-            fix = slip.fix if slip else only_fix(name, known, service.use.parameters)
+            slip, hint, fix = unknown_key(name, known, service.use.parameters, is_empty=_is_empty(entry))
+            message = slip or f"service '{service.manifest.name}' has no parameter '{name}'"
             yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
         elif argument.problem:
             yield argument.problem

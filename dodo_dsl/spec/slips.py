@@ -2,10 +2,9 @@
 
 import re
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
 from typing import Any
 
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix
 from dodo_dsl.source import Entry, Mapping, Node, Scalar
 
 _ALIASES = {
@@ -83,28 +82,29 @@ def _continues(before: Scalar, key: str, entry: Entry) -> bool:
     return empty and adjacent and bool(_WHOLE.fullmatch(before.text) and _REST.fullmatch(key))
 
 
-@dataclass(frozen=True)
-class KeySlip:
-    """An unknown key, in text that is YAML nonetheless: ``{uses:camera}``; ``key`` is the known one that is meant."""
-
-    key: str
-    message: str
-    hint: str
-    fix: Fix | None = None
+_MISSING = (
+    (re.compile(r"(?P<key>[^:\s]+):(?P<value>.*\S.*)", re.DOTALL), "a space is missing after the colon of '{}'"),
+    (re.compile(r"(?P<key>[^\s=]+)[\s=]+(?P<value>.+)", re.DOTALL), "a colon is missing after '{}'"),
+)
+"""Keys in text that is YAML nonetheless, as ``{uses:camera}`` is; the second has no value."""
 
 
-def slip_in_key(word: str, known: Collection[str], *, is_empty: bool) -> KeySlip | None:
-    """What is wrong with an unknown key, ``is_empty`` if it has no value; None when it is not a slip of this kind."""
-    found = re.fullmatch(r"(?P<key>[^:\s]+):(?P<value>.*\S.*)", word, re.DOTALL)
-    if found and found["key"] in known:
-        key, value = found["key"], found["value"].strip()
-        message = f"a space is missing after the colon of '{key}'"
-        return KeySlip(key, message, _write(key, value), Fix(word, f"{key}: {value}"))
-    found = re.fullmatch(r"(?P<key>[^\s=]+)[\s=]+(?P<value>.+)", word, re.DOTALL) if is_empty else None
-    if found and found["key"] in known:
-        key = found["key"]
-        return KeySlip(key, f"a colon is missing after '{key}'", _write(key, found["value"]))
-    return None
+def unknown_key(
+    word: str, known: Collection[str], beside: Collection[str] = (), *, is_empty: bool
+) -> tuple[str, str, Fix | None]:
+    """What is wrong with an unknown key beside others, empty for a misspelt one, a hint, and the only fix."""
+    for number, (pattern, message) in enumerate(_MISSING[: 1 + is_empty]):
+        if (found := pattern.fullmatch(word)) and found["key"] in known:
+            key, value = found["key"], found["value"].strip()
+            fix = None if number else Fix(word, f"{key}: {value}")
+            return message.format(key), _write(key, value), fix
+    return "", did_you_mean(word, known), only_fix(word, known, beside)
+
+
+def meant(word: str, known: Collection[str], *, is_empty: bool) -> str:
+    """The known key that an unknown one most likely means; empty when there is none."""
+    found = (match["key"] for pattern, _ in _MISSING[: 1 + is_empty] if (match := pattern.fullmatch(word)))
+    return next((key for key in found if key in known), "") or next(iter(closest(word, known)), "")
 
 
 def _write(key: str, value: str) -> str:
@@ -112,13 +112,6 @@ def _write(key: str, value: str) -> str:
     if closing not in value:  # the key ends at the first colon within the brackets
         value = f"{value[0]}...{closing}"
     return f"write '{key}: {value if len(value) <= 60 else f'{value[:57]}...'}'"
-
-
-def meant(word: str, known: Collection[str], *, is_empty: bool) -> str:
-    """The known key that an unknown one most likely means; empty when there is none."""
-    if found := slip_in_key(word, known, is_empty=is_empty):
-        return found.key
-    return next(iter(closest(word, known)), "")
 
 
 def mended(node: Node, schema: dict[str, Any]) -> tuple[Node, list[Diagnostic]]:

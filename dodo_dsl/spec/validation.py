@@ -22,7 +22,7 @@ from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, sh
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.registry import SUFFIX, as_file
-from dodo_dsl.spec.slips import boolean_meant, repaired, slip_in_key
+from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
 
 OF_COMPOSE = "application"
 TOLD = "!told"
@@ -298,27 +298,24 @@ def _in_line(value: object) -> str:
 def _additional(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
     known = violation.schema.get("properties", {})
     for *_, name in itertools.islice(violation.places, MAX_PROBLEMS):
-        key, message, hint, fix = place.entries[str(name)].key, f"unknown key {_shown(name)}", "", None
-        if slip := slip_in_key(str(name), known, is_empty=violation.instance[name] is None):
-            message, hint, fix = slip.message, slip.hint, slip.fix
-        else:
-            hint, fix = did_you_mean(str(name), known), only_fix(str(name), known, violation.instance)
-            if set(known) == {"uses", "with"} and not fix:
-                hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
-        yield Diagnostic(key, "unknown-key", message, hint, fix=fix)
+        is_empty = violation.instance[name] is None
+        slip, hint, fix = unknown_key(str(name), known, violation.instance, is_empty=is_empty)
+        if set(known) == {"uses", "with"} and not fix and not slip:
+            hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
+        message = slip or f"unknown key {_shown(name)}"
+        yield Diagnostic(place.entries[str(name)].key, "unknown-key", message, hint, fix=fix)
 
 
 def _required(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
     missing, known = violation.wanted, place.known
     unknown = {name: value for name, value in violation.instance.items() if name not in known}
-    almost = next((name for name in unknown if only_fix(name, [missing])), None)
-    if any((slip := slip_in_key(n, known, is_empty=v is None)) and slip.key == missing for n, v in unknown.items()):
-        return  # which is reported as it is written
-    if almost is not None:
-        if not place.is_closed:
+    if missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
+        almost = next((name for name in unknown if only_fix(name, [missing])), "")
+        if not place.is_closed and almost:  # else it is told as an unknown key
             hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
             yield Diagnostic(place.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
-        return
+        if place.is_closed or almost:
+            return
     hint = _to_write(missing, known.get(missing, {}))
     if near := closest(place.key, place.inherited):
         hint = f"did you mean '{near[0]}' of {shown_path(place.inherited[near[0]].key.file)}?"
