@@ -302,6 +302,8 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _Pattern("flow", "mark", r".*\0(?P<at>)\s*\S.*", "a comma is missing, or the text needs quotes", _COMMAS),
     _Pattern("character", "mark", r".*\0(?P<at>.).*", "a text cannot begin with '{at}'", "write the text in quotes"),
     _Pattern("other", "begin", r".*\0(?P<at>[*&]).*", "a text cannot begin with '{at}'", "write the text in quotes"),
+    _Pattern("other", "mark", r".*\0\s*(?P<at>\S).*", "'{at}' is not expected here",
+             "remove it, or write the text in quotes"),
 )  # fmt: skip
 
 
