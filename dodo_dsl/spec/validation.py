@@ -25,8 +25,8 @@ from dodo_dsl.spec.registry import SUFFIX, as_file
 from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
 
 OF_COMPOSE = "application"
-TOLD = "!told"
-"""The tag of values of which a problem is known already."""
+REPORTED = "!reported"
+"""The tag of values with a problem that is known already."""
 UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
 """The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
 _WHOLE = "x-whole"
@@ -97,7 +97,7 @@ class _Range:
         self._low, self._high = (quantity.convert(bound, self._unit) for bound in bounds)
 
     def validate(self, instance: object) -> None:
-        with contextlib.suppress(quantity.QuantityError):  # which is told by its unit
+        with contextlib.suppress(quantity.QuantityError):  # of which the unit is wrong
             if not self._low <= quantity.convert(instance, self._unit) <= self._high:
                 raise _OutOfRange
 
@@ -143,7 +143,7 @@ class Violation:
     path: Path
     instance: Any
     of_key: str | None = None
-    """The key that is wrong itself, where it is no value."""
+    """The key, where that is wrong itself and not its value."""
 
     @property
     def places(self) -> Iterator[Path]:
@@ -195,14 +195,14 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
 def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], set[Path]]:
     """What of a document its schema allows, what is wrong with the rest, and where that is.
 
-    Values with the tag TOLD are not judged. A service's parameters stay, as they are read by its manifest.
+    Values with the tag REPORTED are not judged. A service's parameters stay, as they are read by its manifest.
     """
     found, places, tagged = list[Diagnostic](), set[Path](), list[tuple[Path, Node]]()
     document = _document(node, schema, (), tagged)
     for path, one in tagged:
         if "with" not in path:
             places.add(path)
-        if one.tag != TOLD:
+        if one.tag != REPORTED:
             tag = one.tag.replace("tag:yaml.org,2002:", "!!")
             hint = "remove the tag, or write a text in quotes"
             found.append(Diagnostic(one.span, "yaml-tag", f"tag '{tag}' is not supported", hint))
@@ -311,7 +311,7 @@ def _required(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
     unknown = {name: value for name, value in violation.instance.items() if name not in known}
     if missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
         almost = next((name for name in unknown if only_fix(name, [missing])), "")
-        if not place.is_closed and almost:  # else it is told as an unknown key
+        if not place.is_closed and almost:  # else it is reported as an unknown key
             hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
             yield Diagnostic(place.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
         if place.is_closed or almost:
