@@ -37,13 +37,19 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         return [_by_name(location, node)], [*found, *_surely_wrong(node)]
     if not isinstance(node, Mapping):
         return [Spec(location)], [*found, *validate(node, "dodo")]
-    choices, problems = matrix.choices(node)
+    specs, problems = _instances(location, node, is_whole)
+    return specs, [*found, *problems]
+
+
+def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
+    """The instances of a test that is merged over what it extends."""
+    choices, found = matrix.choices(node)
     of_matrix = list(matrix.PLACEHOLDERS.unknown(node, "matrix-unknown"))
     of_ranges = list(vary.PLACEHOLDERS.unknown(node, "vary-unknown"))
     unknown = [*of_matrix, *of_ranges]  # which may be meant to use any name
     found += [] if of_matrix else matrix.PLACEHOLDERS.idle(node, "matrix-unused")
     found += [] if of_ranges else vary.PLACEHOLDERS.idle(node, "vary-unused")
-    found += [*problems, *unknown]
+    found += unknown
     spans = {key: entry.value.span for key, entry in node.entries.items()}
     are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
     is_broken = len(choices[0].values) < len(getattr(node.get(MATRIX), "entries", ()))
@@ -56,7 +62,7 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         ranges, problems = vary.read(template)
         found += problems
         if is_broken or has_errors(found):
-            template = _without_reported(template, reported, {each.name for each in ranges})
+            template = _marked(template, reported, {each.name for each in ranges})
         if places is None or not are_alike:
             instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges))
             _, problems, places = valid_part(instance if places is None else without(instance, MATRIX), "dodo")
@@ -71,7 +77,7 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     return specs, found
 
 
-def _without_reported(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
+def _marked(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
     """The test with a mark at values of which nothing more can be said: their placeholders have a problem."""
 
     def marked(value: Node) -> Node:

@@ -25,8 +25,8 @@ from dodo_dsl.spec.registry import SUFFIX, as_file
 from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
 
 OF_COMPOSE = "application"
-REPORTED = "!reported"
-"""The tag of values with a problem that is known already."""
+REPORTED = "\0"
+"""The tag of values with a problem that is known already, which no file can have."""
 UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
 """The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
 _WHOLE = "x-whole"
