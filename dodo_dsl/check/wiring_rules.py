@@ -1,6 +1,7 @@
 """Rules on what services and application give one another: messages, shared memories, and the test's variables."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
 
 from dodo_dsl.application import opendlv_flags, secret_problems
 from dodo_dsl.application.container import is_carried
@@ -10,7 +11,7 @@ from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.pictures import FORMATS, AskedPictures, pictures_of
 from dodo_dsl.application.variables import owner, split_by, with_variables
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import picture_size
+from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring, message
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
@@ -148,17 +149,31 @@ Asked = dict[str, Span]
 
 def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
     """A service that reads one memory of the test may make others, and so may services that share one."""
-    made = {end.port.name for end in context.wiring.produced if end.port.kind == "memory"}
+    ends = [end for end in context.wiring.produced if end.port.kind == "memory"]
+    made = {end.port.name for end in ends}
     if not made or context.application is None or not context.spec.is_whole or not context.test.is_complete:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
     services = with_variables(context.application, set_here).services.values()
     asked = {service.name: _asked(service) for service in services}
+    players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
+    shown = {end.port.name for end in ends if end.service not in players}
+    yield from _blank(asked, {end.port.name: players[end.service] for end in ends if end.port.name not in shown})
     for asking, names in asked.items():
         others = {name for other, own in asked.items() if other != asking for name in own}
         if made.isdisjoint(names) and others.isdisjoint(names):
             for name, span in names.items():
                 yield _missing(asking, name, span, made, _offer(context, name))
+
+
+def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
+    """Memories in which no frame will ever be: their services play recordings without."""
+    for service, names in asked.items():
+        for name in sorted(names.keys() & recordings.keys()):
+            file = recordings[name].name
+            message = f"the application's '{service}' reads frames from '{name}', and '{file}' has none"
+            hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
+            yield Diagnostic(names[name], "application-memory", message, hint, "warning")
 
 
 def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:

@@ -32,7 +32,7 @@ RESERVED_CIDS = frozenset({111, 112})
 _NO_CID = 0
 """Of a rig whose own is not valid."""
 _FROM_HERE = "paths are relative to the folder of dodo.yml"
-_NOT_YET = f"{_FROM_HERE}; 'dodo new NAME' makes it, with a first test"
+_NOT_YET = f"dodo new NAME makes it, with a first test; {_FROM_HERE}"
 DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 

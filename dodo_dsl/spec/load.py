@@ -15,7 +15,7 @@ from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
-from dodo_dsl.spec.validation import TOLD, schema_of_keys, valid_part, validate, without_places
+from dodo_dsl.spec.validation import REPORTED, schema_of_keys, valid_part, validate, without_places
 from dodo_dsl.spec.validation import Path as ValuePath
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
@@ -37,17 +37,23 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         return [_by_name(location, node)], [*found, *_surely_wrong(node)]
     if not isinstance(node, Mapping):
         return [Spec(location)], [*found, *validate(node, "dodo")]
-    choices, problems = matrix.choices(node)
+    specs, problems = _instances(location, node, is_whole)
+    return specs, [*found, *problems]
+
+
+def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
+    """The instances of a test that is merged over what it extends."""
+    choices, found = matrix.choices(node)
     of_matrix = list(matrix.PLACEHOLDERS.unknown(node, "matrix-unknown"))
     of_ranges = list(vary.PLACEHOLDERS.unknown(node, "vary-unknown"))
     unknown = [*of_matrix, *of_ranges]  # which may be meant to use any name
     found += [] if of_matrix else matrix.PLACEHOLDERS.idle(node, "matrix-unused")
     found += [] if of_ranges else vary.PLACEHOLDERS.idle(node, "vary-unused")
-    found += [*problems, *unknown]
+    found += unknown
     spans = {key: entry.value.span for key, entry in node.entries.items()}
     are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
     is_broken = len(choices[0].values) < len(getattr(node.get(MATRIX), "entries", ()))
-    told = {problem.span for problem in unknown}
+    reported = {problem.span for problem in unknown}
     specs = []
     for choice in choices:
         if wrong >= _MOST_WRONG:
@@ -56,7 +62,7 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
         ranges, problems = vary.read(template)
         found += problems
         if is_broken or has_errors(found):
-            template = _told(template, told, {each.name for each in ranges})
+            template = _marked(template, reported, {each.name for each in ranges})
         if places is None or not are_alike:
             instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges))
             _, problems, places = valid_part(instance if places is None else without(instance, MATRIX), "dodo")
@@ -71,12 +77,12 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     return specs, found
 
 
-def _told(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
+def _marked(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
     """The test with a mark at values of which nothing more can be said: their placeholders have a problem."""
 
     def marked(value: Node) -> Node:
         if value.span in spans or matrix.PLACEHOLDERS.names_in(value) or vary.PLACEHOLDERS.names_in(value) - ranges:
-            return replace(value, tag=TOLD)
+            return replace(value, tag=REPORTED)
         if isinstance(value, Mapping):
             entries = {key: Entry(entry.key, marked(entry.value)) for key, entry in value.entries.items()}
             return replace(value, entries=entries)

@@ -128,17 +128,17 @@ def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> No
         return node
     written = dict(_raised(node, schema, found))
     entries: dict[str, Entry] = {}
-    home, told = "", ""
+    home, reported = "", ""
     for key, entry in written.items():
         above = entries.get(home)
         if above and _is_stray(key, entry, above, schema, _of(schema, home)):
             own = _children(above.value)
-            if told != home:
+            if reported != home:
                 deep = next((e.key.column for e in own.values() if e.key.line > above.key.line), entry.key.column + 2)
                 message = f"'{key}' stands beside '{home}'; indent it by {deep - 1} spaces"
                 found.append(Diagnostic(entry.key, "unknown-key", message, f"it belongs to '{home}'"))
             entries[home] = Entry(above.key, Mapping(above.value.span, {**own, key: entry}, above.value.tag))
-            told = home
+            reported = home
         else:
             entries[key], home = entry, key
     below = {key: Entry(entry.key, _indented(entry.value, _of(schema, key), found)) for key, entry in entries.items()}

@@ -11,7 +11,6 @@ import math
 import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
 
@@ -25,8 +24,8 @@ from dodo_dsl.spec.registry import SUFFIX, as_file
 from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
 
 OF_COMPOSE = "application"
-TOLD = "!told"
-"""The tag of values of which a problem is known already."""
+REPORTED = "\0"
+"""The tag of values with a problem that is known already, which no file can have."""
 UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
 """The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
 _WHOLE = "x-whole"
@@ -97,7 +96,7 @@ class _Range:
         self._low, self._high = (quantity.convert(bound, self._unit) for bound in bounds)
 
     def validate(self, instance: object) -> None:
-        with contextlib.suppress(quantity.QuantityError):  # which is told by its unit
+        with contextlib.suppress(quantity.QuantityError):  # of which the unit is wrong
             if not self._low <= quantity.convert(instance, self._unit) <= self._high:
                 raise _OutOfRange
 
@@ -133,17 +132,48 @@ def _validator_of(name: str) -> Any:
     return _validator(schema_of(name))
 
 
-@dataclass(frozen=True)
 class Violation:
-    """A keyword of a schema that the value at a path violates; ``wanted`` is the keyword's value."""
+    """A keyword of a schema that a value violates, where that is, and what is there.
 
-    keyword: str
-    wanted: Any
-    schema: dict[str, Any]
-    path: Path
-    instance: Any
-    of_key: str | None = None
-    """The key that is wrong itself, where it is no value."""
+    ``wanted`` is the keyword's value. ``of_key`` is a key that is wrong itself, and not its value. ``span`` is that of
+    the value, or of its key where it is a collection. ``known`` are the keys that may stand there, ``is_closed`` if no
+    others may. ``inherited`` is what is next to it in a file that its own extends.
+    """
+
+    def __init__(self, error: Any, root: Node, name: str) -> None:
+        *steps, self.keyword = error.evaluation_path
+        self.path: Path = tuple(error.instance_path)
+        self.schema = _part(schema_of(name), steps)
+        self.wanted = error.kind.property if self.keyword == "required" else self.schema[self.keyword]
+        is_of_key = error.kind.name == "propertyNames"
+        self.instance: Any = error.kind.error.instance if is_of_key else error.instance
+        self.of_key: str | None = self.instance if is_of_key else None
+        around = self.schema if self.path else schema_of(name)
+        self.known, self.is_closed = around.get("properties", {}), around.get("additionalProperties") is False
+        self._find(root)
+
+    def _find(self, root: Node) -> None:
+        node, key, name = root, None, "the file"
+        beside: dict[str, Entry] = {}
+        for step in self.path:
+            if isinstance(node, Mapping):
+                beside, entry = node.entries, node.entries[str(step)]
+                node, key, name = entry.value, entry.key, f"'{step}'"
+            elif isinstance(node, Sequence):
+                node, key, name = node.items[int(step)], None, f"item {int(step) + 1} of {name}"
+        self.node, self.name = node, name
+        self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
+        self.key = name[1:-1] if name.startswith("'") else ""
+        self.text = node.text if isinstance(node, Scalar) else ""
+        self.entries: dict[str, Entry] = dict(node.entries) if isinstance(node, Mapping) else {}
+        self.inherited = {k: e for k, e in beside.items() if key is not None and e.key.file != key.file}
+
+    @property
+    def of_file(self) -> str:
+        """A hint for the name of a test, which is that of its file."""
+        file = PurePath(self.span.file).name
+        is_name = self.path == ("name",) and file.endswith(SUFFIX)
+        return as_file(file.removesuffix(SUFFIX), SUFFIX) if is_name else ""
 
     @property
     def places(self) -> Iterator[Path]:
@@ -155,25 +185,12 @@ class Violation:
             yield self.path if self.of_key is None else (*self.path, self.of_key)
 
 
-def _violations(document: object, name: str) -> Iterator[Violation]:
-    """At most MAX_PROBLEMS; of several about one value that of its type alone."""
-    typed = set[Path]()
-    found = []
-    for number, error in enumerate(_validator_of(name).iter_errors(document)):
-        if number == MAX_PROBLEMS:
-            break
-        *steps, keyword = error.evaluation_path
-        path, key = tuple(error.instance_path), None
-        if error.kind.name == "propertyNames":
-            key = error.kind.error.instance
-        elif keyword in _OF_TYPE:
-            if path in typed:
-                continue
-            typed.add(path)
-        schema = _part(schema_of(name), steps)
-        wanted = error.kind.property if keyword == "required" else schema[keyword]
-        found.append(Violation(keyword, wanted, schema, path, error.instance if key is None else key, key))
-    yield from (v for v in found if v.keyword in _OF_TYPE or v.of_key or v.path not in typed)
+def _violations(document: object, root: Node, name: str) -> list[Violation]:
+    """At most MAX_PROBLEMS; of several about one value the first about its type alone."""
+    errors = itertools.islice(_validator_of(name).iter_errors(document), MAX_PROBLEMS)
+    found = [Violation(error, root, name) for error in errors]
+    typed = {v.path: v for v in reversed(found) if v.keyword in _OF_TYPE and v.of_key is None}
+    return [v for v in found if v.of_key or typed.get(v.path, v) is v]
 
 
 def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
@@ -195,23 +212,23 @@ def validate(node: Node, schema: str) -> list[Diagnostic]:
 def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], set[Path]]:
     """What of a document its schema allows, what is wrong with the rest, and where that is.
 
-    Values with the tag TOLD are not judged. A service's parameters stay, as they are read by its manifest.
+    Values with the tag REPORTED are not judged. A service's parameters stay, as they are read by its manifest.
     """
     found, places, tagged = list[Diagnostic](), set[Path](), list[tuple[Path, Node]]()
     document = _document(node, schema, (), tagged)
     for path, one in tagged:
         if "with" not in path:
             places.add(path)
-        if one.tag != TOLD:
+        if one.tag != REPORTED:
             tag = one.tag.replace("tag:yaml.org,2002:", "!!")
             hint = "remove the tag, or write a text in quotes"
             found.append(Diagnostic(one.span, "yaml-tag", f"tag '{tag}' is not supported", hint))
     known = set(places)
-    for violation in _violations(document, schema):
+    for violation in _violations(document, node, schema):
         missing = {(*violation.path, violation.wanted)} if violation.keyword == "required" else set()
         if violation.path in known or missing & known:
             continue
-        found += _TRANSLATORS.get(violation.keyword, _other)(violation, _Place(node, violation, schema))
+        found += _TRANSLATORS.get(violation.keyword, _other)(violation)
         places |= {*violation.places}
     return _without(node, (), places), found, places
 
@@ -254,33 +271,6 @@ def _without(node: Node, path: Path, places: Collection[Path]) -> Node | None:
     return node
 
 
-class _Place:
-    """Where a violation is: the node with the span to report, its own, or its key's where it is a collection."""
-
-    def __init__(self, root: Node, violation: Violation, schema: str) -> None:
-        node, key, name = root, None, "the file"
-        beside: dict[str, Entry] = {}
-        for step in violation.path:
-            if isinstance(node, Mapping):
-                beside, entry = node.entries, node.entries[str(step)]
-                node, key, name = entry.value, entry.key, f"'{step}'"
-            elif isinstance(node, Sequence):
-                node, key, name = node.items[int(step)], None, f"item {int(step) + 1} of {name}"
-        self.node, self.name = node, name
-        self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
-        self.key = name[1:-1] if name.startswith("'") else ""
-        self.entries: dict[str, Entry] = dict(node.entries) if isinstance(node, Mapping) else {}
-        self.inherited = {k: e for k, e in beside.items() if key is not None and e.key.file != key.file}
-        """What is next to it in a file that its own extends."""
-        around = schema_of(schema) if not violation.path else violation.schema
-        self.known, self.is_closed = around.get("properties", {}), around.get("additionalProperties") is False
-        self.text = node.text if isinstance(node, Scalar) else ""
-        file = PurePath(self.span.file).name
-        is_name = violation.path == ("name",) and file.endswith(SUFFIX)
-        self.of_file = as_file(file.removesuffix(SUFFIX), SUFFIX) if is_name else ""
-        """A hint for the name of a test, which is that of its file."""
-
-
 def _shown(value: object) -> str:
     text = value if isinstance(value, str) else json.dumps(value, default=str)
     return f"'{text if len(text) <= 60 else text[:57] + '...'}'"
@@ -295,31 +285,31 @@ def _in_line(value: object) -> str:
     return str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf)).strip()
 
 
-def _additional(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    known = violation.schema.get("properties", {})
-    for *_, name in itertools.islice(violation.places, MAX_PROBLEMS):
-        is_empty = violation.instance[name] is None
-        slip, hint, fix = unknown_key(str(name), known, violation.instance, is_empty=is_empty)
+def _additional(v: Violation) -> Iterator[Diagnostic]:
+    known = v.schema.get("properties", {})
+    for *_, name in itertools.islice(v.places, MAX_PROBLEMS):
+        is_empty = v.instance[name] is None
+        slip, hint, fix = unknown_key(str(name), known, v.instance, is_empty=is_empty)
         if set(known) == {"uses", "with"} and not fix and not slip:
             hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
         message = slip or f"unknown key {_shown(name)}"
-        yield Diagnostic(place.entries[str(name)].key, "unknown-key", message, hint, fix=fix)
+        yield Diagnostic(v.entries[str(name)].key, "unknown-key", message, hint, fix=fix)
 
 
-def _required(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    missing, known = violation.wanted, place.known
-    unknown = {name: value for name, value in violation.instance.items() if name not in known}
+def _required(v: Violation) -> Iterator[Diagnostic]:
+    missing, known = v.wanted, v.known
+    unknown = {name: value for name, value in v.instance.items() if name not in known}
     if missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
         almost = next((name for name in unknown if only_fix(name, [missing])), "")
-        if not place.is_closed and almost:  # else it is told as an unknown key
+        if not v.is_closed and almost:  # else it is reported as an unknown key
             hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
-            yield Diagnostic(place.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
-        if place.is_closed or almost:
+            yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
+        if v.is_closed or almost:
             return
     hint = _to_write(missing, known.get(missing, {}))
-    if near := closest(place.key, place.inherited):
-        hint = f"did you mean '{near[0]}' of {shown_path(place.inherited[near[0]].key.file)}?"
-    yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint)
+    if near := closest(v.key, v.inherited):
+        hint = f"did you mean '{near[0]}' of {shown_path(v.inherited[near[0]].key.file)}?"
+    yield Diagnostic(v.span, "missing-key", f"{v.name} has no key '{missing}'", hint)
 
 
 def _to_write(key: str, schema: Any) -> str:
@@ -334,123 +324,123 @@ def _to_write(key: str, schema: Any) -> str:
     )
 
 
-def _companion(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    for name, others in violation.wanted.items():
-        for missing in others if name in violation.instance else ():
-            if missing not in violation.instance:
-                yield Diagnostic(place.span, "missing-key", f"{place.name} has '{name}' without '{missing}'")
+def _companion(v: Violation) -> Iterator[Diagnostic]:
+    for name, others in v.wanted.items():
+        for missing in others if name in v.instance else ():
+            if missing not in v.instance:
+                yield Diagnostic(v.span, "missing-key", f"{v.name} has '{name}' without '{missing}'")
 
 
-def _type(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    schema, value = violation.schema, violation.instance
+def _type(v: Violation) -> Iterator[Diagnostic]:
+    schema, value = v.schema, v.instance
     if UNIT in schema:
-        yield from _quantity(violation, place)
+        yield from _quantity(v)
         return
     wanted = schema["type"]
     names = [_TYPE_NAMES[each] for each in ([wanted] if isinstance(wanted, str) else wanted)]
-    found = _shown(place.text) if place.text else "empty"
+    found = _shown(v.text) if v.text else "empty"
     if isinstance(value, dict | list):
         found = _TYPE_NAMES["object" if isinstance(value, dict) else "array"]
     if schema.get(EXPECT) == _TYPE_NAMES["boolean"]:
         names = names[:1]
-    hint, fix = schema.get("x-hint") or place.of_file or _in_quotes(violation, place), None
+    hint, fix = schema.get("x-hint") or v.of_file or _in_quotes(v), None
     items = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
     if hint or wanted is None:
         pass
-    elif wanted == "array" and place.key and (items or "examples" in schema):
+    elif wanted == "array" and v.key and (items or "examples" in schema):
         is_meant = items and not any(" " in item for item in items) and _fits(schema, items)
         shown = items if is_meant else schema.get("examples", [None])[0]
-        hint = f"write {'' if is_meant else 'for example '}{place.key}: {_in_line(shown)}" if shown else ""
+        hint = f"write {'' if is_meant else 'for example '}{v.key}: {_in_line(shown)}" if shown else ""
     elif wanted == "boolean" and isinstance(value, str):
         hint, fix = boolean_meant(value)
     elif wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
         hint = f"write {value}, without quotation marks" if _fits(schema, int(value)) else ""
-    span = place.span
-    if isinstance(place.node, Sequence) and wanted == "object":
-        span, hint = place.node.span, hint or "write 'key: value' in place of list items"
-    yield Diagnostic(span, "wrong-type", f"{place.name} is {found}, expected {' or '.join(names)}", hint, fix=fix)
+    span = v.span
+    if isinstance(v.node, Sequence) and wanted == "object":
+        span, hint = v.node.span, hint or "write 'key: value' in place of list items"
+    yield Diagnostic(span, "wrong-type", f"{v.name} is {found}, expected {' or '.join(names)}", hint, fix=fix)
 
 
-def _in_quotes(violation: Violation, place: _Place) -> str:
+def _in_quotes(v: Violation) -> str:
     """A hint for a number or a word that YAML takes for something else than the text that it is."""
-    is_text = violation.keyword == "enum" or violation.schema.get("type") == "string"
-    if not is_text or not place.text or violation.instance is None:
+    is_text = v.keyword == "enum" or v.schema.get("type") == "string"
+    if not is_text or not v.text or v.instance is None:
         return ""
-    expected = violation.schema.get(EXPECT, "")
-    is_right = _fits(violation.schema, place.text)
-    return f'write it in quotes: "{place.text}"' if is_right else f"write {expected}" if expected else ""
+    expected = v.schema.get(EXPECT, "")
+    is_right = _fits(v.schema, v.text)
+    return f'write it in quotes: "{v.text}"' if is_right else f"write {expected}" if expected else ""
 
 
-def _quantity(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    words = violation.schema.get(WORDS, ())
-    if words and isinstance(violation.instance, str) and place.text[:1].isalpha():
-        yield from _choices(violation, place)
+def _quantity(v: Violation) -> Iterator[Diagnostic]:
+    words = v.schema.get(WORDS, ())
+    if words and isinstance(v.instance, str) and v.text[:1].isalpha():
+        yield from _choices(v)
         return
     try:
-        quantity.convert(place.text if isinstance(place.node, Scalar) else None, violation.schema[UNIT])
+        quantity.convert(v.text if isinstance(v.node, Scalar) else None, v.schema[UNIT])
     except quantity.QuantityError as problem:
-        yield Diagnostic(place.span, "wrong-unit", f"{place.name}: {problem}", problem.hint, fix=problem.fix)
+        yield Diagnostic(v.span, "wrong-unit", f"{v.name}: {problem}", problem.hint, fix=problem.fix)
 
 
-def _choices(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    choices = [str(v) for v in violation.schema.get("enum") or violation.schema[WORDS]]
-    message = f"{_shown(violation.instance)} is not a value of {place.name}, expected {', '.join(choices)}"
-    near = [choice for choice in closest(str(violation.instance), choices) if resolve(choice) == choice]
-    hint, fix = did_you_mean(str(violation.instance), near), only_fix(str(violation.instance), near)
+def _choices(v: Violation) -> Iterator[Diagnostic]:
+    choices = [str(v) for v in v.schema.get("enum") or v.schema[WORDS]]
+    message = f"{_shown(v.instance)} is not a value of {v.name}, expected {', '.join(choices)}"
+    near = [choice for choice in closest(str(v.instance), choices) if resolve(choice) == choice]
+    hint, fix = did_you_mean(str(v.instance), near), only_fix(str(v.instance), near)
     if not near:
-        hint, fix = repaired(str(violation.instance), choices.__contains__)
-    if place.text in choices:
-        hint, fix = _in_quotes(violation, place), None
-    yield Diagnostic(place.span, "wrong-value", message, hint, fix=fix)
+        hint, fix = repaired(str(v.instance), choices.__contains__)
+    if v.text in choices:
+        hint, fix = _in_quotes(v), None
+    yield Diagnostic(v.span, "wrong-value", message, hint, fix=fix)
 
 
-def _const(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    message = f"{place.name} is {_shown(violation.instance)}, expected {violation.wanted}"
-    hint = f"write '{place.key}: {violation.wanted}'"
-    if place.key == "dodo" and type(violation.instance) is int and violation.instance > violation.wanted:
-        message = f"the file is of language version {violation.instance}, the installed DoDo {__version__} reads "
-        message += f"{violation.wanted}"
-        hint = f"install a DoDo that reads version {violation.instance}, or, if the number is a mistake, {hint}"
-    yield Diagnostic(place.span, "wrong-value", message, hint)
+def _const(v: Violation) -> Iterator[Diagnostic]:
+    message = f"{v.name} is {_shown(v.instance)}, expected {v.wanted}"
+    hint = f"write '{v.key}: {v.wanted}'"
+    if v.key == "dodo" and type(v.instance) is int and v.instance > v.wanted:
+        message = f"the file is of language version {v.instance}, the installed DoDo {__version__} reads "
+        message += f"{v.wanted}"
+        hint = f"install a DoDo that reads version {v.instance}, or, if the number is a mistake, {hint}"
+    yield Diagnostic(v.span, "wrong-value", message, hint)
 
 
-def _pattern(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    value = str(violation.instance)
-    expected = violation.schema.get(EXPECT, f"a string that matches {violation.schema.get('pattern')}")
-    span = place.span if violation.of_key is None else place.entries[violation.of_key].key
+def _pattern(v: Violation) -> Iterator[Diagnostic]:
+    value = str(v.instance)
+    expected = v.schema.get(EXPECT, f"a string that matches {v.schema.get('pattern')}")
+    span = v.span if v.of_key is None else v.entries[v.of_key].key
     name = re.sub(r"[^a-z0-9]+", "-", value[:_MOST_READ].lower()).strip("-")[:40]
-    is_text = name != value and resolve(name) == name != "" and _fits(violation.schema, name)
-    hint = place.of_file or (f"for example '{name}'" if is_text else "")
+    is_text = name != value and resolve(name) == name != "" and _fits(v.schema, name)
+    hint = v.of_file or (f"for example '{name}'" if is_text else "")
     yield Diagnostic(span, "wrong-value", f"{_shown(value)} is not allowed here, expected {expected}", hint)
 
 
-def _bounds(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    schema = violation.schema
+def _bounds(v: Violation) -> Iterator[Diagnostic]:
+    schema = v.schema
     low, high = schema.get(RANGE) or (schema.get("minimum"), schema.get("maximum"))
-    shown = place.text if len(place.text) <= 60 else f"{place.text[:57]}..."
-    yield Diagnostic(place.span, "out-of-range", f"{place.name} is {shown}, expected {low} to {high}")
+    shown = v.text if len(v.text) <= 60 else f"{v.text[:57]}..."
+    yield Diagnostic(v.span, "out-of-range", f"{v.name} is {shown}, expected {low} to {high}")
 
 
-def _too_many(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    if EXPECT in violation.schema:
-        yield from _pattern(violation, place)
+def _too_many(v: Violation) -> Iterator[Diagnostic]:
+    if EXPECT in v.schema:
+        yield from _pattern(v)
         return
-    what = "characters" if violation.keyword == "maxLength" else "entries"
-    message = f"{place.name} has {len(violation.instance)} {what}, expected at most {violation.wanted}"
-    yield Diagnostic(place.span, "too-large", message)
+    what = "characters" if v.keyword == "maxLength" else "entries"
+    message = f"{v.name} has {len(v.instance)} {what}, expected at most {v.wanted}"
+    yield Diagnostic(v.span, "too-large", message)
 
 
-def _too_few(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    expected = "a string" if violation.keyword == "minLength" else "at least one entry"
-    yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected {expected}")
+def _too_few(v: Violation) -> Iterator[Diagnostic]:
+    expected = "a string" if v.keyword == "minLength" else "at least one entry"
+    yield Diagnostic(v.span, "missing-key", f"{v.name} is empty, expected {expected}")
 
 
-def _other(violation: Violation, place: _Place) -> Iterator[Diagnostic]:
-    message = f"{place.name} does not fit '{violation.keyword}' of its schema: {_shown(violation.wanted)}"
-    yield Diagnostic(place.span, "wrong-value", message)
+def _other(v: Violation) -> Iterator[Diagnostic]:
+    message = f"{v.name} does not fit '{v.keyword}' of its schema: {_shown(v.wanted)}"
+    yield Diagnostic(v.span, "wrong-value", message)
 
 
-_TRANSLATORS: dict[str, Callable[[Violation, _Place], Iterator[Diagnostic]]] = {
+_TRANSLATORS: dict[str, Callable[[Violation], Iterator[Diagnostic]]] = {
     "additionalProperties": _additional,
     "required": _required,
     "dependentRequired": _companion,
