@@ -1,6 +1,7 @@
 """The files of an application, each read once, with their problems."""
 
 import os
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +17,11 @@ TEST_FILLED = ("command", "entrypoint", "environment", "healthcheck")
 """The keys of a service whose variables a test may set, so that they are filled in for each test."""
 _FILLED = ("services", "volumes", "networks", "secrets", "configs", "include")
 """The top-level keys below which compose fills in variables."""
+_PATHS = ("build", "env_file", "extends", "volumes")
+"""Those with paths of the host."""
 _FOLDERS = {"PWD": ".", "HOME": "~"}
-"""Variables that stand for folders, in keys that hold paths."""
+"""What variables stand for at the begin of a path."""
+_FOLDER = re.compile(r"\$(?:\{(?P<braced>PWD|HOME)\}|(?P<bare>PWD|HOME)(?![A-Za-z0-9_]))(?=/|:|$)")
 _LATE = ("PATH",)
 _IMAGES = "DODO_IMAGE_"
 """How variables begin by which a pipeline sets images."""
@@ -45,11 +49,23 @@ class ComposeFiles:
         self.passed = passed
         self.problems: list[Diagnostic] = []
         self.known: dict[str, str] = {}
+        self.included: dict[str, str] = {}
+        """The variables of the file that is being included, which those that are known come before."""
         self.secrets: dict[str, Path] = {}
         self.written: dict[Span, str] = {}
-        self._of: dict[str, Path] = {}
-        self._documents: dict[Path, source.Mapping | None] = {}
+        self._read: dict[Path, source.Mapping | None] = {}
+        self._documents: dict[tuple[Path, frozenset[tuple[str, str]]], source.Mapping | None] = {}
         self._nodes = 0
+
+    def filled(self, text: str, *, is_path: bool = True) -> str:
+        """A text with its variables filled in; at the begin of a path, the compose file's folder and the home."""
+        match = _FOLDER.match(text) if is_path else None
+        text = _FOLDERS[match["braced"] or match["bare"]] + text[match.end() :] if match else text
+        return filled(text, {**self.included, **self.known}, self.is_late)
+
+    def _of_include(self, text: str) -> str:
+        """A text that each test fills in, with the variables that only an included file has."""
+        return filled(text, self.included, lambda name: name in self.known or name not in self.included)
 
     def is_late(self, name: str) -> bool:
         """Whether a variable has its value only when a test runs."""
@@ -77,8 +93,9 @@ class ComposeFiles:
     def problem(self, span: Span, message: str, hint: str = "") -> None:
         self.problems.append(Diagnostic(span, "application-file", message, hint))
 
-    def document(self, file: Path) -> source.Mapping | None:
-        if file not in self._documents:
+    def read(self, file: Path) -> source.Mapping | None:
+        """A file as it is written."""
+        if file not in self._read:
             node, found = self._reader(file)
             if node is None and not found:
                 found = [Diagnostic(Span(str(file)), "application-file", "the file is empty, expected a compose file")]
@@ -87,8 +104,15 @@ class ComposeFiles:
                 found = [*found, Diagnostic(node.span, "wrong-type", message)]
             self.problems.extend(found)
             fits = isinstance(node, source.Mapping) and self.grow(node, Span(str(file)))
-            self._documents[file] = self._filled(node) if isinstance(node, source.Mapping) and fits else None
-        return self._documents[file]
+            self._read[file] = node if isinstance(node, source.Mapping) and fits else None
+        return self._read[file]
+
+    def document(self, file: Path) -> source.Mapping | None:
+        """A file with its variables filled in."""
+        node, key = self.read(file), (file, frozenset(self.included.items()))
+        if key not in self._documents:
+            self._documents[key] = None if node is None else self._filled(node)
+        return self._documents[key]
 
     def _filled(self, document: source.Mapping) -> source.Mapping:
         """The document with variables filled in, but for keys of services that each test fills in, and for own keys."""
@@ -108,24 +132,26 @@ class ComposeFiles:
     def _of_service(self, node: Node) -> Node:
         if not isinstance(node, source.Mapping):
             return self._of_node(node)
-        entries = {
-            key: Entry(e.key, self._of_node(e.value, is_filled=key not in TEST_FILLED and key[:2] != "x-"))
-            for key, e in node.entries.items()
-        }
+        entries = {}
+        for key, e in node.entries.items():
+            is_filled = key not in TEST_FILLED and not key.startswith("x-")
+            entries[key] = Entry(e.key, self._of_node(e.value, is_filled=is_filled, is_path=key in _PATHS))
         return replace(node, entries=entries)
 
-    def _of_node(self, node: Node, *, is_filled: bool = True) -> Node:
+    def _of_node(self, node: Node, *, is_filled: bool = True, is_path: bool = True) -> Node:
+        def below(each: Node) -> Node:
+            return self._of_node(each, is_filled=is_filled, is_path=is_path)
+
         if isinstance(node, source.Mapping):
-            entries = {k: Entry(e.key, self._of_node(e.value, is_filled=is_filled)) for k, e in node.entries.items()}
-            return replace(node, entries=entries)
+            return replace(node, entries={k: Entry(e.key, below(e.value)) for k, e in node.entries.items()})
         if isinstance(node, source.Sequence):
-            return replace(node, items=tuple(self._of_node(item, is_filled=is_filled) for item in node.items))
+            return replace(node, items=tuple(map(below, node.items)))
         if not isinstance(node.value, str) or "$" not in node.value:
             return node
         if slip := slip_in(node.value):
             self.problems.append(Diagnostic(node.span, "application-file", *slip))
         self.written[node.span] = node.value
-        text = filled(node.value, {**_FOLDERS, **self.known}, self.is_late) if is_filled else node.value
+        text = self.filled(node.value, is_path=is_path) if is_filled else self._of_include(node.value)
         return replace(node, value=text, text=text)
 
     def other(self, word: Scalar, folder: Path) -> Path | None:
@@ -155,39 +181,34 @@ class ComposeFiles:
             self.problems.append(Diagnostic(word.span, "application-isolation", problem, "keep it in the repository"))
         return not problem
 
-    def gather(self, file: Path | None, span: Span) -> None:
-        """Adds the variables of an ``.env`` file, if there is one."""
-        if file is None:
-            return
+    def gather(self, file: Path, taken: Collection[str] = ()) -> dict[str, str]:
+        """The variables of an ``.env`` file, if there is one, without secrets, as those that are ``taken`` for one."""
         self.problems.extend(dotenv_problems(file))
         own: dict[str, str] = {}
-        for name, value in dotenv(text_of(file))[0]:
-            if value is None or self.is_late(name):
+        for name, value in statements_of(file):
+            if value is None or name in self.passed:
                 continue
-            text = literal(filled(value, {**self.known, **own}, self.is_late))
-            if text is not None and not holds_secret(name, text):
+            text = literal(self.filled_with(value, own))
+            if text is not None and name not in taken and not holds_secret(name, text):
                 own[name] = text
             elif not is_steering(name):
                 self.secrets[name] = file
-        for name, text in own.items():
-            if self.known.get(name, text) != text:
-                message = f"variable '{name}' has another value in '{file.name}' than in an earlier file"
-                self.problem(span, message, "a test has one .env file, so give the variable one value")
-            else:
-                self.known[name], self._of[name] = text, file
+        return own
 
-    def keep_secret(self, name: str) -> None:
-        """Makes a variable of the files one that no compiled test holds."""
-        if name in self._of:
-            self.secrets[name] = self._of[name]
+    def filled_with(self, value: str, own: Mapping[str, str]) -> str:
+        """A value of an ``.env`` file after the variables of its own earlier lines."""
+        match = _FOLDER.match(value)
+        value = _FOLDERS[match["braced"] or match["bare"]] + value[match.end() :] if match else value
+        return filled(value, {**own, **self.included, **self.known}, self.is_late)
 
 
-def variables_of(file: Path, *, raw: bool = False) -> Mapping[str, str | None]:
-    """The variables that a regular file sets, None if from outside; symlinks are not followed."""
-    found: dict[str, str | None] = {}
-    for name, value in dotenv(text_of(file), raw=raw)[0]:
-        found[name] = found.get(name) if value is None else value
-    return found
+Statements = tuple[tuple[str, str | None], ...]
+"""The names and values of a file of variables, in order; None takes the value from outside."""
+
+
+def statements_of(file: Path, *, raw: bool = False) -> Statements:
+    """What a regular file sets; symlinks are not followed."""
+    return tuple(dotenv(text_of(file), raw=raw)[0])
 
 
 def dotenv_problems(file: Path, *, raw: bool = False) -> Iterator[Diagnostic]:

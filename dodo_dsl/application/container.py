@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.interpolation import changed_node, filled
 from dodo_dsl.application.model import (
     FILES,
@@ -18,6 +19,7 @@ from dodo_dsl.application.model import (
     ComposeService,
     borrowed,
     env_files,
+    environment,
     plain,
     reference,
     text,
@@ -134,8 +136,7 @@ def _healthcheck(c: Container, _: Node) -> Any:
 def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
     for file in env_files(c.service.node):
-        word = Scalar(file.span, file.path, file.path)
-        if path := c.path(word):
+        if path := c.path(file.path, file.span):
             about = {"path": path, **({} if file.required else {"required": False})}
             about |= {"format": "raw"} if file.raw else {}
             made.append(about if len(about) > 1 else path)
@@ -149,7 +150,9 @@ def _own_environment(c: Container) -> None:
     made = {k: None if v is None else opendlv_flags.with_cid_text(v, setting.cid) for k, v in found.items()}
     names = [n for n in opendlv_flags.CID_VARIABLES if n in made or n in c.service.file_variables]
     made |= dict.fromkeys(names, str(setting.cid))
-    if "DISPLAY" in made and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):
+    raw = c.raw("environment")
+    names_it = raw is not None and "DISPLAY" in environment(plain(raw))
+    if names_it and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):
         made |= OFFSCREEN
     if made:
         c.own["environment"] = made
@@ -182,7 +185,7 @@ def _volumes_from(c: Container, node: Node) -> Any:
             c.refuse(item.span, f"the container '{name}' is not part of the application", "make it a service of it")
             continue
         name = containers[name] if kind == "container" else name
-        made += [f"{name}{options}"] if name in services else []
+        made += [escaped(f"{name}{options}")] if name in services else []
     return made or None
 
 
@@ -217,9 +220,15 @@ def _sysctls(c: Container, node: Node) -> Any:
     return {key: plain(value) for key, value in found.items() if is_own or not key.startswith("net.")} or None
 
 
-def _secrets(c: Container, node: Node) -> Any:
+def _secrets(c: Container, node: Node, key: str) -> Any:
+    top = c.project.application.rest.get(key)
+    known = top.entries if isinstance(top, source.Mapping) else {}
     for item in c.items(node):
-        c.fields(item, f"a secret or config of '{c.name}'", "source target uid gid mode")
+        fields = c.fields(item, f"a {key[:-1]} of '{c.name}'", "source target uid gid mode")
+        word = fields.get("source") if isinstance(item, source.Mapping) else item
+        if isinstance(word, Scalar) and word.text not in known:
+            message = f"'{c.name}' takes the {key[:-1]} '{word.text}', which the top-level '{key}' do not declare"
+            c.bad(word.span, message, did_you_mean(word.text, known))
     return plain(node)
 
 
@@ -285,7 +294,7 @@ _CARRIED: dict[str, Key] = {
     "build": image.build,
     "cap_add": hardware.capabilities,
     "command": lambda c, _: _command(c, "command"),
-    "configs": _secrets,
+    "configs": lambda c, n: _secrets(c, n, "configs"),
     "cpu_quota": limits.cpu_quota,
     "cpu_period": lambda c, _: None,
     "depends_on": _depends_on,
@@ -302,7 +311,7 @@ _CARRIED: dict[str, Key] = {
     "networks": _networks,
     "privileged": hardware.privileged,
     "runtime": hardware.runtime,
-    "secrets": _secrets,
+    "secrets": lambda c, n: _secrets(c, n, "secrets"),
     "security_opt": hardware.security,
     "sysctls": _sysctls,
     "tmpfs": limits.tmpfs,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import compose_merge, compose_paths
-from dodo_dsl.application.compose_files import ComposeFiles, variables_of
+from dodo_dsl.application.compose_files import ComposeFiles, statements_of
 from dodo_dsl.application.model import scalars
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed
 from dodo_dsl.source import Entry, Node, Scalar
@@ -24,8 +24,19 @@ _NAMED = ("volumes", "secrets", "configs", "networks")
 def load(files: ComposeFiles, names: Sequence[Path]) -> source.Mapping | None:
     """The files merged in order, with paths relative to the first one's folder; None when one cannot be read."""
     folder = names[0].parent
-    files.gather(folder / ".env", Span(str(names[0])))
+    taken = [word for name in names for word in _variables_of_secrets(files, name)]
+    files.known |= files.gather(folder / ".env", taken)
     return _all(files, names, folder, ())
+
+
+def _variables_of_secrets(files: ComposeFiles, file: Path) -> Iterator[str]:
+    """The variables of which a file makes secrets, before it is read."""
+    document = files.read(file)
+    node = document.get("secrets") if isinstance(document, source.Mapping) else None
+    for entry in node.entries.values() if isinstance(node, source.Mapping) else ():
+        word = entry.value.get("environment") if isinstance(entry.value, source.Mapping) else None
+        if isinstance(word, Scalar):
+            yield word.text
 
 
 def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
@@ -80,9 +91,11 @@ def _included(
         return document
     project = Path(os.path.normpath(folder / place.text)) if isinstance(place, Scalar) else found[0].parent
     own = [files.other(word, folder) for word in scalars(words.get("env_file"))] or [project / ".env"]
-    for file in own:
-        files.gather(file, names[0].span)
+    before = files.included
+    taken = [word for name in found for word in _variables_of_secrets(files, name)]
+    files.included = {**before, **{k: v for file in own if file for k, v in files.gather(file, taken).items()}}
     part = _all(files, found, project, chain)
+    files.included = before
     return document if part is None else _joined(files, document, part, project, folder)
 
 
@@ -214,7 +227,7 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
 
 def _discovered(folder: Path) -> tuple[list[Path], str]:
     """The files that compose reads in a folder, in its order, and why it reads the later ones."""
-    variables = variables_of(folder / ".env")
+    variables = dict(statements_of(folder / ".env"))
     if text := variables.get(_LIST):
         names = text.split(variables.get(_SEPARATOR) or os.pathsep)
         return [_whole_file(folder / name) for name in names if name], f"as {_LIST} in .env says"

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_files import is_late, variables_of
+from dodo_dsl.application.compose_files import Statements, is_late, statements_of
 from dodo_dsl.application.host_paths import HostPaths, repository
+from dodo_dsl.application.interpolation import literal
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, split
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
@@ -100,8 +101,8 @@ class EnvFile:
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo, or if that says nothing of messages. ``file_variables`` are those that its
-    ``env_files`` set. Variables are filled in but for those in ``raw``, the values of TEST_FILLED as they are written.
+    ``declared`` is None without x-dodo, or if that says nothing of messages. ``statements`` are those of its
+    ``env_files``. Variables are filled in but for those in ``raw``, the values of TEST_FILLED as they are written.
     """
 
     name: str
@@ -109,13 +110,18 @@ class ComposeService:
     span: Span
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
-    file_variables: Mapping[str, str | None] = field(default_factory=dict)
+    statements: tuple[Statements, ...] = ()
     raw: Mapping[str, Node] = field(default_factory=dict)
 
     @functools.cached_property
     def words(self) -> tuple[tuple[str, Scalar], ...]:
         """The words of its commands, each with the value in which it is written."""
         return tuple(word for key in COMMANDS for word in words_of(self.node.get(key)))
+
+    @functools.cached_property
+    def file_variables(self) -> Mapping[str, str | None]:
+        """The variables that its files set; None takes the value from outside."""
+        return {name: value for statements in self.statements for name, value in statements}
 
     @property
     def cid_variables(self) -> tuple[str, ...]:
@@ -354,10 +360,15 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
         path, required, form = about("path"), about("required"), about("format")
         if isinstance(path, Scalar) and isinstance(path.value, str):
             optional = isinstance(required, Scalar) and not is_true(required.value)
-            yield EnvFile(path.text, path.span, not optional, isinstance(form, Scalar) and form.value == "raw")
+            yield EnvFile(
+                literal(path.text) or path.text,
+                path.span,
+                not optional,
+                isinstance(form, Scalar) and form.value == "raw",
+            )
 
 
-def file_variables(files: Iterable[EnvFile], folder: Path) -> dict[str, str | None]:
-    """The variables that files next to the compose file set."""
+def file_statements(files: Iterable[EnvFile], folder: Path) -> tuple[Statements, ...]:
+    """What files next to the compose file set, in order."""
     own = (file for file in files if not file.path.startswith(("/", "~")))
-    return {name: v for file in own for name, v in variables_of(folder / file.path, raw=file.raw).items()}
+    return tuple(statements_of(folder / file.path, raw=file.raw) for file in own)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import interpolation, secret_variables
-from dodo_dsl.application.compose_files import variables_of
+from dodo_dsl.application.compose_files import statements_of
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 
@@ -50,7 +50,7 @@ def written(nodes: Collection[Node]) -> Iterator[Diagnostic]:
 
 def in_file(file: Path, raw: bool) -> Iterator[Diagnostic]:
     """The same of a file of ``env_file``."""
-    for name, value in variables_of(file, raw=raw).items():
+    for name, value in statements_of(file, raw=raw):
         if kind := secret_variables.secret_kind(value or ""):
             yield _open(_place(file, name), kind)
 
