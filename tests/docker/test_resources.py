@@ -11,7 +11,6 @@ from dodo_dsl.run.mixed import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.docker.compose import SUBNETS, Crate
-from tests.docker.test_mixed import separate
 from tests.run.helpers import AFTER_START, PASS, READY, WAIT
 from tests.run.process.test_resources import FORKS, LEAKS
 
@@ -32,7 +31,7 @@ def test_each_manner_has_its_figures(crate: Crate) -> None:
 @pytest.mark.proof
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container")
 def test_and_beside_processes(crate: Crate) -> None:
-    job = separate(crate.job("mixed-leaks", JUDGE, LEAKS, mem_limit="400m"), crate.bench.folder)
+    job = crate.job("mixed-leaks", JUDGE, LEAKS, mem_limit="400m")
     runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(1, lambda job: 1.0), Policy())
     (outcome,) = asyncio.run(runner.run([job]))
     have_limits({"mixed-leaks": outcome})

@@ -1,19 +1,12 @@
 """What builds get of a repository: not its tests, their output and ``.git``."""
 
-import asyncio
-import json
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from dodo_dsl.plan.model import ApplicationService
 from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
-from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.pulls import Pulls
-from tests.run.scripted import plan
 
 _FILES = (
     "Dockerfile", "app.py", "data/a.txt", ".git/config", "sub/.git/config", "tests/a.dodo.yml", "tests/map.json",
@@ -35,7 +28,7 @@ def repository(tmp_path: Path) -> Path:
 def _built(root: Path, build: Any, folder: Path) -> dict[str, Any]:
     hidden = [root / ".git", root / "tests", root / "dodo-report", root / "b.dodo.yml"]
     folder.mkdir(exist_ok=True)
-    found: dict[str, Any] = own_contexts({"a": {"image": "a", "build": build, "command": "x"}}, hidden, folder)
+    found = own_contexts({"a": {"image": "a", "build": build, "command": "x"}}, hidden, folder, root)
     return dict(found["a"])
 
 
@@ -86,31 +79,3 @@ def test_hidden_folders_are_no_context(context: str, repository: Path, tmp_path:
         HiddenContext, match=rf"the build of 'a' takes '.*{context}', where tests, their output or \.git"
     ):
         _built(repository, {"context": str(repository / context)}, tmp_path / "copies")
-
-
-async def _nothing(*_: object) -> list[str]:
-    return []
-
-
-def test_a_run_builds_from_the_copy_alone(repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    program = tmp_path / "docker"
-    lines = ['cat "$COMPOSE_FILE" > ../../seen', 'cd "$(dirname "$COMPOSE_FILE")"', f"find . > {tmp_path}/files"]
-    program.write_text("\n".join(["#!/bin/sh", *lines]).replace("../..", str(tmp_path)))
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-    report = repository / "dodo-report" / "sil-first"
-    made = plan()
-    services, hidden = (ApplicationService("a", None),), ("tests", "b.dodo.yml")
-    made = replace(made, application=replace(made.application, folder="../..", services=services, hidden=hidden))
-    monkeypatch.setattr(Pulls, "provide", _nothing)
-    test = Compose(made, repository / "generated" / "sil-first", report, "project", print)
-    test.folder.mkdir(parents=True)
-    test.services = {"a": {"image": "team/a$b", "build": {"context": str(repository)}}}
-    asyncio.run(test.provide_images(Pulls(None)))
-    seen = json.loads((tmp_path / "seen").read_text())
-    assert Path(seen["services"]["a"]["build"]["context"]).parents[1].parent == report
-    files = (tmp_path / "files").read_text()
-    assert "/app.py" in files
-    assert not [name for name in ("config", "results.json", "generated", "map.json", "dodo.yml") if name in files]
-    assert seen["services"]["a"]["image"].startswith("dodo-build:")
-    assert [path.name for path in report.iterdir()] == ["logs"]
