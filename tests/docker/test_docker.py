@@ -132,9 +132,9 @@ print(f'{{"dodo": "verdict", "outcome": "{outcome}", "reason": "felt {len(felt)}
 
 def test_a_hostile_neighbour_is_neither_heard_nor_felt(crate: Crate) -> None:
     """It sends to all groups, writes into all shared memory and fills its /tmp, as long as another test takes."""
-    shutil.copy(HOSTILE / "hostile.py", crate.bench.folder)
-    words = ["--cid=111", "--name=video0.argb", "--harm=groups,memory,tmp", "--stop=/scripts/stop"]
-    hostile = crate.start(crate.job("hostile", entrypoint=["python3", "-u", "/scripts/hostile.py"], command=words))
+    script = shutil.copy(HOSTILE / "hostile.py", crate.bench.folder)
+    words = ["--cid=111", "--name=video0.argb", "--harm=groups,memory,tmp", f"--stop={crate.bench.folder}/stop"]
+    hostile = crate.start(crate.job("hostile", entrypoint=["python3", "-u", str(script)], command=words))
     try:
         wait_for(hostile, "running")
         (outcome,) = crate.run(crate.job("quiet", FEELS, "open('/tmp/app-began', 'w').close()\n" + WAIT)).values()

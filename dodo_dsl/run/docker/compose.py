@@ -24,10 +24,10 @@ from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Application, Plan
-from dodo_dsl.run.application_files import application_paths, secrets_of
+from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
 from dodo_dsl.run.docker.mounts import absent, binds, masks, over, whole
-from dodo_dsl.run.docker.pulls import PullError, Pulls, Say, image_hints
+from dodo_dsl.run.docker.pulls import Pulls, Say, image_hints
 from dodo_dsl.run.hidden_paths import hidden_paths
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.permission import known_ports
@@ -82,8 +82,7 @@ class Compose:
             raise BackendError(f"there is no program 'docker': {advice.docker()}")
         self._hidden = hidden_paths(self.plan.application, self.folder, self.report)
         try:
-            outside = secret_variables.allowed(os.environ, self.plan.application.access.passed)
-            self._outside = {**secrets_of(self.plan.application, self.folder, outside), **outside}
+            self._outside = variables_of(self.plan.application, self.folder)
             self.services = with_images(self.plan.application, self._outside)
         except EnvironmentProblem as error:
             raise BackendError(str(error)) from error
@@ -140,11 +139,12 @@ class Compose:
         """Pulls and builds the services' images, once for all tests of a run; raises BackendError."""
         private = private_images(self.services, self._paths.folder, self._outside)
         foreign = {service["image"] for name, service in self.services.items() if name not in private}
-        try:
-            notes = await pulls.provide(self._own_images(), foreign, self._say, image_hints(self.plan))
-        except PullError as error:
-            raise BackendError(f"{error}{self._other_way(error.image)}") from error
-        for note in notes:
+        ways = {
+            self.services[s.name]["image"]: f"with 'x-dodo-process: [python, main.py]' '{s.name}' starts as a process"
+            for s in self.plan.application.services
+            if s.name in self.services and not s.process
+        }
+        for note in await pulls.provide(self._own_images(), foreign, self._say, ways | image_hints(self.plan)):
             self._say(note)
         for name, image in private.items():
             self.services[name]["image"] = image
@@ -156,12 +156,6 @@ class Compose:
     def _own_images(self) -> set[str]:
         sandbox = {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else ()
         return {service.image for service in self.plan.services}.union(sandbox)
-
-    def _other_way(self, image: str) -> str:
-        """How a service of the application starts without its image; empty if it has a process, and for others."""
-        with_image = {name for name, service in self.services.items() if service["image"] == image}
-        found = [s.name for s in self.plan.application.services if s.name in with_image and not s.process]
-        return f"; with 'x-dodo-process: [python, main.py]' '{found[0]}' starts as a process" if found else ""
 
     async def _build(self, services: Mapping[str, Any]) -> str:
         """Builds images in a project that all tests have in common, from folders without what is hidden."""
