@@ -22,9 +22,8 @@ from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import application_time
 from dodo_dsl.run.backends import Job, Say
 from dodo_dsl.run.docker.backend import DockerBackend
-from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.container_use import ELSEWHERE, is_of
+from dodo_dsl.run.docker.container_use import ELSEWHERE, first_process
 from dodo_dsl.run.docker.containers import Containers
 from dodo_dsl.run.docker.mounts import over, target_of
 from dodo_dsl.run.docker.shared_files import IMAGE
@@ -163,19 +162,13 @@ class ApplicationContainers(DockerBackend):
 
     @staticmethod
     def _find_process(container: Any) -> int:
-        from docker.errors import DockerException
-
-        try:
-            container.reload()
-        except (DockerException, OSError) as error:
-            raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
-        state = container.attrs["State"]
-        process = int(state.get("Pid") or 0)
+        process = first_process(container)
+        if process is None:
+            raise BackendError(f"{ELSEWHERE}, whose network DoDo's processes cannot enter; use --backend docker")
         if not process:
+            state = container.attrs["State"]
             why = state.get("Error") or f"exit code {state.get('ExitCode')}"
             raise BackendError(f"the container that holds the test's network ended at once: {why}")
-        if not is_of(process, container.id):
-            raise BackendError(f"{ELSEWHERE}, whose network DoDo's processes cannot enter; use --backend docker")
         return process
 
 

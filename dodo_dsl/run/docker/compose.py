@@ -17,6 +17,7 @@ from typing import Any
 
 from dodo_dsl import advice, atomic
 from dodo_dsl.application import secret_variables
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.host_paths import holds_port, is_port, is_rule_for_port
 from dodo_dsl.application.interpolation import EnvironmentProblem, interpolate
 from dodo_dsl.application.model import FILES
@@ -26,7 +27,7 @@ from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
-from dodo_dsl.run.docker.mounts import absent, binds, masks, over, whole
+from dodo_dsl.run.docker.mounts import Bind, absent, binds, masks, over, whole
 from dodo_dsl.run.docker.pulls import Pulls, Say, image_hints
 from dodo_dsl.run.hidden_paths import hidden_paths
 from dodo_dsl.run.protocol import BackendError
@@ -73,14 +74,13 @@ class Compose:
         self._application = plan.application.compose
         self._say = say
         self._paths = application_paths(plan.application, folder)
-        self._hidden: list[Path] = []
+        self._binds: dict[str, list[Bind]] = {}
         self._outside: dict[str, str] = {}
 
     def read(self) -> None:
         """Fills ``services``; raises BackendError."""
         if shutil.which("docker") is None:
             raise BackendError(f"there is no program 'docker': {advice.docker()}")
-        self._hidden = hidden_paths(self.plan.application, self.folder, self.report)
         try:
             self._outside = variables_of(self.plan.application, self.folder)
             self.services = with_images(self.plan.application, self._outside)
@@ -102,7 +102,7 @@ class Compose:
 
     def _require_own(self) -> None:
         """Raises BackendError if a path of the application leads elsewhere than when the test was compiled."""
-        hidden = [place for place in self._hidden if place.is_dir()]
+        hidden = [place for place in self._hidden() if place.is_dir()]
         for key in ("configs", "secrets"):
             for name, about in (self._application.get(key) or {}).items():
                 file = whole(about["file"], self.folder) if about.get("file") else ""
@@ -110,18 +110,22 @@ class Compose:
                     what = f"the application may not have {key}.{name}.file: '{file}'"
                     raise BackendError(f"{what} lies where tests, their output or .git are kept")
         ports = tuple(known_ports(self.plan))
-        for name, service in self.services.items():
+        for name, mounted in self._binds.items():
+            service = self.services.get(name, {})
             devices = [str(d["source"] if isinstance(d, dict) else d) for d in service.get("devices") or ()]
             if (
                 any(holds_port(whole(device.partition(":")[0], self.folder), ports) for device in devices)
-                or any(is_port(bind.source, ports) for bind in self._binds[name])
+                or any(is_port(bind.source, ports) for bind in mounted)
                 or any(is_rule_for_port(rule, ports) for rule in service.get("device_cgroup_rules") or ())
             ):
                 raise BackendError(f"service '{name}' may not have the port of a rig, which only its service opens")
-            for bind in self._binds[name]:
+            for bind in mounted:
                 if link := self._paths.link(bind.source):
                     what = f"'{bind.source}' of '{name}' is a symbolic link to '{link}'"
                     raise BackendError(f"{what}, outside the repository")
+
+    def _hidden(self) -> list[Path]:
+        return hidden_paths(self.plan.application, self.folder, self.report)
 
     def mounted(self) -> list[Path]:
         """What containers mount of this machine; what is compiled stands as one file."""
@@ -165,7 +169,7 @@ class Compose:
         with tempfile.TemporaryDirectory(prefix=".build-", dir=self.report) as name:
             copies = Path(name)
             try:
-                builds = await asyncio.to_thread(own_contexts, services, self._hidden, copies, self.folder)
+                builds = await asyncio.to_thread(own_contexts, services, self._hidden(), copies, self.folder)
             except (HiddenContext, OSError, shutil.Error) as error:
                 raise BackendError(f"the application's images cannot be built: {error}") from error
             file = copies / "builds.compose.json"
@@ -200,15 +204,17 @@ class Compose:
 
         That is the ``key``, which is in no variable, as any could be named in the application's file.
         """
-        empty = self.folder / _EMPTY_FILE
-        if any(path.is_file() for path in self._hidden):
+        hidden, empty = self._hidden(), self.folder / _EMPTY_FILE
+        if any(path.is_file() for path in hidden):
             empty.touch()
         services: dict[str, Any] = {s.name: {"environment": {KEY_VARIABLE: key.hex()}} for s in self.plan.services}
         for name, mounted in self._binds.items():
-            lie_over = masks(mounted, self._hidden, empty) + absent(mounted, self._paths, always=name == FILES)
+            lie_over = masks(mounted, hidden, empty) + absent(mounted, self._paths, always=name == FILES)
             service = {key: value for key, value in self.services.get(name, {}).items() if key != "build"}
             volumes = over(service.get("volumes") or (), lie_over)
-            services[name] = {**service, **({"volumes": volumes} if volumes else {})}
+            services[name] = service | ({"volumes": volumes} if volumes else {})
+            if name in self.services:
+                services[name]["image"] = escaped(service["image"])
         return {**self._application, "services": services}
 
     async def run(

@@ -46,25 +46,13 @@ def test_a_context_holds_nothing_that_no_application_sees(repository: Path, tmp_
     assert Path(found["build"]["context"]).name == repository.name
 
 
-def test_so_do_named_contexts(repository: Path, tmp_path: Path) -> None:
-    others = {
-        "same": str(repository),
-        "data": str(repository / "data"),
-        "base": "docker-image://python",
-        "s": "service:b",
-    }
-    build = _built(repository, {"context": str(repository), "additional_contexts": others}, tmp_path / "copies")[
-        "build"
-    ]
-    own = build["additional_contexts"]
-    assert own == {**others, "same": build["context"]}
-    assert ".git/config" not in _shown(own["same"])
-
-
-@pytest.mark.parametrize("context", ["data", "https://example.org/a.git"])
-def test_others_stay_where_they_are(context: str, repository: Path, tmp_path: Path) -> None:
-    where = context if "://" in context else str(repository / context)
-    assert _built(repository, {"context": where}, tmp_path / "copies")["build"]["context"] == where
+def test_so_do_named_contexts_and_others_stay_where_they_are(repository: Path, tmp_path: Path) -> None:
+    own = str(repository)
+    others = {"same": own, "data": f"{own}/data", "base": "docker-image://python", "s": "service:b"}
+    build = _built(repository, {"context": own, "additional_contexts": others}, tmp_path / "copies")["build"]
+    assert build["additional_contexts"] == {**others, "same": build["context"]}
+    for context in (f"{own}/data", "https://example.org/a.git"):
+        assert _built(repository, {"context": context}, tmp_path / "copies")["build"]["context"] == context
 
 
 def test_a_dockerfile_may_be_kept_among_the_tests(repository: Path, tmp_path: Path) -> None:

@@ -99,6 +99,7 @@ def test_a_mount_has_one_place(folder: Path) -> None:
     ("services", "more", "said"),
     [
         ({"volumes": ["../../out:/o:ro"]}, {}, "is a symbolic link to '/etc', outside the repository"),
+        ({}, {"copies": {"files-0": "../../out"}}, "is a symbolic link to '/etc', outside the repository"),
         ({}, {"configs": {"c": {"file": "../../tests/map.json"}}}, r"configs\.c\.file: .*tests/map.json' lies where"),
         ({"image": "${NOBODY:?says}"}, {}, "NOBODY"),
     ],
