@@ -16,6 +16,7 @@ from typing import Any
 
 import yaml
 
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import LAYERS, Plan
@@ -25,7 +26,7 @@ from dodo_dsl.run.docker.backend import DockerBackend
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, first_process
 from dodo_dsl.run.docker.containers import Containers
-from dodo_dsl.run.docker.mounts import over, target_of
+from dodo_dsl.run.docker.mounts import over
 from dodo_dsl.run.docker.shared_files import IMAGE
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
@@ -70,7 +71,7 @@ class ApplicationCompose(Compose):
         return set()
 
     def document(self, key: bytes) -> dict[str, Any]:
-        """With the containers that are no services, with programs of this machine; nothing waits for DoDo's services.
+        """With the containers that DoDo adds, which have programs of this machine; nothing waits for DoDo's services.
 
         Mounts lie over the folders in ``/tmp`` where DoDo's processes have theirs: so no container removes them.
         """
@@ -88,17 +89,15 @@ class ApplicationCompose(Compose):
             own[SANDBOX] = self._holder(compiled["services"][SANDBOX])
             volumes[_TMP] = compiled["volumes"][_TMP]
             if self.plan.clock == VIRTUAL:
-                place = str(application_time.built().library.parent).replace("$", "$$")
+                place = escaped(str(application_time.built().library.parent))
                 volumes[TIME] = {"driver_opts": {"type": "none", "o": "bind", "device": place}}
-        for service in services.values():
-            after = service.get("depends_on") or {}
-            service["depends_on"] = {name: how for name, how in after.items() if name in services or name in own}
         shown = Entered.with_own(0, *needed_paths(self.plan, self.folder, self.report)).shown if SANDBOX in own else ()
         mounts = covers(shown)
         for service in services.values():
-            targets = {target_of(mount) for mount in service.get("volumes", ())}
-            service["volumes"] = [*service.get("volumes", ()), *(m for m in mounts if m["target"] not in targets)]
-        networks = {key: compiled[key] for key in ("networks",) if key in compiled}
+            after = service.get("depends_on") or {}
+            service["depends_on"] = {name: how for name, how in after.items() if name in services or name in own}
+            service["volumes"] = over(mounts, service.get("volumes", ()))
+        networks = {"networks": compiled["networks"]} if "networks" in compiled else {}
         return {**made, **networks, "services": {**services, **own}, "volumes": volumes}
 
     def _holder(self, compiled: dict[str, Any]) -> dict[str, Any]:
@@ -118,7 +117,9 @@ def covers(shown: Iterable[Path]) -> list[dict[str, Any]]:
     tmp, memory = namespaces.SHARED
     folders = [path for path in shown if path.is_dir() and not path.is_symlink()]  # as only these are mounted
     places = [{tmp: apart, memory: memory}[path.parent] / path.name for path in folders]
-    mounts: list[dict[str, Any]] = [{"type": "tmpfs", "target": str(place), "read_only": True} for place in places]
+    mounts: list[dict[str, Any]] = [
+        {"type": "tmpfs", "target": escaped(str(place)), "read_only": True} for place in places
+    ]
     if apart in {place.parent for place in places}:
         options = {"read_only": True, "volume": {"nocopy": True}}
         mounts.insert(0, {"type": "volume", "source": _TMP, "target": str(apart), **options})

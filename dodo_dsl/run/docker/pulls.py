@@ -126,21 +126,12 @@ class Pulls:
 
         progress = _Progress(image, say)
         try:
-            for line in self._client.api.pull(*split_reference(image), stream=True, decode=True):
+            for line in self._client.api.pull(image, stream=True, decode=True):
                 if self._interrupted.is_set():
                     return
                 progress.take(line)
         except (DockerException, OSError) as error:
             raise _problem(image, engine_error(error)) from error
-
-
-def split_reference(image: str) -> tuple[str, str]:
-    """An image's repository, and its tag (``latest`` by default) or digest."""
-    repository, sign, digest = image.partition("@")
-    if sign:
-        return repository, digest
-    repository, sign, tag = image.rpartition(":")
-    return (repository, tag) if sign and "/" not in tag else (image, "latest")
 
 
 def _problem(image: str, text: str) -> BackendError:
