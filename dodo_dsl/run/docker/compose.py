@@ -27,7 +27,7 @@ from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
-from dodo_dsl.run.docker.mounts import Bind, absent, binds, masks, over, whole
+from dodo_dsl.run.docker.mounts import Bind, absent, binds, long_form, masks, over, whole
 from dodo_dsl.run.docker.pulls import Pulls, Say, image_hints
 from dodo_dsl.run.hidden_paths import hidden_paths
 from dodo_dsl.run.protocol import BackendError
@@ -211,7 +211,7 @@ class Compose:
         for name, mounted in self._binds.items():
             lie_over = masks(mounted, hidden, empty) + absent(mounted, self._paths, always=name == FILES)
             service = {key: value for key, value in self.services.get(name, {}).items() if key != "build"}
-            volumes = over(service.get("volumes") or (), lie_over)
+            volumes = over([long_form(mount, self.folder) for mount in service.get("volumes") or ()], lie_over)
             services[name] = service | ({"volumes": volumes} if volumes else {})
             if name in self.services:
                 services[name]["image"] = escaped(service["image"])

@@ -54,6 +54,21 @@ def over(mounts: Sequence[Any], masks: Sequence[Mapping[str, Any]]) -> list[Any]
     return [*(mount for mount in mounts if target_of(mount) not in targets), *masks]
 
 
+def long_form(mount: str | Mapping[str, Any], folder: Path) -> str | Mapping[str, Any]:
+    """A mount of what is there in the form in which its path may have a colon, and the engine makes nothing."""
+    made: Mapping[str, Any] = {} if isinstance(mount, str) else mount
+    if isinstance(mount, str):
+        source, _, rest = mount.partition(":")
+        target, _, options = rest.partition(":")
+        if not is_path(source) or not rest or options not in ("", "ro"):
+            return mount
+        made = {"type": "bind", "source": source, "target": target, "read_only": options == "ro"}
+    is_there = made["type"] == "bind" and os.path.lexists(whole(made["source"], folder))
+    if not is_there or "selinux" in made.get("bind", {}):
+        return mount
+    return {**made, "bind": {"create_host_path": False}}
+
+
 def masks(mounted: Sequence[Bind], hidden: Sequence[Path], empty: Path) -> list[dict[str, Any]]:
     """Mounts that hide files and folders; the file that is ``empty`` takes the place of files."""
     targets: dict[Path, bool] = {}

@@ -84,7 +84,8 @@ def bind(source: str, target: str, makes: bool = True) -> dict[str, Any]:
 def test_what_lies_over_mounts(mount: Any, targets: list[str], folder: Path) -> None:
     """Empty folders, an empty file over a file, and nothing that the engine would make as root."""
     bound = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "../../tests"}}, "own": {}}
-    found = [each for each in volumes(mount, folder=folder, volumes=bound) if each != mount]
+    first, *found = volumes(mount, folder=folder, volumes=bound)
+    found = [each for each in (first, *found) if each != mount and "bind" not in each]
     assert sorted(mask["target"] for mask in found) == targets
     assert all(mask["read_only"] for mask in found)
     assert {m["target"] for m in found if m["type"] == "bind"} == {t for t in targets if t.endswith("dodo.yml")}
