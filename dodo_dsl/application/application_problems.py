@@ -4,7 +4,8 @@ A service has names, commands, references, and what cannot be isolated; together
 dependencies, and no service that takes a CID.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from graphlib import CycleError, TopologicalSorter
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
@@ -19,14 +20,13 @@ from dodo_dsl.application.model import (
     ComposeService,
     declared_cid,
     image_variable,
-    is_true,
     plain,
     references,
     words_of,
 )
 from dodo_dsl.application.slips import cid_slips, is_cid, missing_program
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
 
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
@@ -56,7 +56,6 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(construction.check())
     found.extend(_cycles(application))
-    found.extend(_never_healthy(application))
     found.extend(_same_variable(application))
     found.extend(_several_cids(application, of_stack))
     yield from found
@@ -98,54 +97,16 @@ def _missing_folder(service: ComposeService, application: ApplicationSource) -> 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Services that depend on themselves, directly or through others."""
-    containers = dict(application.containers)
-    needs = {
-        name: {other for _, other in references(plain(s.node), containers) if other in application.services}
-        for name, s in application.services.items()
-    }
-    waiting = set(_never_ready(needs))
-    wanted_by: dict[str, set[str]] = {name: set() for name in needs}
-    for name in waiting:
-        for other in needs[name]:
-            wanted_by[other].add(name)
-    cycle = [name for name in _never_ready(wanted_by) if name in waiting]
-    if cycle:
-        message = f"services depend on one another: {', '.join(cycle[:6])}{', ...' if len(cycle) > 6 else ''}"
+    containers, services = dict(application.containers), application.services
+    needs = {n: {o for _, o in references(plain(s.node), containers) if o in services} for n, s in services.items()}
+    try:
+        TopologicalSorter(needs).prepare()
+    except CycleError as error:
+        first, *others = (name for name in services if name in error.args[1])
+        more = ", ..." if len(others) > 5 else ""
+        message = f"services depend on one another: {', '.join([first, *others[:5]])}{more}"
         hint = "remove one of the dependencies, so that one service can start first"
-        yield Diagnostic(application.services[cycle[0]].span, "application-file", message, hint)
-
-
-def _never_healthy(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Services that wait for the health of one whose health check is turned off; an image may have one as well."""
-    for service in application.services.values():
-        needed = plain(service.node).get("depends_on")
-        for name, about in needed.items() if isinstance(needed, dict) else ():
-            other = application.services.get(str(name))
-            is_waiting = isinstance(about, dict) and about.get("condition") == "service_healthy"
-            check = plain(other.node).get("healthcheck") if other and is_waiting else None
-            if isinstance(check, dict) and (
-                is_true(check.get("disable") or False) or check.get("test") in ("NONE", ["NONE"])
-            ):
-                message = f"'{service.name}' waits for '{name}' to be healthy, whose health check is turned off"
-                hint = f"give '{name}' a healthcheck, or wait with 'condition: service_started'"
-                span = place(service.node, ("depends_on", str(name), "condition"), service.span)
-                yield Diagnostic(span, "application-file", message, hint)
-
-
-def _never_ready(needs: Mapping[str, set[str]]) -> Iterator[str]:
-    """Those that depend on themselves, or on such a service."""
-    left = {name: len(others) for name, others in needs.items()}
-    wanted_by: dict[str, list[str]] = {}
-    for name, others in needs.items():
-        for other in others:
-            wanted_by.setdefault(other, []).append(name)
-    ready = [name for name, count in left.items() if not count]
-    while ready:
-        for name in wanted_by.get(ready.pop(), ()):
-            left[name] -= 1
-            if not left[name]:
-                ready.append(name)
-    yield from (name for name, count in left.items() if count)
+        yield _bad(services[first].span, message, hint)
 
 
 def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -228,11 +189,9 @@ def takes_cid(service: ComposeService) -> bool:
 def _problems(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
     """What is wrong with one service beside its keys: its name, commands, and the services that it names."""
     yield from _name(service)
-    yield from _display(service)
     yield from _commands(service)
     yield from _references(service, application)
     yield from _conditions(service)
-    yield from _unmounted(service)
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
@@ -242,9 +201,6 @@ def unknown_keys(service: Node) -> Iterator[Diagnostic]:
         if word.startswith("x-dodo") and word not in KEYS:
             hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
             yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, fix=fix)
-        elif word not in KEYS and word.startswith("x-do") and did_you_mean(word, KEYS).startswith("did"):
-            message = f"neither compose nor DoDo uses the key '{word}'"
-            yield Diagnostic(entry.key, "unknown-key", message, did_you_mean(word, KEYS), "warning")
 
 
 def _name(service: ComposeService) -> Iterator[Diagnostic]:
@@ -255,15 +211,6 @@ def _name(service: ComposeService) -> Iterator[Diagnostic]:
         yield _bad(service.span, f"the name of a service has {len(name)} characters, expected at most {_LONGEST}")
     if not any(plain(service.node).get(key) for key in ("image", "build", "x-dodo-process")):
         yield _bad(service.span, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
-
-
-def _display(service: ComposeService) -> Iterator[Diagnostic]:
-    """A warning of an X server that only a process gets."""
-    if service.has_display and KEYS[1] not in service.node.entries:
-        message = f"'display' of '{service.name}' has no effect in a container, whose image brings its own X server"
-        hint = "start it with xvfb-run there, or give it x-dodo-process; docs/reference/applications.md, Windows"
-        span = place(service.node, (KEYS[0], "display"), service.span)
-        yield Diagnostic(span, "application-file", message, hint, "warning")
 
 
 def _commands(service: ComposeService) -> Iterator[Diagnostic]:
@@ -299,8 +246,7 @@ def _conditions(service: ComposeService) -> Iterator[Diagnostic]:
         condition = about.get("condition") if isinstance(about, dict) else None
         if isinstance(condition, str) and condition not in _CONDITIONS:
             message = f"'{condition}' is not a condition of 'depends_on'"
-            near = closest(condition, _CONDITIONS)
-            hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(_CONDITIONS)}"
+            hint = f"known: {', '.join(_CONDITIONS)}"
             yield _bad(place(service.node, ("depends_on", name, "condition"), service.span), message, hint)
 
 
@@ -312,21 +258,6 @@ def _of_name(service: ComposeService, key: str, name: str) -> Span:
     items = node.items if isinstance(node, source.Sequence) else ()
     fits = (item.span for item in items if isinstance(item, source.Scalar) and name in item.text.split(":"))
     return next(fits, place(service.node, (key,), service.span))
-
-
-def _unmounted(service: ComposeService) -> Iterator[Diagnostic]:
-    """A warning of a volume that a process lacks; it has its own folder, the test's ``/tmp`` and devices."""
-    volumes = service.node.get("volumes") if KEYS[1] in service.node.entries else None
-    for item in volumes.items if isinstance(volumes, source.Sequence) else ():
-        about = plain(item)
-        parts = [about.get("source"), about.get("target")] if isinstance(about, dict) else str(about).split(":")
-        origin, target = ([str(part or "") for part in parts] + [""])[:2]
-        if origin in (target, ".", "./") or origin.startswith(("/tmp", "/dev", "/sys")) or not target:
-            continue
-        what = f"the process of '{service.name}' has no '{target}', as volumes are mounted in containers only"
-        hint = f"it starts in this file's folder: name '{origin}' there in its command, or use --backend docker"
-        yield Diagnostic(item.span, "application-file", what, hint, "warning")
-        return
 
 
 def _bad(span: Span, message: str, hint: str = "", fix: Fix | None = None) -> Diagnostic:

@@ -6,9 +6,8 @@ Problems stand at their place in ``dodo.yml``.
 from collections.abc import Iterator
 from pathlib import Path
 
-from dodo_dsl import source
-from dodo_dsl.application.model import KEYS, ApplicationSource, plain, references
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix, shown_path
+from dodo_dsl.application.model import KEYS
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.source import Entry, Mapping, Node
 from dodo_dsl.spec.deployment import Declarations
 
@@ -100,31 +99,5 @@ def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnost
     for name, entry in declarations.services.items():
         if name in gone:
             yield Diagnostic(entry.key, _RULE, f"'{name}' is declared, but {gone[name]}", "remove one of them")
-        elif name in services:
-            yield from _said_twice(name, services[name].value, entry.value)
 
 
-def _said_twice(name: str, service: Node, about: Node) -> Iterator[Diagnostic]:
-    """Warnings of keys that the compose file has with another value."""
-    if not isinstance(service, Mapping) or not isinstance(about, Mapping):
-        return
-    mine = _entries(service.get(_DECLARED))
-    if _OF_PROCESS in service.entries:
-        mine[PROCESS] = service.entries[_OF_PROCESS]
-    for key, entry in about.entries.items():
-        if key in mine and source.plain(mine[key].value) != source.plain(entry.value):
-            message = f"'{key}' of '{name}' is also in {_place(mine[key].key)}, and this one counts"
-            yield Diagnostic(entry.key, _RULE, message, "remove one of them", "warning")
-
-
-def depending(application: ApplicationSource, gone: dict[str, str]) -> Iterator[Diagnostic]:
-    """Warnings of services that need one that is left out; missing volumes of one are an error elsewhere."""
-    for name, service in application.services.items() if gone else ():
-        for key, other in references(plain(service.node), dict(application.containers)):
-            if other in gone and key != "volumes_from":
-                message = f"'{name}' starts without '{other}', which its '{key}' names: {gone[other]}"
-                yield Diagnostic(service.node.entries[key].key, _RULE, message, severity="warning")
-
-
-def _place(span: Span) -> str:
-    return f"{shown_path(span.file)}:{span.line}"

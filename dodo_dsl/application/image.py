@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import limits
-from dodo_dsl.application.interpolation import literal
 from dodo_dsl.application.model import environment, image_variable, plain, text
 from dodo_dsl.application.part import pairs
 from dodo_dsl.source import Node
@@ -20,20 +19,7 @@ _BASES = ("python", "library/python", "debian", "library/debian")
 
 def image(c: "Container", node: Node) -> Any:
     """The image of the file, unless a pipeline sets another one."""
-    image = text(plain(node))
-    written = literal(image)
-    if written is not None and (name := _repository(written)) != name.lower():
-        hint = f"write {written.replace(name, name.lower(), 1)}"
-        c.bad(node.span, f"the image '{written}' has capitals, which no engine takes in its name", hint)
-    return f"${{{image_variable(c.name)}:-{image}}}"
-
-
-def _repository(image: str) -> str:
-    """The part of an image's name that is in small letters: without registry, tag and digest."""
-    host, sign, rest = image.partition("@")[0].partition("/")
-    has_host = bool(sign) and ("." in host or ":" in host or host == "localhost")
-    name = rest if has_host else f"{host}{sign}{rest}"
-    return name.partition(":")[0]
+    return f"${{{image_variable(c.name)}:-{text(plain(node))}}}"
 
 
 def short_name(image: str) -> str:

@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from dodo_dsl.source import Node
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_WITHOUT_OPERATOR = re.compile(r"\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*):=?(?P<word>[^-?+}:=][^{}]*)\}")
 _SHOWN = 60
 _BLANKS = r"[ \t\v\f\r\x85\xa0]*"
 _SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
@@ -173,12 +172,7 @@ def _slip(written: str) -> tuple[str, str]:
     shown = written[:_SHOWN]
     if written.count("{") != written.count("}"):
         return "'${' is not closed", f"write '{written.split(maxsplit=1)[0][:_SHOWN]}}}'"
-    if written == "${}":
-        return "'${}' names no variable", "for example ${GAIN:-1}, or $${} for the text itself"
-    known = _WITHOUT_OPERATOR.fullmatch(written)
-    if known:
-        return f"'{shown}' is not a variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
-    what = "the name of a variable has letters, digits and underscores"
+    what = "write ${NAME:-default}, with letters, digits and underscores in the name"
     return f"'{shown}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"
 
 

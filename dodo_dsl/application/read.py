@@ -78,7 +78,6 @@ def read_application(
     named = tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths)
     application = replace(application, dropped={**application.dropped, **gone}, named=named, without=tuple(gone))
     found.extend(unread(paths, root))
-    found.extend(declared.depending(application, gone))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
@@ -90,9 +89,8 @@ def _secrets(application: ApplicationSource, document: source.Mapping, files: Co
     """Warnings of what looks like a secret, in the compose files and beside them."""
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
     yield from secret_problems.withheld(nodes, files.written, {*files.known, *files.secrets, *files.passed}, os.environ)
-    yield from secret_problems.written([document])
     for file, raw in _own_files(application):
-        yield from (*dotenv_problems(file, raw=raw), *secret_problems.in_file(file, raw))
+        yield from dotenv_problems(file, raw=raw)
     yield from secret_problems.left_out(files.secrets)
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import interpolation, secret_variables
-from dodo_dsl.application.compose_files import variables_of
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 
@@ -38,27 +37,16 @@ def withheld(
 
 
 def written(nodes: Collection[Node]) -> Iterator[Diagnostic]:
-    """Values in the files themselves that look like secrets; each once, though anchors and merges repeat it."""
+    """Values in tests that look like secrets; each once, though anchors and merges repeat it."""
     seen: set[Span] = set()
     for node in nodes:
         for part in source.walk(node):
             kind = secret_variables.secret_kind(part.text) if isinstance(part, Scalar) else ""
             if kind and part.span not in seen:
                 seen.add(part.span)
-                yield _open(replace(part.span, length=0), kind)
-
-
-def in_file(file: Path, raw: bool) -> Iterator[Diagnostic]:
-    """The same of a file of ``env_file``."""
-    for name, value in variables_of(file, raw=raw).items():
-        if kind := secret_variables.secret_kind(value or ""):
-            yield _open(_place(file, name), kind)
-
-
-def _open(span: Span, kind: str) -> Diagnostic:
-    message = f"this looks like {kind}, which everybody with access to the repository can read"
-    hint = "keep it out of the repository, name its variable here, and write that in 'environment' of dodo.yml"
-    return Diagnostic(span, "application-secret", message, hint, "warning")
+                message = f"this looks like {kind}, which everybody with access to the repository can read"
+                hint = "keep it out of the repository, and pass a variable with 'environment' of dodo.yml"
+                yield Diagnostic(replace(part.span, length=0), "application-secret", message, hint, "warning")
 
 
 def _named(node: Node, key: str, texts: Mapping[Span, str]) -> Iterator[tuple[str, Span]]:

@@ -13,7 +13,7 @@ from dodo_dsl.application.interpolation import changed_node, filled, literal, na
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import is_steering
-from dodo_dsl.diagnostics import Diagnostic, closest
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.vary import Range
 
@@ -108,14 +108,9 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
 def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Parameters that are DoDo's own, without a range, or with different ones at several services."""
     seen: dict[str, tuple[str, Range]] = {}
-    used = _variables(application)
     for service in application.services.values():
         for name, entry in _written(service).items():
             problems = list(_problems(name, entry))
-            near = closest(name.lower(), {each.lower() for each in used}) if name not in used else []
-            if meant := [each for each in sorted(used) if each.lower() in near[:1]]:
-                message = f"nothing in the application uses the variable '{name}'"
-                yield Diagnostic(entry.key, _RULE, message, f"did you mean '{meant[0]}'?", "warning")
             yield from problems
             if problems:
                 continue
@@ -124,17 +119,6 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
             if _numbers(first) != _numbers(one):
                 message = f"'{name}' has another range at '{other}', expected the same one: a parameter has one value"
                 yield Diagnostic(entry.key, _RULE, message)
-
-
-def _variables(application: ApplicationSource) -> set[str]:
-    """The variables that the services set or fill in; a program may read others."""
-    found: set[str] = set()
-    for service in application.services.values():
-        found.update(environment(plain(service.node).get("environment")))
-        texts = (part.text for node in service.raw.values() for part in source.walk(node) if isinstance(part, Scalar))
-        found.update(*map(names, texts))
-        found.update(service.file_variables)
-    return found
 
 
 def _written(service: ComposeService) -> dict[str, Entry]:
