@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
-from dodo_dsl.application.interpolation import changed_node, filled
+from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.model import (
     FILES,
     NAMESPACES,
@@ -80,7 +80,7 @@ class Container(Part):
     def filled(self, node: Node) -> Node:
         """A value with the variables of the test filled in."""
         late = self.project.application.is_late
-        return changed_node(node, lambda word: filled(word, self.known, late))
+        return filled_node(node, self.known, late)
 
     def raw(self, key: str) -> Node | None:
         return self.service.raw.get(key)

@@ -99,5 +99,3 @@ def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnost
     for name, entry in declarations.services.items():
         if name in gone:
             yield Diagnostic(entry.key, _RULE, f"'{name}' is declared, but {gone[name]}", "remove one of them")
-
-

@@ -2,12 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from dodo_dsl.source import Node
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _SHOWN = 60
@@ -135,23 +130,6 @@ def interpolate(text: str, known: Mapping[str, str] | None = None) -> str:
         raise RequiredVariable(match["bare"] or match["name"], match["word"] or "")
 
     return _replaced(text if known is None else filled(text, known), read)
-
-
-def changed_node(written: "Node", change: Callable[[str], str]) -> "Node":
-    """A node with ``change`` applied to each text that has a variable; every part keeps its place."""
-    from dodo_dsl import source  # which programs that only read variables do not load
-
-    if isinstance(written, source.Mapping):
-        entries = {
-            key: source.Entry(entry.key, changed_node(entry.value, change)) for key, entry in written.entries.items()
-        }
-        return replace(written, entries=entries)
-    if isinstance(written, source.Sequence):
-        return replace(written, items=tuple(changed_node(item, change) for item in written.items))
-    if not isinstance(written.value, str) or "$" not in written.value:
-        return written
-    filled = change(written.value)
-    return replace(written, value=filled, text=filled)
 
 
 def slip_in(text: str) -> tuple[str, str] | None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dodo_dsl.application.compose_paths import is_path
 from dodo_dsl.application.host_paths import MEMORY, TMP, is_port, is_token
 from dodo_dsl.application.limits import size, tmpfs_options
 from dodo_dsl.application.model import is_true
@@ -77,11 +78,6 @@ class Mount:
 def own_name(name: str) -> str:
     """The name of an application's volume in the test's project, where DoDo has its own volumes."""
     return f"application-{name}" if name in OWN_VOLUMES or _OF_COPY.fullmatch(name) else name
-
-
-def is_path(text: str) -> bool:
-    """Whether a volume's source is a path; other words name a volume."""
-    return text.startswith((".", "/", "~"))
 
 
 def mounts(of: "Container", node: Node) -> list[str | dict[str, Any]]:

@@ -12,8 +12,8 @@ from dodo_dsl.application import declarations as declared
 from dodo_dsl.application import secret_problems
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles, dotenv_problems
+from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
-from dodo_dsl.application.interpolation import changed_node, filled
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.model import (
     Access,
@@ -42,18 +42,17 @@ def read_application(
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008
     reader: Reader = source.read,
     declarations: Declarations = Declarations(),  # noqa: B008
-    keeps_wrong: bool = False,
 ) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems.
 
     ``access`` is what the deployment allows it, ``limits`` are the highest that it may set. ``declarations`` are what
-    the deployment says of the application in its files; they do not hold for others. ``keeps_wrong`` keeps one with
-    errors, as far as it could be read.
+    the deployment says of the application in its files; they do not hold for others. One with errors is as far as it
+    could be read.
     """
     paths = [path] if isinstance(path, Path) else list(path)
     declarations = declared.holding(declarations, paths)
     roots = (*repository(paths[0].resolve().parent), *map(Path, access.roots))
-    files = ComposeFiles(reader, roots, access.passed)
+    files = ComposeFiles(paths[0].parent, reader, roots, access.passed)
     found = files.problems
     found.extend(_links(paths))
     if found:
@@ -82,7 +81,7 @@ def read_application(
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
     found.extend(problem for problem in _secrets(application, document, files) if problem.span not in refused)
-    return (application if application.services and (keeps_wrong or not has_errors(found)) else None), found
+    return (application if application.services else None), found
 
 
 def _secrets(application: ApplicationSource, document: source.Mapping, files: ComposeFiles) -> Iterator[Diagnostic]:
@@ -95,14 +94,8 @@ def _secrets(application: ApplicationSource, document: source.Mapping, files: Co
 
 
 def as_written(path: Path) -> ApplicationSource | None:
-    """The application of a compose file with whatever else is wrong with it; None if it is not a compose file."""
-    roots = repository(path.resolve().parent)
-    files = ComposeFiles(source.read, roots)
-    document = load(files, [path])
-    services = document.get("services") if document else None
-    if document is None or not isinstance(services, source.Mapping) or has_errors(validate(document, "application")):
-        return None
-    return _application(path.resolve(), document, services, files, Access(), SandboxLimits())
+    """The application of a compose file with whatever is wrong with it; None if it cannot be read."""
+    return read_application(path)[0]
 
 
 def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
@@ -164,17 +157,12 @@ def _service(name: str, entry: Entry, folder: Path, files: ComposeFiles) -> Comp
         return None
     raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
     entries = {
-        key: Entry(each.key, _as_written(each.value, files)) if key in raw else each
+        key: Entry(each.key, filled_node(each.value, files.known, files.is_late)) if key in raw else each
         for key, each in node.entries.items()
     }
     node = replace(node, entries=entries)
     own = tuple(env_files(node))
     return ComposeService(name, node, entry.key, declaration_of(node), own, file_variables(own, folder), raw)
-
-
-def _as_written(node: Node, files: ComposeFiles) -> Node:
-    """A value without what a test sets."""
-    return changed_node(node, lambda text: filled(text, files.known, files.is_late))
 
 
 def _why_dropped(service: dict[str, Any]) -> str:

@@ -9,7 +9,8 @@ from dataclasses import replace
 from decimal import Decimal
 
 from dodo_dsl import source
-from dodo_dsl.application.interpolation import changed_node, filled, literal, names
+from dodo_dsl.application.compose_paths import filled_node
+from dodo_dsl.application.interpolation import filled, literal, names
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import is_steering
@@ -54,7 +55,7 @@ def with_variables(application: ApplicationSource, values: Mapping[str, str]) ->
 def _with_values(service: ComposeService, known: Mapping[str, str], is_late: Callable[[str], bool]) -> ComposeService:
     entries = dict(service.node.entries)
     for key, node in service.raw.items():
-        value = changed_node(node, lambda text: filled(text, known, is_late))
+        value = filled_node(node, known, is_late)
         entries[key] = Entry(entries[key].key, value)
     return replace(service, node=replace(service.node, entries=entries))
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.construction import Construction, Setting
-from dodo_dsl.application.interpolation import changed_node, filled
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
 from dodo_dsl.application.variables import variables_of
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
@@ -97,11 +97,7 @@ def _process(service: ComposeService, application: ApplicationSource, setting: S
     def is_late(name: str) -> bool:
         return name in opendlv_flags.CID_VARIABLES or application.is_late(name)
 
-    written = (
-        plain(changed_node(service.raw["command"], lambda word: filled(word, known, is_late)))
-        if "command" in service.raw
-        else None
-    )
+    written = plain(filled_node(service.raw["command"], known, is_late)) if "command" in service.raw else None
     command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
     found = variables_of(service, known, is_late, dict(setting.given))
     variables = {k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in found.items()}
