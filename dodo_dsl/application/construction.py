@@ -13,7 +13,7 @@ from typing import Any
 from dodo_dsl.application import compose_paths, secret_variables
 from dodo_dsl.application.container import TOP_LEFT_OUT, Container
 from dodo_dsl.application.interpolation import interpolate
-from dodo_dsl.application.model import ApplicationSource, ComposeService, is_true
+from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
 from dodo_dsl.application.part import Part
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
@@ -22,10 +22,6 @@ from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _NAMED = ("volumes", "secrets", "configs")
 _OF_SERVICES = {"image", "build", "command", "x-dodo", "x-dodo-process"}
-_REFUSED = {
-    "models": "the engine's model runner is shared by all tests",
-    "jobs": "a test starts services and no schedules",
-}
 
 
 @dataclass(frozen=True)
@@ -161,27 +157,15 @@ class Construction:
         """The problems of everything but the services, which are made already."""
         self.rest()
         self._top()
-        self._networks()
         for span, message, hint in nested(self):
             self.problems.append(Diagnostic(span, "application-isolation", message, hint))
         return self.problems
 
-    def _networks(self) -> None:
-        known = "attachable driver driver_opts enable_ipv4 enable_ipv6 external internal ipam labels name"
-        for name, node, span in self._named("networks"):
-            fields = self.about(name, span).fields(node, f"the network '{name}'", known)
-            external = fields.get("external")
-            if isinstance(external, Mapping) or (isinstance(external, Scalar) and is_true(external.value)):
-                message = f"the network '{name}' is external, and a test has its own network only"
-                self.problems.append(Diagnostic(span, "application-key", message, severity="warning"))
-
     def _top(self) -> None:
-        known = ("services", "include", *_NAMED, *TOP_LEFT_OUT, *_REFUSED)
+        known = ("services", "include", *_NAMED, *TOP_LEFT_OUT)
         of = self.about("the compose file", Span(str(self.application.path)))
         for key, entry in self.application.top.items():
-            if key in _REFUSED:
-                of.refuse(entry.key, f"'{key}' cannot be isolated: {_REFUSED[key]}", "remove it")
-            elif key not in known and not key.startswith("x-"):
+            if key not in known and not key.startswith("x-"):
                 about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
                 is_service = bool(about & _OF_SERVICES)
                 hint = "indent it by 2: it looks like a service" if is_service else did_you_mean(key, known)

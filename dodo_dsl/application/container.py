@@ -31,7 +31,7 @@ from dodo_dsl.source import Node, Scalar
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
 
-TOP_LEFT_OUT = ("name", "networks", "version")
+TOP_LEFT_OUT = ("jobs", "models", "name", "networks", "version")
 Key = Callable[["Container", Node], Any]
 
 
@@ -286,8 +286,6 @@ _CARRIED: dict[str, Key] = {
     "cap_add": hardware.capabilities,
     "command": lambda c, _: _command(c, "command"),
     "configs": _secrets,
-    "cpu_quota": limits.cpu_quota,
-    "cpu_period": lambda c, _: None,
     "depends_on": _depends_on,
     "deploy": limits.deploy,
     "device_cgroup_rules": hardware.device_rules,
@@ -329,6 +327,8 @@ _LEFT_OUT = frozenset(
         "container_name",
         "cpu_count",
         "cpu_percent",
+        "cpu_period",
+        "cpu_quota",
         "cpu_rt_period",
         "cpu_rt_runtime",
         "cpu_shares",

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application import limits
 from dodo_dsl.application.model import environment, image_variable, plain, text
 from dodo_dsl.application.part import pairs
 from dodo_dsl.source import Node
@@ -42,12 +41,12 @@ def build(c: "Container", node: Node) -> Any:
         c.own["image"] = f"${{{image_variable(c.name)}:-}}"
     fields = c.fields(
         node, f"the build of '{c.name}'",
-        "context dockerfile dockerfile_inline args target additional_contexts network platforms secrets no_cache pull"
-        " extra_hosts provenance sbom no_cache_filter shm_size ulimits",
-        "cache_from cache_to isolation labels privileged ssh tags entitlements",
+        "context dockerfile dockerfile_inline args target additional_contexts network platforms secrets extra_hosts",
+        "cache_from cache_to entitlements isolation labels no_cache no_cache_filter privileged provenance pull sbom"
+        " shm_size ssh tags ulimits",
     ) if isinstance(node, source.Mapping) else {"context": node}  # fmt: skip
-    kept = ("dockerfile_inline", "target", "platforms", "secrets", "no_cache", "pull", "extra_hosts", "provenance")
-    made = {key: plain(fields[key]) for key in (*kept, "sbom", "no_cache_filter") if key in fields}
+    kept = ("dockerfile_inline", "target", "platforms", "secrets", "extra_hosts")
+    made = {key: plain(fields[key]) for key in kept if key in fields}
     context = c.literal(fields["context"]) if "context" in fields else "."
     if context is not None:
         made = {"context": _context(c, fields.get("context"), context), **made}
@@ -68,10 +67,6 @@ def build(c: "Container", node: Node) -> Any:
         c.refuse(fields["network"].span, message, "remove it")
     elif network:
         made["network"] = network
-    if "shm_size" in fields:
-        made["shm_size"] = c.number(fields["shm_size"], c.limits.memory, "build.shm_size", "memory", limits.size)
-    if "ulimits" in fields:
-        made["ulimits"] = limits.ulimits(c, fields["ulimits"], is_whole=False)
     return made
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from dodo_dsl import source
 from dodo_dsl.application import compose_merge
-from dodo_dsl.application.compose_files import ComposeFiles, variables_of
+from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.model import scalars
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed
 from dodo_dsl.source import Entry, Node, Scalar
@@ -162,7 +162,6 @@ _OVERRIDES = (
     "docker-compose.override.yaml",
 )
 """Of each, compose takes the first that is there."""
-_LIST, _SEPARATOR = "COMPOSE_FILE", "COMPOSE_PATH_SEPARATOR"
 _PLAIN = re.compile(r"[\w./-]+")
 
 
@@ -173,7 +172,11 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
     """
     folder = paths[0].parent
     named = [_whole_file(path) for path in paths]
-    found, why = _discovered(folder)
+    found = [
+        next(_whole_file(folder / name) for name in names if (folder / name).is_file())
+        for names in (_NAMES, _OVERRIDES)
+        if any((folder / name).is_file() for name in names)
+    ]
     others = [path for path in found if path not in named]
     if not others or len(others) == len(found):
         return
@@ -183,23 +186,11 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
     yield Diagnostic(
         Span(str(paths[0])),
         "application-override",
-        f"'docker compose' also reads {names}, {why}; DoDo does not",
+        f"'docker compose' also reads {names}, which it finds next to this file; DoDo does not",
         f"write application: [{', '.join(items)}] in dodo.yml; to test without it, name another file there that has "
         f"include: [{own}]",
         "warning",
     )
-
-
-def _discovered(folder: Path) -> tuple[list[Path], str]:
-    """The files that compose reads in a folder, in its order, and why it reads the later ones."""
-    variables = variables_of(folder / ".env")
-    if text := variables.get(_LIST):
-        names = text.split(variables.get(_SEPARATOR) or os.pathsep)
-        return [_whole_file(folder / name) for name in names if name], f"as {_LIST} in .env says"
-    there = [
-        [_whole_file(folder / name) for name in names if (folder / name).is_file()] for names in (_NAMES, _OVERRIDES)
-    ]
-    return [paths[0] for paths in there if paths], "which it finds next to this file"
 
 
 def _whole_file(path: Path) -> Path:

@@ -144,17 +144,16 @@ class ComposeService:
 class ApplicationSource:
     """The merged compose files, which are all that rules and the planner see of the application.
 
-    ``services`` are those that start, by name; ``rest`` has every other top-level key but those ``left_out``. Paths
-    are relative to ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the
-    services by their ``container_name``, and ``secrets`` the files that set variables which no compiled test holds.
-    ``known`` are all variables whose values are known, ``access`` is what the deployment allows, ``limits`` are the
-    highest that the services may set. ``named`` are the files as ``dodo.yml`` names them, ``without`` the services that
-    it leaves out. ``cids`` are declared to be built in, all the same one. ``top`` has all top-level keys.
+    ``services`` are those that start, by name. Paths are relative to ``folder``. ``dropped`` has the reasons why
+    services do not start, by name, ``containers`` the services by their ``container_name``, and ``secrets`` the
+    files that set variables which no compiled test holds. ``known`` are all variables whose values are known,
+    ``access`` is what the deployment allows, ``limits`` are the highest that the services may set. ``named`` are the
+    files as ``dodo.yml`` names them, ``without`` the services that it leaves out. ``cids`` are declared to be built
+    in, all the same one. ``top`` has all top-level keys.
     """
 
     path: Path
     services: Mapping[str, ComposeService]
-    rest: Mapping[str, Node]
     dropped: Mapping[str, str] = field(default_factory=dict)
     containers: Mapping[str, str] = field(default_factory=dict)
     secrets: Mapping[str, Path] = field(default_factory=dict)
@@ -165,6 +164,11 @@ class ApplicationSource:
     named: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     cids: tuple[Scalar, ...] = ()
+
+    @property
+    def rest(self) -> Mapping[str, Node]:
+        """The top-level keys that a test carries beside services."""
+        return {key: entry.value for key, entry in self.top.items() if key in ("volumes", "secrets", "configs")}
 
     @functools.cached_property
     def demanding(self) -> tuple[tuple[str, str, Scalar], ...]:

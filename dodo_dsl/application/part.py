@@ -47,8 +47,7 @@ class Part:
     def cut(self, span: Span, what: str, most: float, key: str = "") -> None:
         """A limit beyond ``most``, which takes its place; ``key`` of ``sandbox`` sets it, if one does."""
         hint = f"it is cut; '{key}' of 'sandbox' in dodo.yml sets the limit" if key else "it is cut"
-        whose = f"'{self.name}'" if "'" not in self.name else self.name
-        message = f"'{what}' of {whose} is beyond the test's limit of {_limit(most, key)}"
+        message = f"'{what}' of {self.name} is beyond the test's limit of {most:,g}"
         self.add(Diagnostic(span, "application-limit", message, hint, "warning"))
 
     def literal(self, node: Node) -> str | None:
@@ -96,12 +95,6 @@ class Part:
                 fix = only_fix(key, every, node.entries if isinstance(node, source.Mapping) else ())
                 self.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in {what}", hint, fix=fix))
         return found
-
-
-def _limit(most: float, key: str) -> str:
-    if key in ("memory", "file-size"):
-        return f"{most / 10**9:g} GB ({most:,.0f} bytes)"
-    return f"{most:,g}" if most < 10**6 else f"{most:,.0f}"
 
 
 def spot(entry: source.Entry) -> Span:

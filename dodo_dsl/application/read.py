@@ -33,7 +33,6 @@ from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.validation import validate
 
 MAX_SERVICES = 256
-_OURS = ("services", "version", "name", "networks", "include")
 
 
 def read_application(
@@ -76,7 +75,7 @@ def read_application(
     root = Path(access.roots[0]) if access.roots else None
     named = tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths)
     application = replace(application, dropped={**application.dropped, **gone}, named=named, without=tuple(gone))
-    found.extend(unread(paths, root))
+    found.extend(() if "COMPOSE_FILE" in files.known else unread(paths, root))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
@@ -115,8 +114,7 @@ def _application(
     limits: SandboxLimits,
 ) -> ApplicationSource:
     dropped = {name: why for name, entry in services.entries.items() if (why := _why_dropped(plain(entry.value)))}
-    rest = {k: e.value for k, e in document.entries.items() if k not in _OURS and not k.startswith("x-")}
-    for variable in _variables_of_secrets(rest.get("secrets")):
+    for variable in _variables_of_secrets(document.get("secrets")):
         files.keep_secret(variable)
     kept = {
         name: service
@@ -126,7 +124,6 @@ def _application(
     return ApplicationSource(
         path=path,
         services=kept,
-        rest=rest,
         dropped=dropped,
         containers={str(c): n for n, s in kept.items() if (c := plain(s.node).get("container_name"))},
         secrets=files.secrets,

@@ -38,11 +38,5 @@ def unseen_problems(
             continue
         names = map(Path, application.paths.names(source))
         if holder := next((h for name in names for h in hidden if name.is_relative_to(h)), None):
-            what = f"'{holder.name}', {_reason(holder)}"
-            message = f"'{source}' lies in {what}, which no application sees"
+            message = f"'{source}' lies in '{holder.name}', which no application sees"
             yield Diagnostic(span, "application-isolation", message, "keep what it needs in another folder")
-
-
-def _reason(holder: Path) -> str:
-    reasons = {".git": "where Git keeps its own", "generated": "the compiled tests", "dodo-report": "the report"}
-    return reasons.get(holder.name, "a folder of tests or of DoDo's services")
