@@ -24,6 +24,7 @@ from dodo_dsl.application.model import (
     references,
     words_of,
 )
+from dodo_dsl.application.part import spot
 from dodo_dsl.application.slips import cid_slips, is_cid, missing_program
 from dodo_dsl.application.variables import variables_of
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, has_errors, only_fix, shown_path
@@ -61,20 +62,6 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     yield from found
     if not has_errors(found):
         yield from _without_cid(application)
-
-
-def place(node: Node, steps: Sequence[str | int], key: Span) -> Span:
-    """The position of the value that the steps lead to, or of its key if it has no text."""
-    span = key
-    for step in steps:
-        if isinstance(node, source.Mapping) and step in node.entries:
-            entry = node.entries[str(step)]
-            node = entry.value
-            span = node.span if isinstance(node, source.Scalar) and node.text else entry.key
-        elif isinstance(node, source.Sequence) and isinstance(step, int) and step < len(node.items):
-            node = node.items[step]
-            span = node.span
-    return span
 
 
 def _missing_files(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -215,39 +202,32 @@ def _name(service: ComposeService) -> Iterator[Diagnostic]:
 
 def _commands(service: ComposeService) -> Iterator[Diagnostic]:
     for key in ("entrypoint", "command"):
-        value = plain(service.node).get(key)
-        if isinstance(value, str):
+        node = service.node.get(key)
+        if isinstance(node, source.Scalar) and isinstance(node.value, str):
             try:
-                opendlv_flags.split(value)
+                opendlv_flags.split(node.value)
             except ValueError as error:
-                yield _bad(place(service.node, (key,), service.span), f"'{key}' of '{service.name}': {error}")
+                yield _bad(node.span, f"'{key}' of '{service.name}': {error}")
 
 
 def _references(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    others, dropped = application.services, application.dropped
+    others = application.services
     named = list(references(plain(service.node), application.containers))
     for key, name in named:
-        if name in others or (name in dropped and key != "volumes_from"):
-            continue
-        if name in dropped:
-            message = f"'{name}', whose volumes '{service.name}' uses, does not start: {dropped[name]}"
-            yield _bad(place(service.node, (key,), service.span), message)
-        else:
+        if name not in others and name not in application.dropped:
             message = f"'{key}' of '{service.name}' names the unknown service '{name}'"
             taken = [service.name, *(other for of, other in named if of == key)]
-            span = _of_name(service, key, name)
-            yield _bad(span, message, did_you_mean(name, others), only_fix(name, others, taken))
+            yield _bad(_of_name(service, key, name), message, did_you_mean(name, others), only_fix(name, others, taken))
 
 
 def _conditions(service: ComposeService) -> Iterator[Diagnostic]:
     """What compose does not know of ``depends_on``."""
-    needed = plain(service.node).get("depends_on")
-    for name, about in needed.items() if isinstance(needed, dict) else ():
-        condition = about.get("condition") if isinstance(about, dict) else None
-        if isinstance(condition, str) and condition not in _CONDITIONS:
-            message = f"'{condition}' is not a condition of 'depends_on'"
-            hint = f"known: {', '.join(_CONDITIONS)}"
-            yield _bad(place(service.node, ("depends_on", name, "condition"), service.span), message, hint)
+    needed = service.node.get("depends_on")
+    for entry in needed.entries.values() if isinstance(needed, source.Mapping) else ():
+        word = entry.value.get("condition") if isinstance(entry.value, source.Mapping) else None
+        if isinstance(word, source.Scalar) and isinstance(word.value, str) and word.value not in _CONDITIONS:
+            message = f"'{word.value}' is not a condition of 'depends_on'"
+            yield _bad(word.span, message, f"known: {', '.join(_CONDITIONS)}")
 
 
 def _of_name(service: ComposeService, key: str, name: str) -> Span:
@@ -257,7 +237,7 @@ def _of_name(service: ComposeService, key: str, name: str) -> Span:
         return node.entries[name].key
     items = node.items if isinstance(node, source.Sequence) else ()
     fits = (item.span for item in items if isinstance(item, source.Scalar) and name in item.text.split(":"))
-    return next(fits, place(service.node, (key,), service.span))
+    return next(fits, spot(service.node.entries[key]))
 
 
 def _bad(span: Span, message: str, hint: str = "", fix: Fix | None = None) -> Diagnostic:

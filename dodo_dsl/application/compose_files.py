@@ -1,7 +1,7 @@
 """The files of an application, each read once, with their problems."""
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from dodo_dsl import source
@@ -166,14 +166,6 @@ class ComposeFiles:
         """Makes a variable of the files one that no compiled test holds."""
         if name in self._of:
             self.secrets[name] = self._of[name]
-
-
-def variables_of(file: Path, *, raw: bool = False) -> Mapping[str, str | None]:
-    """The variables that a regular file sets, None if from outside; symlinks are not followed."""
-    found: dict[str, str | None] = {}
-    for name, value in dotenv(text_of(file), raw=raw)[0]:
-        found[name] = found.get(name) if value is None else value
-    return found
 
 
 def dotenv_problems(file: Path, *, raw: bool = False) -> Iterator[Diagnostic]:

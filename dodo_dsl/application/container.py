@@ -16,7 +16,6 @@ from dodo_dsl.application.model import (
     OFFSCREEN,
     SANDBOX,
     ComposeService,
-    borrowed,
     env_files,
     plain,
     reference,
@@ -173,19 +172,6 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
     return None
 
 
-def _volumes_from(c: Container, node: Node) -> Any:
-    containers, services = c.project.application.containers, c.project.application.services
-    made = []
-    for item in c.items(node):
-        kind, name, options = borrowed(c.literal(item))
-        if kind == "container" and name not in containers:
-            c.refuse(item.span, f"the container '{name}' is not part of the application", "make it a service of it")
-            continue
-        name = containers[name] if kind == "container" else name
-        made += [f"{name}{options}"] if name in services else []
-    return made or None
-
-
 def _networks(c: Container, node: Node) -> Any:
     """The names that the service has in networks, which are the test's one."""
     about = node.entries.values() if isinstance(node, source.Mapping) else ()
@@ -306,7 +292,6 @@ _CARRIED: dict[str, Key] = {
     "tmpfs": limits.tmpfs,
     "ulimits": limits.ulimits,
     "volumes": lambda c, n: mounts(c, n) or None,
-    "volumes_from": _volumes_from,
     **{key: lambda c, n, key=key: _namespace(c, key, n) for key in NAMESPACES},  # type: ignore[misc]
 }
 """What the container has for a key, by the key; None for nothing."""
@@ -354,6 +339,7 @@ _LEFT_OUT = frozenset(
         "storage_opt",
         "userns_mode",
         "uts",
+        "volumes_from",
     ]
 )
 """Keys of the compose specification that a test has no use for."""

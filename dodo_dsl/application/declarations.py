@@ -4,9 +4,10 @@ Problems stand at their place in ``dodo.yml``.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-from dodo_dsl.application.model import KEYS
+from dodo_dsl.application.model import KEYS, with_entry
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.source import Entry, Mapping, Node
 from dodo_dsl.spec.deployment import Declarations
@@ -35,7 +36,7 @@ def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
     gone = left_out(document, declarations)
     if declarations.own:
         about = next(iter(declarations.own.values()))
-        document = _with(document, _DECLARED, {**_entries(document.get(_DECLARED)), **declarations.own}, about.key)
+        document = with_entry(document, _DECLARED, _both(document.get(_DECLARED), declarations.own, about.key))
     if not gone and not declarations.services:
         return document
     kept = {
@@ -45,15 +46,7 @@ def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
         for name, entry in _services(document).items()
         if name not in gone
     }
-    return _with(document, _SERVICES, kept, document.span)
-
-
-def _with(node: Mapping, key: str, entries: dict[str, Entry], span: Span) -> Mapping:
-    """The node with a mapping, which is at ``span`` where the node has none."""
-    old = node.entries.get(key)
-    place = old.key if old else span
-    value = Mapping(old.value.span if old else span, entries, old.value.tag if old else "")
-    return Mapping(node.span, {**node.entries, key: Entry(place, value)}, node.tag)
+    return with_entry(document, _SERVICES, Mapping(document.entries[_SERVICES].value.span, kept))
 
 
 def _entries(node: Node | None) -> dict[str, Entry]:
@@ -70,10 +63,15 @@ def _declared(service: Node, about: Entry) -> Node:
         return service
     keys = {key: entry for key, entry in about.value.entries.items() if key != PROCESS}
     if keys:
-        service = _with(service, _DECLARED, {**_entries(service.get(_DECLARED)), **keys}, about.key)
+        service = with_entry(service, _DECLARED, _both(service.get(_DECLARED), keys, about.key))
     if PROCESS not in about.value.entries:
         return service
-    return Mapping(service.span, {**service.entries, _OF_PROCESS: about.value.entries[PROCESS]}, service.tag)
+    return replace(service, entries={**service.entries, _OF_PROCESS: about.value.entries[PROCESS]})
+
+
+def _both(old: Node | None, new: dict[str, Entry], span: Span) -> Mapping:
+    """A mapping with other values of keys, at ``span`` if there is none."""
+    return Mapping(old.span if old else span, {**_entries(old), **new})
 
 
 def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnostic]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from dodo_dsl import source
 from dodo_dsl.application import compose_merge
 from dodo_dsl.application.compose_files import ComposeFiles
-from dodo_dsl.application.model import scalars
+from dodo_dsl.application.model import scalars, with_entry
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed
 from dodo_dsl.source import Entry, Node, Scalar
 
@@ -40,7 +40,7 @@ def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[
         return settled
     here = files.relative(folder)
     entries = {name: Entry(e.key, _with_context(e.value, here)) for name, e in services.entries.items()}
-    return _with(settled, "services", source.Mapping(services.span, entries, services.tag))
+    return with_entry(settled, "services", source.Mapping(services.span, entries, services.tag))
 
 
 def _with_context(service: Node, here: str) -> Node:
@@ -48,7 +48,7 @@ def _with_context(service: Node, here: str) -> Node:
     build = service.get("build") if isinstance(service, source.Mapping) else None
     if not isinstance(service, source.Mapping) or not isinstance(build, source.Mapping) or "context" in build.entries:
         return service
-    return _with(service, "build", _with(build, "context", Scalar(service.entries["build"].key, here, here)))
+    return with_entry(service, "build", with_entry(build, "context", Scalar(service.entries["build"].key, here, here)))
 
 
 def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
@@ -63,7 +63,7 @@ def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...
             name: Entry(entry.key, _extended(files, (Service(file, folder, name),), entry.value))
             for name, entry in services.entries.items()
         }
-        rest = _with(rest, "services", source.Mapping(services.span, entries, services.tag))
+        rest = with_entry(rest, "services", source.Mapping(services.span, entries, services.tag))
     include = document.get("include")
     for item in include.items if isinstance(include, source.Sequence) else (include,) if include else ():
         part = _included(files, item, folder, (*chain, file))
@@ -103,11 +103,6 @@ def _joined(files: ComposeFiles, document: source.Mapping, part: source.Mapping)
     kept = {key: entry for key, entry in part.entries.items() if key in _NAMED}
     merged = compose_merge.merged(source.Mapping(document.span, kept), document)
     return merged if isinstance(merged, source.Mapping) else document
-
-
-def _with(document: source.Mapping, key: str, node: Node) -> source.Mapping:
-    place = document.entries[key].key if key in document.entries else node.span
-    return source.Mapping(document.span, {**document.entries, key: Entry(place, node)}, document.tag)
 
 
 class Service(NamedTuple):

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_files import is_late, variables_of
+from dodo_dsl.application.compose_files import is_late, text_of
 from dodo_dsl.application.host_paths import HostPaths, repository
+from dodo_dsl.application.interpolation import dotenv
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, split
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
@@ -230,23 +231,12 @@ def reference(value: object) -> tuple[str, str]:
     return (kind, name) if sign and kind in ("service", "container") else ("", "")
 
 
-def borrowed(entry: object) -> tuple[str, str, str]:
-    """An entry of ``volumes_from`` as kind, name and options."""
-    kind, name = reference(entry)
-    name, sign, options = (name if kind else str(entry)).partition(":")
-    return kind or "service", name, sign + options
-
-
 def references(service: dict[str, Any], containers: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """The services that a service needs, each with its key; containers of the application count as its services."""
     for key in NAMESPACES:
         kind, name = reference(service.get(key))
         if kind == "service" or name in containers:
             yield key, containers.get(name, name) if kind == "container" else name
-    for entry in service.get("volumes_from") or ():
-        kind, name, _ = borrowed(entry)
-        if kind == "service" or name in containers:
-            yield "volumes_from", containers.get(name, name) if kind == "container" else name
     for link in service.get("links") or ():
         yield "links", str(link).partition(":")[0]
     waits = service.get("depends_on") or {}
@@ -362,6 +352,16 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
 
 
 def file_variables(files: Iterable[EnvFile], folder: Path) -> dict[str, str | None]:
-    """The variables that files next to the compose file set."""
-    own = (file for file in files if not file.path.startswith(("/", "~")))
-    return {name: v for file in own for name, v in variables_of(folder / file.path, raw=file.raw).items()}
+    """The variables that files next to the compose file set, None if from outside."""
+    found: dict[str, str | None] = {}
+    for file in files:
+        own = "" if file.path.startswith(("/", "~")) else text_of(folder / file.path)
+        for name, value in dotenv(own, raw=file.raw)[0]:
+            found[name] = found.get(name) if value is None else value
+    return found
+
+
+def with_entry(node: source.Mapping, key: str, value: Node) -> source.Mapping:
+    """The node with another value of a key, which stands where the value does if it is new."""
+    place = node.entries[key].key if key in node.entries else value.span
+    return source.Mapping(node.span, {**node.entries, key: source.Entry(place, value)}, node.tag)
