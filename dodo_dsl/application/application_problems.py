@@ -10,7 +10,7 @@ from graphlib import CycleError, TopologicalSorter
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
 from dodo_dsl.application.compose_paths import is_local
-from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.construction import construction_of
 from dodo_dsl.application.interpolation import filled, literal
 from dodo_dsl.application.model import (
     COMMANDS,
@@ -45,7 +45,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         return
     found: list[Diagnostic] = []
     of_stack = stack.parts(application)
-    construction = Construction(application, Setting(1, "network", application.folder, limits=application.limits))
+    construction = construction_of(application)
     for name, service in application.services.items():
         own = [*_problems(service, application), *_missing_files(service, application)]
         own += [*_missing_folder(service, application), *missing_program(service, application.folder)]

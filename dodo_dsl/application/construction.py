@@ -16,7 +16,7 @@ from dodo_dsl.application.interpolation import interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
 from dodo_dsl.application.part import Part
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Mapping, Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -164,13 +164,17 @@ class Construction:
     def _top(self) -> None:
         known = ("services", "include", *_NAMED, *TOP_LEFT_OUT)
         of = self.about("the compose file", Span(str(self.application.path)))
-        for key, entry in self.application.top.items():
-            if key not in known and not key.startswith("x-"):
+        top = Mapping(Span(str(self.application.path)), dict(self.application.top))
+        for key, entry in top.entries.items():
+            if key not in known:
                 about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
-                is_service = bool(about & _OF_SERVICES)
-                hint = "indent it by 2: it looks like a service" if is_service else did_you_mean(key, known)
-                fix = None if is_service else only_fix(key, known)
-                of.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in the compose file", hint, fix=fix))
+                hint = "indent it by 2: it looks like a service" if about & _OF_SERVICES else ""
+                of.unknown(key, top, "the compose file", known, hint)
+
+
+def construction_of(application: ApplicationSource) -> Construction:
+    """An application of any test, to be checked."""
+    return Construction(application, Setting(1, "network", application.folder, limits=application.limits))
 
 
 def checked_builds(application: ApplicationSource) -> dict[str, Any]:
@@ -178,7 +182,7 @@ def checked_builds(application: ApplicationSource) -> dict[str, Any]:
 
     Variables whose values are not known are empty: each builder has others in the environment.
     """
-    made = Construction(application, Setting(1, "network", application.folder, limits=application.limits))
+    made = construction_of(application)
     services = {name: made.service(service) for name, service in application.services.items()}
     builds = {name: _whole(made, each["build"]) for name, each in services.items() if "build" in each}
     secrets = {name: _whole(made, about) for name, about in made.rest().get("secrets", {}).items()}

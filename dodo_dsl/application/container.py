@@ -22,9 +22,9 @@ from dodo_dsl.application.model import (
     text,
 )
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import ASK_KEY, Part, pairs, spot
+from dodo_dsl.application.part import Part, pairs, spot
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean, listed, only_fix
+from dodo_dsl.diagnostics import Diagnostic, listed
 from dodo_dsl.source import Node, Scalar
 
 if TYPE_CHECKING:
@@ -61,11 +61,8 @@ class Container(Part):
                     self.refuse(spot(entry), f"'{key}' of '{self.name}' {_REFUSED[key]}", _WITHOUT)
             elif key in _LEFT_OUT:
                 self.left += [(key, entry.key)] if not _is_off(entry.value) else []
-            elif not key.startswith("x-") and key != "profiles":
-                known = (*_CARRIED, *_REFUSED, *_LEFT_OUT)
-                hint = did_you_mean(key, known) or ASK_KEY.format(key)
-                fix = only_fix(key, known, self.service.node.entries)
-                self.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in '{self.name}'", hint, fix=fix))
+            elif key != "profiles":
+                self.unknown(key, self.service.node, f"'{self.name}'", (*_CARRIED, *_REFUSED, *_LEFT_OUT))
         for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
             step(self)
         if self.left:

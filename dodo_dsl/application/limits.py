@@ -118,8 +118,7 @@ def cpus(c: "Container", node: Node) -> Any:
 def tmpfs(c: "Container", node: Node) -> Any:
     made = []
     for item in c.items(node):
-        word = c.literal(item)
-        if not word:
+        if not (word := c.literal(item)):
             continue
         target, _, options = word.partition(":")
         allowed, is_cut, unknown = tmpfs_options(options, c.limits)

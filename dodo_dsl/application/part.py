@@ -1,6 +1,6 @@
 """A part of a compose file while it is read: its fields and texts, and the problems at their places."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from dodo_dsl import source
@@ -50,6 +50,14 @@ class Part:
         message = f"'{what}' of {self.name} is beyond the test's limit of {most:,g}"
         self.add(Diagnostic(span, "application-limit", message, hint, "warning"))
 
+    def unknown(self, key: str, of: source.Mapping, where: str, known: Collection[str], hint: str = "") -> None:
+        """A key of a mapping that compose has not; one with x- is somebody's own."""
+        if not key.startswith("x-"):
+            fix = None if hint else only_fix(key, known, of.entries)
+            hint = hint or did_you_mean(key, known) or ASK_KEY.format(key)
+            message = f"unknown key '{key}' in {where}"
+            self.add(Diagnostic(of.entries[key].key, "unknown-key", message, hint, fix=fix))
+
     def literal(self, node: Node) -> str | None:
         """A text that is known when the test is compiled; None for any other, with a problem."""
         if not isinstance(node, Scalar) or node.value is None:
@@ -89,11 +97,8 @@ class Part:
                     self.refuse(spot(entry), f"'{key}' of {what} cannot be isolated: {refused[key]}", "remove it")
             elif key in gone:
                 self.left.append((key, entry.key))
-            elif not key.startswith("x-"):
-                every = (*words, *gone, *(refused or ()))
-                hint = did_you_mean(key, every) or ASK_KEY.format(key)
-                fix = only_fix(key, every, node.entries if isinstance(node, source.Mapping) else ())
-                self.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in {what}", hint, fix=fix))
+            elif isinstance(node, source.Mapping):
+                self.unknown(key, node, what, (*words, *gone, *(refused or ())))
         return found
 
 

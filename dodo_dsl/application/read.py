@@ -89,7 +89,6 @@ def _secrets(application: ApplicationSource, document: source.Mapping, files: Co
     yield from secret_problems.withheld(nodes, files.written, {*files.known, *files.secrets, *files.passed}, os.environ)
     for file, raw in _own_files(application):
         yield from dotenv_problems(file, raw=raw)
-    yield from secret_problems.left_out(files.secrets)
 
 
 def as_written(path: Path) -> ApplicationSource | None:

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import interpolation, secret_variables
@@ -67,23 +66,3 @@ def _named(node: Node, key: str, texts: Mapping[Span, str]) -> Iterator[tuple[st
         yield from ((name, node.span) for name in sorted(interpolation.names(texts.get(node.span, ""))))
         if key == "environment" and isinstance(node.value, str):
             yield node.text, node.span
-
-
-def left_out(secrets: Mapping[str, Path]) -> Iterator[Diagnostic]:
-    """Secrets of the application's ``.env`` files, which are not copied into compiled tests."""
-    for file in dict.fromkeys(secrets.values()):
-        names = [name for name, of in secrets.items() if of == file]
-        listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
-        message = f"secrets stay out of compiled tests: {listed}"
-        hint = "'dodo run' takes them from this file, where it is there, or from variables that dodo.yml passes"
-        yield Diagnostic(_place(file, names[0]), "application-secret", message, hint, "warning")
-
-
-def _place(file: Path, name: str) -> Span:
-    """Where a variable is set; the line itself is not to be shown."""
-    lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-    found = re.compile(rf"\s*(?:export\s+)?(?P<name>{re.escape(name)})\s*[=:]")
-    for number, line in enumerate(lines, 1):
-        if match := found.match(line):
-            return Span(str(file), number, match.start("name") + 1, 0)
-    return Span(str(file), 1, 1, 0)

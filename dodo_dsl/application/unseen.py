@@ -4,7 +4,7 @@ import os
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.construction import construction_of
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment import Deployment
@@ -29,7 +29,7 @@ def unseen_problems(
 ) -> Iterator[Diagnostic]:
     """Mounts, configs, secrets, files of variables and builds' contexts in a folder that no application sees."""
     hidden = unseen_folders(application, deployment, registries)
-    construction = Construction(application, Setting(1, "network", application.folder, limits=application.limits))
+    construction = construction_of(application)
     for service in application.services.values():
         construction.service(service)
     construction.rest()

@@ -4,6 +4,7 @@ A test sets ``application: {env: {SPEED: 0.5}}``. The application has parameters
 ``x-dodo: {tune: {KP: {from: 0.2, to: 3, default: 1}}}``.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
@@ -148,21 +149,13 @@ def _problems(name: str, entry: Entry) -> Iterator[Diagnostic]:
     if why := owner(name):
         yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
         return
-    one = _range(name, entry)
-    if broken := [end for end in (*one.ends, one.nominal) if not _is_decimal(one, end)]:
-        yield Diagnostic(broken[0].span, _RULE, f"'{broken[0].text}' is not a finite decimal number")
-        return
-    low, high, default = _numbers(one)
+    low, high, default = (float(str(scalar.value)) for scalar in _scalars(entry))
+    start, end, middle = _scalars(entry)
+    for scalar in (start, end, middle):
+        if not math.isfinite(float(str(scalar.value))):
+            yield Diagnostic(scalar.span, _RULE, f"'{scalar.text}' is not a finite decimal number")
+            return
     if low >= high:
-        message = f"'from' is {one.ends[0].text}, expected less than 'to', {one.ends[1].text}"
-        yield Diagnostic(one.ends[0].span, _RULE, message)
+        yield Diagnostic(start.span, _RULE, f"'from' is {start.text}, expected less than 'to', {end.text}")
     elif not low <= default <= high:
-        message = f"'default' is {one.nominal.text}, expected {one.ends[0].text} to {one.ends[1].text}"
-        yield Diagnostic(one.nominal.span, _RULE, message)
-
-
-def _is_decimal(one: Range, end: Scalar) -> bool:
-    try:
-        return one.number(end.text).is_finite()
-    except (ArithmeticError, ValueError):
-        return False
+        yield Diagnostic(middle.span, _RULE, f"'default' is {middle.text}, expected {start.text} to {end.text}")
