@@ -1,7 +1,7 @@
 """The application's part of a test, constructed from its compose files: services, volumes, secrets and configs.
 
 Only what a test carries gets into it, so that nothing has to be looked for in it afterwards. Problems are collected
-meanwhile, each at its place in the file: whoever checks an application constructs it.
+meanwhile, each at its place in the file: to check an application is to construct it.
 """
 
 import os
@@ -169,7 +169,7 @@ class Construction:
             if key not in known:
                 about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
                 hint = "indent it by 2: it looks like a service" if about & _OF_SERVICES else ""
-                of.unknown(key, top, "the compose file", known, hint)
+                of.unknown_key(key, top, "the compose file", known, hint)
 
 
 def construction_of(application: ApplicationSource) -> Construction:

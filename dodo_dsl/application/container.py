@@ -62,7 +62,7 @@ class Container(Part):
             elif key in _LEFT_OUT:
                 self.left += [(key, entry.key)] if not _is_off(entry.value) else []
             elif key != "profiles":
-                self.unknown(key, self.service.node, f"'{self.name}'", (*_CARRIED, *_REFUSED, *_LEFT_OUT))
+                self.unknown_key(key, self.service.node, f"'{self.name}'", (*_CARRIED, *_REFUSED, *_LEFT_OUT))
         for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
             step(self)
         if self.left:

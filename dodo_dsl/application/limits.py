@@ -50,7 +50,7 @@ def whole(value: object) -> float:
 
 
 def cut(value: object, most: float, measure: Callable[[object], float] = number) -> tuple[float, bool]:
-    """A limit of at most ``most``, and whether it was cut; 0 and below are no limit."""
+    """A limit of at most ``most``, and whether it was cut; 0 and below do not limit."""
     found = measure(value)
     if 0 < found <= most and math.isfinite(found):
         return found, False

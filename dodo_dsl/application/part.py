@@ -50,7 +50,7 @@ class Part:
         message = f"'{what}' of {self.name} is beyond the test's limit of {most:,g}"
         self.add(Diagnostic(span, "application-limit", message, hint, "warning"))
 
-    def unknown(self, key: str, of: source.Mapping, where: str, known: Collection[str], hint: str = "") -> None:
+    def unknown_key(self, key: str, of: source.Mapping, where: str, known: Collection[str], hint: str = "") -> None:
         """A key of a mapping that compose has not; one with x- is somebody's own."""
         if not key.startswith("x-"):
             fix = None if hint else only_fix(key, known, of.entries)
@@ -98,7 +98,7 @@ class Part:
             elif key in gone:
                 self.left.append((key, entry.key))
             elif isinstance(node, source.Mapping):
-                self.unknown(key, node, what, (*words, *gone, *(refused or ())))
+                self.unknown_key(key, node, what, (*words, *gone, *(refused or ())))
         return found
 
 

@@ -63,7 +63,7 @@ def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterato
         hint = "name each part of the line that is a field, for example (?P<groundSteering>[-+.0-9eE]+)"
         yield Diagnostic(line.match_span, LINES_RULE, "the pattern has no group, so that no field gets a value", hint)
     elif pattern.groups > len(groups):
-        message = "the pattern has a group without a field of its own"
+        message = "the pattern has a group that no field alone takes"
         yield Diagnostic(line.match_span, LINES_RULE, message, "name each once, as in (?P<field>...), or write (?:...)")
     if name in known:
         yield from _unknown_fields(line, groups, known[name])
