@@ -52,8 +52,7 @@ class Fix:
 class Diagnostic:
     """One problem; ``rule`` is its name in the rule catalogue. It has a ``fix`` if there is exactly one.
 
-    ``tests`` are those that it depends on, where its position does not say so. ``about`` names what it says is
-    missing, or where something belongs, for problems that only follow from others.
+    ``tests`` are those that it depends on, where its position does not say so.
     """
 
     span: Span
@@ -63,7 +62,6 @@ class Diagnostic:
     severity: Severity = "error"
     fix: Fix | None = field(default=None, compare=False)
     tests: tuple[str, ...] = field(default=(), compare=False)
-    about: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def sentence(self) -> str:

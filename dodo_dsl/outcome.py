@@ -3,11 +3,11 @@
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dodo_dsl.spec.model import BASELINE, Goal, RecordedValue
+from dodo_dsl.spec.model import Goal
 
 Result = Literal["passed", "failed", "error"]
 ON_EMULATED = "on an emulated rig: no hardware took part"
@@ -236,28 +236,6 @@ def numbered(checks: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], Mappi
         found[check["name"], counts[check["name"]]] = check
         counts[check["name"]] += 1
     return found
-
-
-def against_baseline(
-    checks: Sequence[Mapping[str, Any]], baseline: Sequence[RecordedValue]
-) -> Iterator[tuple[dict[str, Any], RecordedValue]]:
-    """A check for each recorded value whose check has a limit now: on that side it may be worse by the tolerance only.
-
-    The tolerance is a share of the recorded value, or if that is 0 of the limit. Of two limits the nearer one to
-    the recorded value counts. What differs from run to run does not count.
-    """
-    found = numbered(checks)
-    for before in baseline:
-        now = found.get((before.check, before.number))
-        if now is None or not now["limit"] or differs_each_run(before.check):
-            continue
-        side, limit = min(now["limit"].items(), key=lambda pair: abs(pair[1] - before.value))
-        allowed = before.tolerance * (abs(before.value) or abs(limit))
-        bound = before.value + allowed if side == "max" else before.value - allowed
-        value = now["value"]
-        ok = value is not None and (value <= bound if side == "max" else value >= bound)
-        check = {"name": BASELINE + before.check, "value": value, "limit": {side: bound}, "unit": now["unit"], "ok": ok}
-        yield with_margin(check), before
 
 
 def _margin(check: Mapping[str, Any]) -> float | None:

@@ -5,7 +5,7 @@ import re
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -20,16 +20,12 @@ _KINDS = {
     "expected key": "mapping",
     "'-' indicator": "sequence",
     "block sequence entries": "dash",
-    "an alias": "alias",
     "cannot start any token": "character",
 }
 """What the parser expected, by words of its messages, which only this table knows; others are of kind ``other``."""
 _CLOSING = {"{": "}", "[": "]"}
 _KEY = re.compile(r"\s*(?:- )?(?P<key>[A-Za-z_][\w.-]*):(?:\s+(?P<value>.*))?$")
 _KEY_LINE = re.compile(r"\s*(?:- )?[\w.-]+:(?:\s|$)")
-_OPEN = re.compile(r" *(?:- )?(?P<key>[A-Za-z_][\w.-]*):(?:\s+(?P<sign>[|>][-+\d]*))?\s*(?:#.*)?")
-"""A key whose value is in the lines below."""
-_ITEM = re.compile(r"-(\s|$)")
 _FOREIGN = re.compile("(?:^\\s*|:)(?P<blank>[\u00a0\u2000-\u200b\u202f\u3000\ufeff])")
 _MARK = "\0"
 """Stands in a line where the parser gave up; YAML has no such character."""
@@ -144,33 +140,32 @@ def _shortened(text: str) -> str:
 
 
 class _Pattern(NamedTuple):
-    """A slip that one line shows.
+    """A slip that one line shows: that of the mark, where the parser began, or that which is not as meant.
 
-    ``pattern`` is of a whole line, with the mark in it; its group ``at`` is the place, and with a ``fix`` what that
-    replaces. Other groups fill the texts. ``above`` is of the line above.
+    ``pattern`` is of the whole line, with a sign at the place; its group ``at`` is what is wrong, and with a ``fix``
+    what that replaces. Other groups fill the texts.
     """
 
     kinds: str
-    where: Literal["suspect", "above", "mark", "begin"]
+    where: str
     pattern: str
     message: str
     hint: str
     fix: str = ""
-    above: str = ".*"
 
     def __call__(self, failure: Failure) -> Slip | None:
-        place = failure.mark if self.where == "mark" else (failure.begin if self.where == "begin" else None)
-        number = place[0] if place else failure.suspect if self.where == "suspect" else failure.above(failure.mark[0])
+        place = {"mark": failure.mark, "begin": failure.begin}.get(self.where)
+        number = place[0] if place else failure.suspect
         line = failure.line(number)
         line = f"{line[: place[1]]}{_MARK}{line[place[1] :]}" if place else line
         is_meant = failure.kind in self.kinds.split() and len(line) <= _LONGEST
         found = re.fullmatch(self.pattern, line) if is_meant else None
-        if found is None or number < 0 or not re.fullmatch(self.above, failure.line(failure.above(number))):
+        if found is None or number < 0:
             return None
         words = {name: _shortened((text or "").replace(_MARK, "").strip()) for name, text in found.groupdict().items()}
-        at, closing = found["at"].replace(_MARK, ""), _CLOSING.get(failure.opening, "")
-        words |= {"line": str(failure.mark[0] + 1), "opening": failure.opening, "closing": closing}
-        words["code"] = f"U+{ord(at[:1] or ' '):04X}"
+        words |= {"line": str(failure.mark[0] + 1), "opening": failure.opening}
+        words["closing"] = _CLOSING.get(failure.opening, "")
+        at = found["at"].replace(_MARK, "")
         column = found.start("at") - line[: found.start("at")].count(_MARK)
         fix = Fix(at, self.fix.format(**words)) if self.fix else None
         message, hint = self.message.format(**words), self.hint.format(**words)
@@ -199,7 +194,7 @@ def _foreign_blank(failure: Failure) -> Slip | None:
     for number in range(min(first, failure.above(failure.mark[0])), failure.mark[0] + 1):
         if found := _FOREIGN.search(failure.line(number)):
             blank = found["blank"]
-            name = unicodedata.name(blank, "unnamed").lower()
+            name = unicodedata.name(blank).lower()
             message = f"this blank is not a space but a {name} (U+{ord(blank):04X})"
             new, hint = ("", "remove it") if "zero width" in name else (" ", "write a space")
             return Slip(number, found.start("blank"), message, hint, fix=Fix(blank, new))
@@ -221,40 +216,6 @@ def _open_quote(failure: Failure) -> Slip | None:
     return Slip(*begin, "this quotation mark is not closed in its line", f"add {quote} at the end of the text")
 
 
-def _not_indented(failure: Failure) -> Slip | None:
-    """A value in its own line, which begins where its key does."""
-    number = failure.suspect
-    above = failure.above(number)
-    found = _OPEN.fullmatch(failure.line(above)) if above >= 0 else None
-    deep = _indent(line := failure.line(number))
-    if not found or deep > _indent(failure.line(above)) or ": " in line or line.rstrip().endswith(":"):
-        return None
-    if any(written.strip() for written in failure.text.splitlines()[above + 1 : number]):
-        return None  # the text of a block, or a comment
-    below = next((line for line in failure.lines[number + 1 :] if line.strip() and line.strip()[0] != "#"), "")
-    if not found["sign"] and _indent(below) > deep:
-        return None
-    message = f"this text begins in the column of '{found['key']}' above"
-    return Slip(number, deep, message, f"indent it: it is the value of '{found['key']}'")
-
-
-def _colon_further_down(failure: Failure) -> Slip | None:
-    """A colon in a text of several lines, after the first one."""
-    number, word = failure.mark[0], failure.before.strip()
-    if failure.kind != "colon" or ": " in failure.before or not word:
-        return None
-    key, deep = None, _indent(failure.line(number))
-    while key is None and number > 0 and _indent(failure.line(number := failure.above(number))) <= deep:
-        key = _KEY.fullmatch(failure.line(number))
-    value = (key["value"] or "").strip() if key else ""
-    if not key or _indent(failure.line(number)) >= deep or not value or value[0] in "\"'[{|>&*!":
-        return None
-    if " " not in word and (" " not in value or re.fullmatch("[a-z][a-z0-9-]*", word)):
-        return None
-    hint = f"put the text in quotes, or write '>' behind '{key['key']}:' and the text below"
-    return Slip(*failure.mark, f"a colon in the text of '{key['key']}', which goes on here", hint)
-
-
 def _too_deep(failure: Failure) -> Slip | None:
     number = failure.mark[0]
     above = failure.above(number)
@@ -264,28 +225,23 @@ def _too_deep(failure: Failure) -> Slip | None:
         return None
     message = f"indented deeper than '{found['key']}' above, which has its value already"
     where = f"indent it by {_spaces(usual)}" if usual else "begin it in the first column"
-    return Slip(number, deep, message, f"{where}, as line {above + 1}")
+    return Slip(number, deep, message, f"{where}, as line {above + 1}, or put a text that goes on in quotes")
 
 
 def _between_levels(failure: Failure) -> Slip | None:
-    """A line whose indentation is that of no line above, or an item before the column of the items above."""
+    """A line whose indentation is that of no line above, or an item among keys."""
     number = failure.mark[0]
     deep = _indent(failure.line(number))
     if failure.kind != "mapping" or failure.before.strip():
         return None
     levels, above = list[int](), number
     while (above := failure.above(above)) >= 0:
-        line, usual = failure.line(above), _indent(failure.line(above))
+        usual = _indent(failure.line(above))
         if not levels or usual < levels[-1]:
             levels.append(usual)
-        if _ITEM.match(failure.here) and _ITEM.match(line.lstrip()) and usual > deep == min(deep, *levels):
-            message = f"this item is indented by {_spaces(deep)}, but the one in line {above + 1} by {usual}"
-            return Slip(number, deep, message, f"indent it by {_spaces(usual)}")
-    if _ITEM.match(failure.here):
-        message = "'- ' begins an item of a list, expected a key as in the lines above"
-        return Slip(*failure.mark, message, "remove the '- '")
     if deep in levels:
-        return None
+        message = "'- ' begins an item of a list, expected a key as in the lines above"
+        return Slip(*failure.mark, message, "remove the '- '") if re.match(r"-(\s|$)", failure.here) else None
     near = [*[level for level in levels if level < deep][:1], *[level for level in levels if level > deep][-1:]]
     expected = " or ".join(str(level) for level in sorted(near))
     message = f"indented by {_spaces(deep)}, but the lines above by {expected}"
@@ -303,28 +259,9 @@ def _open_bracket(failure: Failure) -> Slip | None:
     return Slip(*begin, f"'{opening}' is not closed", f"add '{_CLOSING[opening]}' at the end of line {end}")
 
 
-def _unexpected(failure: Failure) -> Slip | None:
-    """What no other slip explains, in general words."""
-    above = failure.above(failure.mark[0])
-    if failure.kind == "colon" and above >= 0:
-        key = failure.before.strip() or "key"
-        hint = f"is line {above + 1} complete, and is this line indented as it is meant?"
-        return Slip(failure.mark[0], _indent(failure.before), f"the key '{_shortened(key)}' is not expected here", hint)
-    column = failure.mark[1] + _indent(failure.here)
-    message, hint = f"'{failure.here.strip()[:1]}' is not expected here", "remove it, or write the text in quotes"
-    return Slip(failure.mark[0], column, message, hint) if failure.here.strip() else None
-
-
-_NO_KEY = r"(?!.*: )(?!.*:\s*$)\s*(?:- )?(?P<at>)"
 _NAME = r"(?P<key>[A-Za-z_][\w.-]*)"
-_SEVERAL_WORDS = r"\s*(?:- )?[A-Za-z_][\w.-]*:\s+(?![\"'\[{|>])\S+ .*"
-_OR_INDENT = ", or indent the line if it goes on with the text above"
-_TEXT = "a second colon in the value of '{key}', which must be one string"
-_IN_TEXT = r"\s*(?:- )?(?P<key>[^:]*): "
+_NO_COLON = rf"(?!.*: )(?!.*:\s*$)\s*(?:- )?(?P<at>){_NAME}"
 _WRITE = "write '{key}: {value}'"
-_EQUALS = "'=' stands after '{key}', expected a colon"
-_NO_COLON = "a colon is missing after '{key}'"
-_QUOTE = "write the text in quotes"
 _COMMAS = "entries within brackets are separated by commas"
 _SUSPECTS = "key colon"
 
@@ -333,45 +270,22 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _tab,
     _foreign_blank,
     _open_quote,
-    _Pattern("mapping flow sequence other", "mark", r".*(?P<at>')\0[^\W\d_].*",
-             "this apostrophe ends the text, which is in single quotes", "write the text in double quotes"),
     _Pattern("mapping flow sequence other", "mark", r".*[\"']\s*(?P<at>\0)[^\s,\]}:].*",
              "text stands behind the closing quotation mark", "put the whole text in quotes"),
     _Pattern("escape", "mark", r".*(?P<at>\0)(?P<sign>..?).*", "'{sign}' means nothing within double quotes",
              "write the text in single quotes, where a backslash is a backslash"),
     _Pattern(_SUSPECTS, "suspect", r" *(?P<at>-)(?P<value>[^-\s].*)",
              "a space is missing after '-'", "write '- {value}'", "- "),
-    _Pattern(_SUSPECTS, "suspect", r" *(?P<at>[\u2010-\u2015\u2212])(?P<value> .*)",
-             "'{at}' ({code}) begins no item of a list, expected '-'", "write '- {value}'", "-"),
-    _Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{_NAME}(?P<at>;)(?P<value> .*)",
-             "';' stands after '{key}', expected a colon", _WRITE, ":"),
-    _Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{_NAME}(?P<at>\uff1a)(?P<value>.*)",
-             "'{at}', a fullwidth colon ({code}), stands after '{key}', expected a colon", _WRITE, ": "),
-    _Pattern(_SUSPECTS, "suspect", r"\s*(?P<at>\*)(?P<name>[\w.-]+)\s*(?:#.*)?",
-             "'*{name}' stands among keys, expected a key before it", "write '<<: *{name}'", "<<: *"),
-    _Pattern("mapping", "above", r"\s*(?P<at>\*)(?P<name>[\w.-]+)\s*(?:#.*)?",
-             "'*{name}' stands among keys, expected a key before it", "write '<<: *{name}'", "<<: *"),
-    _not_indented,
-    _Pattern(_SUSPECTS, "suspect", r"(?!.*: )\s*(?:- )?(?P<key>[a-z][a-z0-9-]*)(?P<at>:)(?P<value>(?!//)[^\s:#].*)",
-             "a space is missing after the colon of '{key}'", _WRITE, ": "),
-    _Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{_NAME}(?P<at>:)(?P<value>(?!//)[^\s:].*)",
-             "a space is missing after the colon of '{key}'", _WRITE),
-    _Pattern("colon", "mark", rf"{_IN_TEXT}(?P<value>\s*[a-z][a-z0-9-]*\s*(?P<at>\0).*)", _TEXT,
-             "write a mapping in braces, '{key}: {{{value}}}', or into the next lines"),
-    _Pattern("colon", "mark", rf"{_IN_TEXT}\s*\((?P<value>.*(?P<at>\0).*)\)\s*", _TEXT,
-             "write braces: '{key}: {{{value}}}'"),
-    _Pattern("colon", "mark", rf"{_IN_TEXT}\s*(?:\S+\s+){{1,3}}(?P<value>[a-z][a-z0-9-]*(?P<at>\0).*)", _TEXT,
-             "write '{value}' into a new line, or the text in quotes"),
-    _Pattern("colon", "mark", rf"{_IN_TEXT}.*(?P<at>\0).*", _TEXT, _QUOTE),
-    _Pattern(_SUSPECTS, "suspect", r"\s*(?P<at>)//.*", "'//' does not begin a comment", "comments begin with '#'"),
-    _Pattern(_SUSPECTS, "suspect", rf"{_NO_KEY}{_NAME}\s*=(?P<value>.+)", _EQUALS,
-             _WRITE + _OR_INDENT, above=_SEVERAL_WORDS),
-    _Pattern(_SUSPECTS, "suspect", rf"{_NO_KEY}{_NAME}\s*=(?P<value>.+)", _EQUALS, _WRITE),
-    _Pattern(_SUSPECTS, "suspect", rf"{_NO_KEY}{_NAME}\s+(?P<value>\S.*)",
-             _NO_COLON, _WRITE + _OR_INDENT, above=_SEVERAL_WORDS),
-    _Pattern(_SUSPECTS, "suspect", rf"{_NO_KEY}{_NAME}\s+(?P<value>\S.*)", _NO_COLON, _WRITE),
-    _Pattern(_SUSPECTS, "suspect", rf"{_NO_KEY}{_NAME}\s*", _NO_COLON, "write '{key}:'"),
-    _colon_further_down,
+    *(_Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{name}(?P<at>:)(?P<value>(?!//)[^\s:#].*)",
+               "a space is missing after the colon of '{key}'", _WRITE, fix)
+      for name, fix in ((r"(?P<key>[a-z][a-z0-9-]*)", ": "), (_NAME, ""))),
+    _Pattern("colon", "mark", r"\s*(?:- )?(?P<key>[^:]*): .*(?P<at>\0).*",
+             "a second colon in the value of '{key}', which must be one string",
+             "put the text in quotes, or write a mapping in braces or into the next lines"),
+    _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}[\s=;]+(?P<value>\S.*)",
+             "a colon is missing after '{key}'", _WRITE + ", or indent the line if it goes on with the text above"),
+    _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}\s*", "a colon is missing after '{key}'",
+             "write '{key}:', or indent the line if it goes on with the text above"),
     _too_deep,
     _Pattern("sequence", "begin", r".*(?P<at>\0).*",
              "'- ' begins a list here, but line {line} goes on with a key", "remove the '- ' for a mapping of keys"),
@@ -386,11 +300,10 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _Pattern("flow", "mark", r".*(?P<at>\$)\0(?P<name>\{[\w.-]+\}).*",
              "'${name}' within brackets needs quotes, as braces mean something else in YAML", 'write "${name}"'),
     _Pattern("flow", "mark", r".*\0(?P<at>)\s*\S.*", "a comma is missing, or the text needs quotes", _COMMAS),
-    _Pattern("character", "mark", r".*\0(?P<at>% ?(?P<number>\d+(?:\.\d+)?))\s*(?:[]},#].*)?",
-             "a text cannot begin with '%', which begins a directive", "write '{number} %'", "{number} %"),
-    _Pattern("character", "mark", r".*\0(?P<at>.).*", "a text cannot begin with '{at}'", _QUOTE),
-    _Pattern("alias", "begin", r".*\0(?P<at>\*).*", "a text cannot begin with '*', which begins an alias", _QUOTE),
-    _unexpected,
+    _Pattern("character", "mark", r".*\0(?P<at>.).*", "a text cannot begin with '{at}'", "write the text in quotes"),
+    _Pattern("other", "begin", r".*\0(?P<at>[*&]).*", "a text cannot begin with '{at}'", "write the text in quotes"),
+    _Pattern("other", "mark", r".*\0\s*(?P<at>\S).*", "'{at}' is not expected here",
+             "remove it, or write the text in quotes"),
 )  # fmt: skip
 
 

@@ -141,8 +141,6 @@ class _Builder:
         self.stack: list[_Open] = []
         self.root: Node | None = None
         self.anchors: dict[str, tuple[Node, int, int]] = {}
-        self.named_texts: dict[str, Span] = {}
-        """Texts of several words with anchors that no alias has referred to yet."""
         self.count = 0
         self.documents = 0
         self.diagnostics: list[Diagnostic] = []
@@ -181,8 +179,6 @@ class _Builder:
         is_plain = event.implicit[0]
         if is_plain and event.end_mark.line > event.start_mark.line and _DASHES.fullmatch(event.value):
             raise _Stop(span, "yaml-syntax", "a space is missing after '-'", f"write '- {event.value.split()[0][1:]}'")
-        if event.anchor and is_plain and " " in event.value:
-            self.named_texts[event.anchor] = span
         value = resolve(event.value) if is_plain else event.value
         self._add(Scalar(span, value, event.value, self._tag(event)), 1, event.anchor)
 
@@ -198,7 +194,6 @@ class _Builder:
             hint = f"did you mean '{near[0]}'?" if near else "a text that begins with '*' needs quotes"
             fix = Fix(f"*{event.anchor}", near[0]) if len(near) == 1 else None
             raise _Stop(span, "yaml-syntax", message, hint, fix)
-        self.named_texts.pop(event.anchor, None)
         node, weight, depth = self.anchors[event.anchor]
         self._check_depth(span, len(self.stack) + depth)
         self._add(node, weight, None, span, depth)
@@ -317,10 +312,6 @@ def parse(text: str, file: str) -> tuple[Node | None, list[Diagnostic]]:
         return None, [*builder.diagnostics, stop.diagnostic]
     except (yaml.YAMLError, ValueError) as error:
         return None, [*builder.diagnostics, _syntax(file, text, error)]
-    for name, span in builder.named_texts.items():
-        message = f"'&{name}' is not part of the text but an anchor's name, and nothing refers to it"
-        hint = "write the whole text in quotes"
-        builder.diagnostics.append(Diagnostic(span, "yaml-syntax", message, hint, "warning"))
     return builder.root, builder.diagnostics
 
 

@@ -151,6 +151,8 @@ class Construction:
             message = f"{what} is '{variable}', which belongs to the pipeline and not to the application"
             hint = f"to allow it, write environment: [{variable}] in dodo.yml"
             of.refuse(fields["environment"].span, message, hint)
+        if not (isinstance(node, Mapping) and node.entries):
+            of.bad(span, f"{what} has neither 'file' nor 'environment'", f"for example {name}: {{file: ./{name}.txt}}")
         return {"file": "/dev/null"}
 
     def check(self) -> list[Diagnostic]:

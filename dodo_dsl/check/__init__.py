@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check import baseline, file_rules, needed_files, resolve, service_rules, spec_rules, wiring_rules
+from dodo_dsl.check import file_rules, needed_files, resolve, service_rules, spec_rules, wiring_rules
 from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic
@@ -33,7 +33,6 @@ RULES: tuple[Rule, ...] = (
     file_rules.check_limits,
     file_rules.check_input,
     spec_rules.check_goals,
-    spec_rules.check_baseline,
     wiring_rules.check_producers,
     wiring_rules.check_hidden_messages,
     wiring_rules.check_variables,
@@ -83,10 +82,8 @@ def forget_files() -> None:
         file_rules.problems,
         file_rules.course_of,
         file_rules.fault_of_start,
-        file_rules.table_span,
-        file_rules.pictures,
-        baseline.results,
         needed_files.files,
+        file_rules.table_begin,
     )
     for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()

@@ -21,7 +21,7 @@ The rules that `dodo compile` checks, by the name that it prints in square brack
 in a terminal.
 
 Each example has only the keys that differ from a valid test `example.dodo.yml`. A line such as `# dodo.yml` begins
-another file. The first example of a rule violates it, the second does not; DoDo's own tests check both.
+another file. The example of a rule violates it; with what is written instead it does not. DoDo's own tests check both.
 
 `scripts/make-rules` generates this page from `dodo_dsl/check/catalogue.yml`.
 """
@@ -29,7 +29,10 @@ another file. The first example of a rule violates it, the second does not; DoDo
 
 @dataclass(frozen=True)
 class Page:
-    """One rule; ``encoding`` is that of the bad example's files."""
+    """One rule; ``encoding`` is that of the bad example's files.
+
+    ``instead`` is a line in place of the bad example's with the same key, empty if the good one differs by more.
+    """
 
     name: str
     group: str
@@ -37,6 +40,7 @@ class Page:
     why: str
     bad: str
     good: str
+    instead: str = ""
     encoding: str = "utf-8"
 
 
@@ -47,10 +51,22 @@ def pages() -> dict[str, Page]:
     if node is None or problems:
         raise ValueError(f"{FILE.name}: {problems}")
     return {
-        name: Page(name, group, **{key: text.strip("\n") for key, text in page.items()})
+        name: Page(name, group, **_examples({key: text.strip("\n") for key, text in page.items()}))
         for group, members in plain(node).items()
         for name, page in members.items()
     }
+
+
+def _examples(page: dict[str, str]) -> dict[str, str]:
+    """A page with its good example, which is the bad one with a line instead of the one with its key."""
+    instead = page.get("instead")
+    if instead is None:
+        return page
+    key = instead.partition(":")[0]
+    lines = page["bad"].splitlines()
+    number = next(n for n, line in enumerate(lines) if line.strip().partition(":")[0] == key)
+    indent = lines[number][: len(lines[number]) - len(lines[number].lstrip())]
+    return {**page, "good": "\n".join([*lines[:number], indent + instead, *lines[number + 1 :]])}
 
 
 def text(page: Page) -> str:
@@ -60,8 +76,8 @@ def text(page: Page) -> str:
         textwrap.fill(page.why, 100),
         "This violates the rule:",
         textwrap.indent(page.bad, "    "),
-        "This does not:",
-        textwrap.indent(page.good, "    "),
+        "Instead:",
+        textwrap.indent(page.instead or page.good, "    "),
     )
     return "\n\n".join(parts) + "\n"
 
@@ -89,7 +105,7 @@ def _sections() -> Iterator[str]:
         yield f"\n## {group}"
         for page in members:
             yield f"\n### {page.name}\n\n{page.summary}\n{page.why}\n"
-            yield f"```yaml\n{page.bad}\n```\n\nInstead:\n\n```yaml\n{page.good}\n```"
+            yield f"```yaml\n{page.bad}\n```\n\nInstead:\n\n```yaml\n{page.instead or page.good}\n```"
     yield ""
 
 

@@ -9,11 +9,10 @@ from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.diagnostics import Span, shown_path
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.arguments import Argument
+from dodo_dsl.spec.arguments import Argument, default_value
 from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import EMULATED_FILE
-from dodo_dsl.spec.values import default_value
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ def explain(test: ResolvedTest) -> Explanation:
         spec.level or "?",
         spec.kind or "?",
         spec.rig or "",
-        spec.pool.text if spec.pool else "",
+        spec.pool,
         tuple(_service(test, use) for use in spec.uses),
         tuple(_variable(name, entry) for name, entry in spec.variables.items()),
         tuple(RangeExplained(one.name, one.nominal.text, one.text, _place(one.nominal.span)) for one in spec.ranges),

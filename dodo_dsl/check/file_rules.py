@@ -1,29 +1,18 @@
-"""Rules on the files that parameters name, and on the limits by which evaluators judge.
-
-``wrong-file``: what is in a file, read as the services read it, at the position in the file. A file whose parameter
-has no format is JSON of the shape that the manifest names.
-``unknown-name``: a value names an entry of a file, such as an obstacle of the map.
-``short-timeout``: the test's timeout leaves room for the longest time that an evaluator waits.
-``wrong-start``: the vehicle starts clear of the walls and on their side of the goal.
-``input-limit``: what the test shows can meet the limits, and is judged until its end.
-``no-limit``: an evaluator has something to judge by; ``empty-file``: so has the file that it judges by. A test that can
-only pass shows nothing about the application.
-"""
+"""Rules on the files that parameters name, and on the limits by which evaluators judge."""
 
 import functools
 import json
 import math
-import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.check import lockstep
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import IMAGE, known_ids, without_pictures
+from dodo_dsl.check.resolve import known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
-from dodo_dsl.opendlv.assets import formats, map_file, recording_contents
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.opendlv.assets import formats, map_file
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -78,8 +67,6 @@ def _diagnostic(error: InputError, help_: str) -> Diagnostic:
 MAP = "map.json"
 """The map in its folder."""
 _MAX_BYTES = 20 << 20
-_ATTEMPT = re.compile(r"\$\{(matrix|vary)")
-"""A placeholder that nothing has replaced, which another rule reports."""
 _CLASSES, _OBSTACLES = "categories", "obstacles"
 _HELP = {"obstacles": "see docs/reference/maps.md"}
 _PLURAL = {"block": "blocks"}
@@ -96,75 +83,46 @@ def check_references(context: RuleContext) -> Iterator[Diagnostic]:
 
 
 def _among(context: RuleContext, service: ResolvedService, argument: Argument, entry: Entry) -> Iterator[Diagnostic]:
-    source, keys = sources(argument.parameter.among)
-    file, key = _file(service.arguments[source]), " and ".join(_PLURAL.get(key, key) for key in keys)
-    if file is None:
-        return
-    names = _names(file, keys)
-    if has_errors(file_problems(context, service, service.arguments[source])):
+    """``map-path.obstacles|block`` names a parameter with a JSON file, and lists of that file."""
+    source, _, lists = argument.parameter.among.partition(".")
+    keys, path = lists.split("|"), argument.value and service.arguments[source].value
+    if not path or not path.path or has_errors(file_problems(context, service, service.arguments[source])):
         return  # reported with the file
-    if isinstance(names, str):
-        yield Diagnostic(
-            entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {names}", _HELP.get(keys[0], "")
-        )
+    file = path.path / MAP if path.path.is_dir() else path.path
+    shown = f"{file.parent.name}/{file.name}"
+    try:
+        names = [*filter(None, (name for key in keys for name in entries(file, key))), *argument.parameter.words]
+    except ValueError as error:
+        yield Diagnostic(entry.value.span, "wrong-file", f"{shown}: {error}", _HELP.get(keys[0], ""))
         return
     items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
-    names += argument.parameter.words
     for item in items[:MAX_PROBLEMS]:
-        if isinstance(item, Scalar) and item.text not in names and not _ATTEMPT.search(item.text):
-            message = f"'{item.text}' is not among the {key} of {file.parent.name}/{file.name}"
-            hint, fix = did_you_mean(item.text, names), only_fix(item.text, names)
-            yield Diagnostic(item.span, "unknown-name", message, hint, fix=fix)
-
-
-def _file(argument: Argument) -> Path | None:
-    path = argument.value.path if argument.value else None
-    if path is None:
-        return None
-    return path / MAP if path.is_dir() else path
-
-
-def sources(among: str) -> tuple[str, list[str]]:
-    """The parameter that names a JSON file, and the lists of it, as ``map-path.obstacles|block`` says."""
-    source, _, keys = among.partition(".")
-    return source, keys.split("|")
-
-
-def _names(file: Path, keys: list[str]) -> tuple[str, ...] | str:
-    """The names of the entries of lists in a JSON file, or the problem of the file."""
-    found: list[str] = []
-    for key in keys:
-        listed = entries(file, key)
-        if isinstance(listed, str):
-            return listed
-        found += [name for name in listed if name]
-    return tuple(dict.fromkeys(found))
+        if isinstance(item, Scalar) and item.text not in names:
+            of = " and ".join(_PLURAL.get(key, key) for key in keys)
+            message, hint = f"'{item.text}' is not among the {of} of {shown}", did_you_mean(item.text, names)
+            yield Diagnostic(item.span, "unknown-name", message, hint, fix=only_fix(item.text, names))
 
 
 @functools.lru_cache(maxsize=256)
-def entries(file: Path, key: str) -> tuple[str, ...] | str:
-    """The entries of a list in a JSON file by name, empty for those that have none, or the problem of the file.
+def entries(file: Path, key: str) -> tuple[str, ...]:
+    """The entries of a list in a JSON file by name, empty for those that have none; raises ValueError.
 
     A class may be written with ``color:`` before its name, as in messages.
     """
     try:
-        if file.exists() and not file.is_file():
-            return "not a regular file"
-        if file.stat().st_size > _MAX_BYTES:
-            return f"larger than {_MAX_BYTES >> 20} MiB"
         is_walls = file.suffix == map_file.WALLS
-        document = map_file.load(file).value if is_walls else json.loads(file.read_text(encoding="utf-8"))
-        found = document.get(key, []) if isinstance(document, dict) else None
-        if not isinstance(found, list):
-            return f"expected an object with a list '{key}'"
-        plain, unnamed = _plain if key == _CLASSES else str, map_file.numbered if key == _OBSTACLES else lambda _: ""
-        return tuple(
-            plain(e["name"]) if isinstance(e, dict) and "name" in e else unnamed(n) for n, e in enumerate(found, 1)
-        )
+        document = map_file.load(file).value if is_walls else json.loads(regular_file.text(file, _MAX_BYTES))
     except OSError as error:
-        return f"cannot be read: {error.strerror}"
+        raise ValueError(f"cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        return f"not JSON: {str(error)[:120]}"
+        raise ValueError(f"not JSON: {str(error)[:120]}") from error
+    found = document.get(key, []) if isinstance(document, dict) else None
+    if not isinstance(found, list):
+        raise ValueError(f"expected an object with a list '{key}'")  # noqa: TRY004  (of the file)
+    plain, unnamed = _plain if key == _CLASSES else str, map_file.numbered if key == _OBSTACLES else lambda _: ""
+    return tuple(
+        plain(e["name"]) if isinstance(e, dict) and "name" in e else unnamed(n) for n, e in enumerate(found, 1)
+    )
 
 
 def _plain(name: object) -> str:
@@ -224,20 +182,15 @@ def course_of(flags: tuple[tuple[str, str, str], ...]) -> tuple[Any, Any] | None
 
 _SINCE_1970 = 1e8
 """Seconds; larger times count from 1970."""
-_CLOSE = 1e-9
 
 Unmet = tuple[str, str, str, Severity]
 """A parameter that what the test shows cannot meet, why in words behind the service's name, and a hint."""
 
 
 def check_input(context: RuleContext) -> Iterator[Diagnostic]:
-    """In lockstep a frame has one answer, with its sample time; else an application may answer as often as it likes."""
     spec, services = context.spec, context.services
     unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
     player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
-    known = lockstep.rates(services)
-    has_rate = not player and known.keys() & lockstep.cameras_of(context.wiring)
-    period = 1 / lockstep.step_hz(context.wiring, known) if has_rate else 0.0
     for service in services if spec.is_whole and context.test.is_complete else ():
         found: list[Unmet] = []
         for name, argument in service.arguments.items():
@@ -248,7 +201,7 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
                 )
                 found.append((name, why, f"write '{name}: ...', how long it is to judge", "warning"))
         if service.use.layer == "evaluation":
-            found += [*_times(service, player, unsure), *_frames(service, player, period, unsure)]
+            found += _times(service, player, unsure)
         for name, why, hint, severity in found:
             entry = service.use.parameters.get(name)
             span = entry.value.span if entry else service.use.span
@@ -262,77 +215,25 @@ def _times(service: ResolvedService, player: ResolvedService | None, unsure: Sev
         why = f"expects samples with times of the test, and frames of '{player.use.name}' keep those of the recording"
         hint = f"write 'sample-times: test' under 'with' of '{player.use.name}'"
         yield "align", why, hint, "warning" if without_pictures(player) else unsure
-    if judged := _judged(service):
-        first, begin, end = judged
-        if begin >= end:
-            why = (
-                f"has nothing to judge: its target begins at {first:,.10g} s, judged is {begin:,.10g} s to {end:.10g} s"
-            )
-            hint = "write 'align: sample-time' for times since 1970" if first > _SINCE_1970 else "see from and until"
-            yield "target", why, hint, "error"
-        elif is_copied and first < _SINCE_1970:
-            why = f"aligns by sample times, which count from 1970, and its target begins at {first:g} s"
-            yield "target", why, "write 'align: begin' for seconds since the start of the test", "error"
-
-
-def _judged(service: ResolvedService) -> tuple[float, float, float] | None:
-    """When a table begins, and what of it is judged from when to when, in s; None where that is not known."""
-    texts, target = service.texts, service.arguments.get("target")
-    path = target.value.path if target and target.value else None
-    found = table_span(path, texts.get("target-field") or texts.get("field", "")) if path else None
-    if found is None:
-        return None
-    is_copied = texts.get("align") == "sample-time"
-    begin, end = (0.0, found[1] - found[0]) if is_copied else found
-    limits = [float(texts[name]) for name in ("until", "max-time")[: 1 if is_copied else 2] if name in texts]
-    return found[0], max(begin, float(texts.get("from", 0))), min(end, *limits, end)
+    target = service.arguments["target"].value if "target" in service.arguments else None
+    begin = table_begin(target.path, service.texts.get("target-field", "")) if target and target.path else None
+    if begin is not None and is_copied != (begin > _SINCE_1970):
+        why = f"compares {'sample' if is_copied else 'test'} times with a target that begins at {begin:,.10g} s"
+        meant = "begin' for seconds since the start of the test" if is_copied else "sample-time' for times since 1970"
+        yield "target", why, f"write 'align: {meant}", "error"
 
 
 @functools.lru_cache(maxsize=256)
-def table_span(path: Path, field: str) -> tuple[float, float] | None:
-    """When a table of a target begins and ends, in s; None for a recording and a table that cannot be read."""
+def table_begin(path: Path, field: str) -> float | None:
+    """When a table of a target begins, in s; None for a recording and a table that cannot be read."""
     if path.suffix == formats.RECORDING:
         return None
     from dodo_dsl.opendlv.assets import target_table
 
     try:
-        times = [time / target_table.MICROSECONDS for time, _ in target_table.read(path, field)]
+        return target_table.read(path, field)[0][0] / target_table.MICROSECONDS
     except target_table.TargetError:
         return None  # reported with the file
-    return times[0], times[-1]
-
-
-def _frames(
-    service: ResolvedService, player: ResolvedService | None, period: float, unsure: Severity
-) -> Iterator[Unmet]:
-    """More answers than there are frames in a recording or each ``period`` s, and a gap that is shorter than that."""
-    texts, judged = service.texts, _judged(service)
-    name = "min-samples" if "min-samples" in texts else "min-frames"
-    least = most = int(texts.get(name, 0))
-    path = player.arguments["rec"].value if player else None
-    if player and path and path.path and unsure == "error":
-        most = pictures(path.path, int(player.texts.get("video-sender", 0)), least)
-    elif period and judged and judged[1] < judged[2]:
-        most = math.floor(judged[2] / period + _CLOSE) - math.ceil(judged[1] / period - _CLOSE) + 1
-    elif period and name == "min-frames" and {"max-delay", "max-time"} <= texts.keys():
-        wait = 0.0 if "message" in texts else float(texts["max-delay"])  # responds counts an answer when it comes
-        most = math.floor((float(texts["max-time"]) - wait) / period + _CLOSE) + 1
-    if most < least:
-        why = f"expects {least} answers, and what it judges has {most} frame{'' if most == 1 else 's'}"
-        yield name, why, f"write '{name}: {most}' or less", unsure
-    gap = service.arguments.get("max-gap")
-    if gap and gap.text and not gap.parameter.shared and float(gap.text) < period - _CLOSE:
-        why = f"expects an answer each {float(gap.text):g} s, and frames come each {period:g} s"
-        yield "max-gap", why, f"write 'max-gap: {period:g} s' or more", unsure
-
-
-@functools.lru_cache(maxsize=256)
-def pictures(path: Path, sender: int, most: int) -> int:
-    """How many frames of a camera a recording has, up to so many; so many if it has none, or is damaged."""
-    try:
-        return recording_contents.count(path, known_ids(())[IMAGE], sender, most) or most
-    except OSError:
-        return most  # reported with the file
 
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
@@ -344,23 +245,21 @@ def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
 
 def _limits(service: ResolvedService) -> Iterator[Diagnostic]:
     for names in service.manifest.one_of:
-        given = [name for name in names if name in service.use.parameters or service.texts.get(name)]
-        if not given:
-            message = f"'{service.use.name}' has nothing to judge by"
-            yield Diagnostic(
-                service.use.span, "no-limit", message, f"write one or more of {', '.join(names)} under 'with'"
-            )
+        if not any(name in service.use.parameters or service.texts.get(name) for name in names):
+            message, hint = f"'{service.use.name}' has nothing to judge by", f"write one or more of {', '.join(names)}"
+            yield Diagnostic(service.use.span, "no-limit", message, f"{hint} under 'with'")
 
 
 def _files(service: ResolvedService) -> Iterator[Diagnostic]:
     for argument in service.arguments.values():
         entry, file = argument.entry, argument.value.path if argument.value else None
         for key in argument.parameter.not_empty if entry and file else ():
-            found = entries(file, key) if file else ""
-            if isinstance(found, str) and argument.parameter.format:
-                continue  # reported with the file
-            if entry and file and isinstance(found, str):
-                yield Diagnostic(entry.value.span, "wrong-file", f"{file.parent.name}/{file.name}: {found}")
-            elif entry and file and not found:
-                message = f"{file.parent.name}/{file.name} has no {key}, so there is nothing to judge by"
-                yield Diagnostic(entry.value.span, "empty-file", message)
+            assert entry and file
+            shown = f"{file.parent.name}/{file.name}"
+            try:
+                if not entries(file, key):
+                    message = f"{shown} has no {key}, so there is nothing to judge by"
+                    yield Diagnostic(entry.value.span, "empty-file", message)
+            except ValueError as error:
+                if not argument.parameter.format:  # which is reported with the file
+                    yield Diagnostic(entry.value.span, "wrong-file", f"{shown}: {error}")

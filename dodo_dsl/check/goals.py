@@ -1,15 +1,15 @@
 """The goals of a test in the units of its checks."""
 
-import math
 from dataclasses import dataclass
+from decimal import Decimal
 from fnmatch import fnmatchcase
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
-from dodo_dsl.source import Entry, Mapping, Scalar
-from dodo_dsl.spec import quantity
-from dodo_dsl.spec.arguments import ResolvedService
+from dodo_dsl.source import Entry, Mapping, Scalar, plain
+from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Goal
+from dodo_dsl.spec.quantity import SHARE, QuantityError, convert, written_unit
 
 _OF_THE_TEST = {
     "slow-answers": "",
@@ -30,89 +30,65 @@ class ResolvedGoals:
     problems: tuple[Diagnostic, ...]
 
 
-class _WrongGoal(Exception):
-    """A goal with a problem, or one that the schema reports."""
-
-    def __init__(self, *problems: Diagnostic) -> None:
-        super().__init__()
-        self.problems = problems
-
-
 def resolved_goals(test: ResolvedTest) -> ResolvedGoals:
     """The goals of a test, in the order in which they are written."""
-    goals: list[Goal] = []
-    problems: list[Diagnostic] = []
-    for name, entry in test.spec.goals.items():
+    found = [_goal(test, name, entry) for name, entry in test.spec.goals.items()]
+    goals = tuple(goal for goal in found if isinstance(goal, Goal))
+    return ResolvedGoals(goals, tuple(problem for problem in found if isinstance(problem, Diagnostic)))
+
+
+def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | None:
+    """A goal or its problem; None if a key is not valid, or a service that is not known may have the check."""
+    unit, written = _unit(test, name), plain(entry.value)
+    if unit is None and _is_known(test):
+        hint = did_you_mean(name, _units(test))
+        return Diagnostic(entry.key, "unknown-check", f"no evaluator of the test has a check '{name}'", hint)
+    if not {"better", "zero", "one"} <= written.keys() or (unit is None and not _undeclared(test)):
+        return None
+    scalars = {k: e.value for k, e in entry.value.entries.items()} if isinstance(entry.value, Mapping) else {}
+    values = {}
+    for key in ("zero", "one"):
+        scalar = scalars[key]
+        assert isinstance(scalar, Scalar)
         try:
-            goals.append(_goal(test, name, entry))
-        except _WrongGoal as wrong:
-            problems.extend(wrong.problems)
-    return ResolvedGoals(tuple(goals), tuple(problems))
+            values[key] = float(_number(scalar.text) if unit is None else convert(scalar.text, unit or SHARE))
+        except QuantityError as error:
+            return Diagnostic(scalar.span, "wrong-unit", f"'{key}': {error}", error.hint)
+    better = written["better"]
+    if not (values["one"] < values["zero"] if better == "less" else values["one"] > values["zero"]):
+        message = f"'one' is {written['one']}, expected {better} than 'zero', as {better} is better"
+        return Diagnostic(scalars["one"].span, "goal-values", message)
+    return Goal(name, **values, weight=float(written.get("weight", 1)))
 
 
-def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal:
-    unit = _unit(test, name, entry)
-    if not isinstance(entry.value, Mapping):
-        raise _WrongGoal
-    zero, one = (_value(entry.value, key, unit) for key in ("zero", "one"))
-    better, weight = (_scalar(entry.value, key) for key in ("better", "weight"))
-    if better is None or better.text not in ("less", "more"):
-        raise _WrongGoal
-    if not (one < zero if better.text == "less" else one > zero):
-        written = _scalar(entry.value, "one") or better
-        message = f"'one' is {written.text}, expected {better.text} than 'zero', as {better.text} is better"
-        raise _WrongGoal(Diagnostic(written.span, "goal-values", message))
-    number = weight.value if weight else 1.0
-    if isinstance(number, bool) or not isinstance(number, int | float) or not number > 0:
-        raise _WrongGoal
-    return Goal(name, zero, one, float(number))
-
-
-def _unit(test: ResolvedTest, name: str, entry: Entry) -> str | None:
-    """The unit of a check, None if no manifest has it; raises _WrongGoal."""
-    known = dict(_OF_THE_TEST)
-    judges = [service.manifest for service in test.services if _judges(service)]
-    for manifest in judges:
-        known.update(manifest.checks)
-    unit = next((unit for pattern, unit in known.items() if fnmatchcase(name, pattern)), None)
-    if unit is None and all(manifest.checks for manifest in judges):
-        if not test.is_complete or not test.spec.is_whole:
-            raise _WrongGoal  # a service that is not known may have the check
-        hint = did_you_mean(name, known)
-        raise _WrongGoal(Diagnostic(entry.key, "unknown-check", f"no evaluator of the test has a check '{name}'", hint))
-    return unit
-
-
-def _judges(service: ResolvedService) -> bool:
-    """Whether it is an evaluator, or in a wrong layer, where it may be one."""
-    return service.use.layer == "evaluation" or service.use.layer not in service.manifest.layers
-
-
-def _scalar(goal: Mapping, key: str) -> Scalar | None:
-    value = goal.get(key)
-    return value if isinstance(value, Scalar) else None
-
-
-def _value(goal: Mapping, key: str, unit: str | None) -> float:
-    """A value in the check's unit; raises _WrongGoal."""
-    written = _scalar(goal, key)
-    if written is None or written.value is None:
-        raise _WrongGoal
-    if unit is None:
-        return _bare(key, written)
-    try:
-        return float(quantity.convert(written.text, unit or quantity.SHARE))
-    except quantity.QuantityError as error:
-        raise _WrongGoal(Diagnostic(written.span, "wrong-unit", f"'{key}': {error}", error.hint)) from error
-
-
-def _bare(key: str, written: Scalar) -> float:
+def _number(text: str) -> Decimal:
     """A number of an evaluator that does not declare its units."""
-    value = written.value
-    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-        return float(value)
-    message = (
-        f"'{key}': '{written.text}' is not a number, and its evaluator's manifest does not declare the check's unit"
-    )
-    hint = "write a bare number, or add 'checks' to the manifest"
-    raise _WrongGoal(Diagnostic(written.span, "wrong-unit", message, hint))
+    if written_unit(text) != "":
+        hint = "write a bare number, or add 'checks' to the manifest"
+        raise QuantityError(f"'{text}' is not a number, and its evaluator's manifest does not declare a unit", hint)
+    return Decimal(text)
+
+
+def _judges(test: ResolvedTest) -> list[Manifest]:
+    """The manifests of evaluators, and of services in a wrong layer, where they may be some."""
+    return [s.manifest for s in test.services if s.use.layer == "evaluation" or s.use.layer not in s.manifest.layers]
+
+
+def _undeclared(test: ResolvedTest) -> bool:
+    return not all(manifest.checks for manifest in _judges(test))
+
+
+def _is_known(test: ResolvedTest) -> bool:
+    return not _undeclared(test) and test.is_complete and test.spec.is_whole
+
+
+def _units(test: ResolvedTest) -> dict[str, str]:
+    found = dict(_OF_THE_TEST)
+    for manifest in _judges(test):
+        found.update(manifest.checks)
+    return found
+
+
+def _unit(test: ResolvedTest, name: str) -> str | None:
+    """The unit of a check, None if no manifest has it."""
+    return next((unit for pattern, unit in _units(test).items() if fnmatchcase(name, pattern)), None)

@@ -13,16 +13,12 @@ from dodo_dsl import source
 from dodo_dsl.check import file_rules
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.service_rules import unknown_message
-from dodo_dsl.diagnostics import Diagnostic, Span, ordered
+from dodo_dsl.diagnostics import Diagnostic, ordered
 from dodo_dsl.source import Reader, Scalar, walk
 from dodo_dsl.spec.model import Spec
 
 _OF_ALL = "name-taken"
 """A service that has the name of another is not known, so that no test uses it."""
-_VALUE = frozenset({"matrix-unknown", "vary-unknown", "yaml-tag"})
-"""Rules about a value as it is written, of which nothing else can be said."""
-_OF_BASE = frozenset({"no-limit", "service-taken"})
-"""Rules about a service that is merged with one of an extended test."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +49,9 @@ class Problems:
         by_rules = {path: list(_of(own, self.by_rules.get(path, ()))) for path, own in instances.items()}
         read = itertools.chain.from_iterable(own for path, own in self.as_read.items() if path in instances)
         ruled = dict.fromkeys(itertools.chain.from_iterable(by_rules.values()))
-        unfilled = {span for own in instances.values() for spec in own for span in spec.unfilled}
-        found = _without_consequences([*self.common, *self.of_services, *read, *ruled], by_rules, unfilled)
         having = _having(instances, by_rules)
-        return tuple(replace(d, tests=having.get(d, ())) for d in ordered(found))
+        found = ordered([*self.common, *self.of_services, *read, *ruled])
+        return tuple(replace(d, tests=having.get(d, ())) for d in found)
 
 
 def _of(instances: Sequence[Spec], found: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
@@ -85,36 +80,6 @@ def _having(
                 at_home.add(problem)
             names.setdefault(problem, []).extend([name] if is_of_all else problem.tests)
     return {problem: tuple(dict.fromkeys(those)) for problem, those in names.items() if problem not in at_home}
-
-
-def _without_consequences(
-    found: Sequence[Diagnostic], by_rules: Mapping[Path, Sequence[Diagnostic]], unfilled: Collection[Span]
-) -> Iterator[Diagnostic]:
-    """The problems without those that follow from others, so that each mistake is reported once.
-
-    At ``unfilled`` positions stand placeholders whose dimension or range is wrong itself.
-    """
-    told = {_place(d) for d in found if d.rule in _VALUE}
-    moved = {
-        path: {layer for d in own if d.rule == "wrong-layer" for layer in d.about} for path, own in by_rules.items()
-    }
-    gone = {d for path in moved for d in _of_services(path, by_rules[path])}
-    wrong = {d.span.file for d in found if d.severity == "error" and d.span not in unfilled}
-    for d in found:
-        follows = _place(d) in told or (d.span in unfilled and d.span.file in wrong)
-        is_lacking = d.rule == "missing-key" and not moved.get(Path(d.span.file), set()).isdisjoint(d.about)
-        if (d.rule in _VALUE or not follows) and d not in gone and not is_lacking:
-            yield d
-
-
-def _place(diagnostic: Diagnostic) -> tuple[str, int, int]:
-    return diagnostic.span.file, diagnostic.span.line, diagnostic.span.column
-
-
-def _of_services(path: Path, problems: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
-    """What a test says twice or too little, as an extended one has a service in the wrong layer."""
-    if any(d.rule == "wrong-layer" and d.span.file != str(path) for d in problems):
-        yield from (d for d in problems if d.rule in _OF_BASE)
 
 
 _NAME = re.compile(r"[\w.]+")

@@ -86,9 +86,13 @@ def may_send(service: ResolvedService, port: Port, ids: frozenset[tuple[str, int
     only, without = (_ports(service.texts.get(name, "")) for name in (ONLY, WITHOUT))
     if any(_is_all_of(other, port) for other in without) or (only and not any(port.consumes(each) for each in only)):
         return False
-    old = frozenset((one.name, one.id) for one in odvd.load(STANDARD_0_9))
-    numbers = {number for name, number in ids | old if name == port.name}
+    numbers = {number for name, number in ids | _former_ids() if name == port.name}
     return any(holds(path, number, _NO_STAMP if port.stamp is None else port.stamp) for number in numbers)
+
+
+@functools.cache
+def _former_ids() -> frozenset[tuple[str, int]]:
+    return frozenset((one.name, one.id) for one in odvd.load(STANDARD_0_9))
 
 
 def without_pictures(service: ResolvedService) -> Path | None:

@@ -1,20 +1,5 @@
-"""Rules on the services of a test: their names and layers, parameters, messages and cameras.
+"""Rules on the services of a test: their names and layers, parameters, messages and cameras."""
 
-``unknown-service``: ``uses`` names a service with a manifest; ``service-taken``: names in a test are unique.
-``service-reserved``: DoDo adds its own services to every test.
-``wrong-layer``: a service is in a layer that its manifest lists.
-Parameters fit the manifest: known, complete, of the right type and unit, within bounds, files in place:
-``unknown-parameter``, ``missing-parameter``, ``wrong-type``, ``wrong-unit``, ``wrong-value``, ``out-of-range``,
-``missing-file``, ``path-escape``. ``unused-parameter``: those that are set have an effect beside the others.
-``unknown-message``: the messages that parameters and the application name are OpenDLV's or the deployment's.
-``wrong-messages``: the deployment's do not give what DoDo's services use another meaning.
-``application-lines``: patterns of what the application prints are RE2's, and their groups fields of the message.
-``camera-source``: what a rig's computer can take frames from, in which sizes, and how often.
-``camera-size``: a camera's optics, as they were measured, are those of frames of one size. ``out-of-range``: sizes
-are even.
-"""
-
-import math
 from collections.abc import Collection, Iterator
 from pathlib import PurePath
 
@@ -29,14 +14,14 @@ from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
 from dodo_dsl.spec.deployment import MANIFEST
 from dodo_dsl.spec.manifest import holds
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
-from dodo_dsl.spec.slips import meant, slip_in_key
+from dodo_dsl.spec.slips import meant, unknown_key
 
 
 def check_services(context: RuleContext) -> Iterator[Diagnostic]:
     first_layer: dict[str, str] = {}
     for use in context.spec.uses:
         if use.uses.text not in context.manifests and not _is_broken(context, use.uses.text):
-            hint = did_you_mean(use.uses.text, context.manifests)
+            hint = did_you_mean(use.uses.text, context.manifests) or "'dodo list --services' shows those that there are"
             message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
             yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
         if use.name == "sandbox" or use.name.startswith("dodo-"):
@@ -55,10 +40,9 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
 def _is_broken(context: RuleContext, name: str) -> bool:
     """Whether there is the user's own service in a folder of this name, whose manifest is reported itself."""
     read = {manifest.folder for manifest in context.manifests.values()}
-    parts = (name, name.replace("-", "_"))
-    named = context.deployment.services
-    folders = [*(above / part for above in named for part in parts), *(own for own in named if own.name in parts)]
-    return any(folder not in read and (folder / MANIFEST).is_file() for folder in folders)
+    patterns = (MANIFEST, f"*/{MANIFEST}")
+    found = (file.parent for above in context.deployment.services for each in patterns for file in above.glob(each))
+    return name.replace("_", "-") in {folder.name.replace("_", "-") for folder in found if folder not in read}
 
 
 def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
@@ -67,7 +51,7 @@ def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
         if use.layer not in manifest.layers:
             message = f"service '{manifest.name}' does not fit layer {use.layer}"
             hint = f"move it to {' or '.join(manifest.layers)}"
-            yield Diagnostic(use.uses.span, "wrong-layer", message, hint, about=tuple(manifest.layers))
+            yield Diagnostic(use.uses.span, "wrong-layer", message, hint)
 
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
@@ -95,10 +79,8 @@ def _written(service: ResolvedService) -> Iterator[Diagnostic]:
         argument = service.arguments.get(name)
         if argument is None:
             known = service.manifest.parameters
-            slip = slip_in_key(name, known, is_empty=_is_empty(entry))
-            message = slip.message if slip else f"service '{service.manifest.name}' has no parameter '{name}'"
-            hint = slip.hint if slip else did_you_mean(name, known)
-            fix = slip.fix if slip else only_fix(name, known, service.use.parameters)
+            slip, hint, fix = unknown_key(name, known, service.use.parameters, is_empty=_is_empty(entry))
+            message = slip or f"service '{service.manifest.name}' has no parameter '{name}'"
             yield Diagnostic(entry.key, "unknown-parameter", message, hint, fix=fix)
         elif argument.problem:
             yield argument.problem
@@ -147,6 +129,8 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
             continue  # a rig that is unknown or missing may give it, too
         if parameter.shared and not context.spec.is_whole:
             continue  # a service that could not be read may give it
+        if parameter.shared and _lacks_first(context, service, parameter.name):
+            continue  # what is written there would be given here, too
         givers = _givers(context, parameter.name) if parameter.shared else {}
         if len(givers) == 1:
             continue
@@ -157,6 +141,19 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
         if len(givers) > 1:
             hint = f"{' and '.join(givers.values())} give different values, so write the one to use"
         yield Diagnostic(use.span, "missing-parameter", message, hint)
+
+
+def _lacks_first(context: RuleContext, service: ResolvedService, name: str) -> bool:
+    """Whether another service that shares the parameter needs it as well, and comes first."""
+    needing = (
+        each
+        for each in context.services
+        if (one := each.manifest.parameters.get(name))
+        and one.required
+        and name not in each.use.parameters
+        and not _misspelt(each) & {name}
+    )
+    return next(needing, service) is not service
 
 
 def _wants_rig(context: RuleContext) -> bool:
@@ -251,18 +248,15 @@ _NAMES = (RPICAM, _FILE, EMULATED)
 _ALIGNED = 64
 """Rows of other widths are padded in the pipe of ``rpicam-vid``."""
 
-_I420 = "name.i420"
 _OPTICS = "camera.intrinsics"
 
 
 def check_camera_sources(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         yield from _size(context.rig, service)
-        yield from _odd(service)
         for argument in service.arguments.values():
             if argument.parameter.rig == CAMERA_SOURCE and argument.text:
                 yield from _problems(context, service, argument)
-                yield from _exposure(service, argument.text)
 
 
 def _problems(context: RuleContext, service: ResolvedService, argument: Argument) -> Iterator[Diagnostic]:
@@ -280,34 +274,6 @@ def _problems(context: RuleContext, service: ResolvedService, argument: Argument
     elif source == RPICAM and (width := service.texts.get("width", "")).isdigit() and int(width) % _ALIGNED:
         message = f"rpicam-vid gives frames whose width is a multiple of {_ALIGNED}, not {width}"
         hint = f"write a width of {max(int(width) // _ALIGNED, 1) * _ALIGNED}"
-        yield Diagnostic(span, "camera-source", message, hint)
-
-
-def _odd(service: ResolvedService) -> Iterator[Diagnostic]:
-    """Sizes that frames in I420 cannot have, where a colour is that of two by two pixels."""
-    for name in ("width", "height") if _I420 in service.arguments else ():
-        argument, text = service.arguments.get(name), service.texts.get(name, "")
-        if argument and text.isdigit() and int(text) % 2 and (name, service.texts.get("source")) != ("width", RPICAM):
-            message = f"parameter '{name}' is {text}, expected an even number"
-            yield Diagnostic(
-                _span(service, argument), "out-of-range", message, f"write for example {max(int(text) - 1, 2)}"
-            )
-
-
-def _exposure(service: ResolvedService, source: str) -> Iterator[Diagnostic]:
-    """Frames of a real camera that would come faster than it can expose them."""
-    if source != RPICAM and not source.startswith("/dev/"):
-        return
-    try:
-        rate, exposure = (float(service.texts[name]) for name in ("freq", "exposure"))
-    except (KeyError, ValueError):
-        return
-    if rate * exposure > 1 + 1e-9:
-        places = (service.use.parameters.get(name) for name in ("exposure", "freq"))
-        span = next((entry.value.span for entry in places if entry), service.use.span)
-        message = f"an exposure of {exposure * 1e3:g} ms does not fit into the {1e3 / rate:.3g} ms between two frames"
-        most, fastest = math.floor(1e4 / rate) / 10, math.floor(10 / exposure) / 10
-        hint = f"write an exposure of at most {most:g} ms, or a freq of at most {fastest:g} Hz"
         yield Diagnostic(span, "camera-source", message, hint)
 
 

@@ -1,31 +1,13 @@
-"""Rules on a test itself: its names, its level and clock, its rig or pool of rigs, and its goals.
-
-``name-differs``: a test's name equals its file's; ``name-taken``: it is unique.
-``name-reserved``: a test is a job of its name, and GitLab reads some names as keywords.
-``level-kind``: recorded data cannot react, so no closed loop at level dil (thesis, Table 4.3).
-``clock-level``: lockstep needs an environment that can wait, so hardware runs in real time.
-``clock-rate``: in lockstep a test steps from frame to frame, so all rates have to fit the camera's.
-``clock-answers``: in lockstep a message has to complete the application's answer to a frame.
-``clock-timed``: in lockstep only time that frames bring goes on, and not that of an application's own timers.
-``clock-virtual``: where the application's time is the test's, no answer is slow, and no printed line has a time.
-``rig-pool``: any rig of a pool can run the test: there are some, of one kind, and they can be distinguished.
-``rig-level``: hil tests name their rig, others have none; ``unknown-rig``: the deployment has the rig.
-``rig-isolation``: hardware is on the host's network.
-``rig-device``: a test moves the rig that it names and no other, and only the service that moves it opens its port.
-``unknown-check``: a goal names a check of an evaluator. ``goal-values``: its values fit its direction: a goal that
-scores nothing, or the wrong way, would rank applications by mistake. ``wrong-file``: a baseline has the test.
-"""
+"""Rules on a test itself: its names, its level and clock, its rig, and its goals."""
 
 import os
 from collections.abc import Iterator
 
-from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.goals import resolved_goals
-from dodo_dsl.check.lockstep import answers, rates, rates_fit, step_hz
+from dodo_dsl.check.lockstep import rates, rates_fit, step_hz
 from dodo_dsl.check.resolve import isolation
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean, shown_path
-from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.deployment import RESERVED_CIDS
 from dodo_dsl.spec.load import members
@@ -68,14 +50,9 @@ def check_levels(context: RuleContext) -> Iterator[Diagnostic]:
 def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
     if not context.spec.is_stepped or not context.spec.is_whole:
         return
-    wiring = context.wiring
     yield from _rates(context)
     if context.spec.clock == VIRTUAL:
         yield from _own_time(context)
-    elif wiring.has_application and not wiring.done and not answers(wiring):
-        message = "no declared message completes a frame: the application's answer ends when it waits for the next one"
-        hint = "declare x-dodo.answers, or x-dodo.done, at the application's service that sends last"
-        yield Diagnostic(context.spec.span("clock"), "clock-answers", message, hint, severity="warning")
     timed = context.application.timed if context.application and context.spec.clock != VIRTUAL else ()
     for name, span in timed:
         message = f"this application acts by its own clock: '{name}' has timers, which in lockstep do not wait"
@@ -118,45 +95,15 @@ def _near(rate: float, step: float) -> float:
 
 
 def check_pools(context: RuleContext) -> Iterator[Diagnostic]:
-    pool, rigs = context.spec.pool, context.deployment.rigs
-    if pool is None:
-        return
-    if pool.kind:
-        yield from _kind(pool.kind, rigs)
-    for word in pool.names:
-        if word.text in EMULATED_RIGS:
-            message = f"'{word.text}' is in no pool, because every test has its own"
-            yield Diagnostic(word.span, "rig-pool", message, f"write 'rig: {word.text}'")
-        elif word.text not in rigs:
-            yield Diagnostic(word.span, "unknown-rig", f"unknown rig '{word.text}'", did_you_mean(word.text, rigs))
-    found = members(pool, rigs)
-    places = {word.text: word.span for word in pool.names}
+    spec, found = context.spec, members(context.spec.pool, context.deployment.rigs)
     for number, rig in enumerate(found):
-        span = places.get(rig.name, pool.kind.span if pool.kind else context.spec.span("rig"))
-        what, first = (f"{'emulated, ' * one.is_emulated}{one.kind}" for one in (rig, found[0]))
-        if what != first:
-            message = f"rig '{rig.name}' is {what}, and '{found[0].name}' is {first}"
-            yield Diagnostic(span, "rig-pool", message, "rigs of one kind can replace each other")
         for other in found[:number]:
             if device := _same_device(other, rig):
                 message = (
                     f"rigs '{other.name}' and '{rig.name}' both have '{device}', so it is unknown which one is there"
                 )
                 hint = "name ports by their serial numbers, as /dev/serial/by-id/... does"
-                yield Diagnostic(span, "rig-pool", message, hint)
-
-
-def _kind(word: Scalar, rigs: dict[str, Rig]) -> Iterator[Diagnostic]:
-    if word.text in rigs:
-        hint = f"write 'rig: {word.text}', or a list: [{', '.join(rigs)}]"
-        yield Diagnostic(word.span, "rig-pool", f"'{word.text}' is a rig, expected a kind", hint)
-    elif word.text not in KIND_TAGS:
-        hint = did_you_mean(word.text.removeprefix("hil-"), KIND_TAGS)
-        yield Diagnostic(word.span, "rig-pool", f"'{word.text}' is not a kind of rig", hint)
-    elif all(rig.kind != word.text for rig in rigs.values()):
-        said = ", ".join(f"'{rig.name}' ({rig.kind})" for rig in rigs.values())
-        message = f"dodo.yml has no rig of kind '{word.text}'"
-        yield Diagnostic(word.span, "rig-pool", message, f"it has {said}" if said else "add it under 'rigs'")
+                yield Diagnostic(spec.span("rig"), "rig-pool", message, hint)
 
 
 def _same_device(one: Rig, other: Rig) -> str:
@@ -172,7 +119,7 @@ def check_rigs(context: RuleContext) -> Iterator[Diagnostic]:
         message = "a hil test needs a rig to run on"
         hint = "write the kind of the rig, such as 'rig: dynamic', or the name of one in dodo.yml"
         yield Diagnostic(spec.span("level"), "rig-level", message, hint)
-    if spec.level in ("sil", "dil") and (spec.rig or spec.pool):
+    if spec.level in ("sil", "dil") and spec.rig:
         message = f"a {spec.level} test runs without a rig"
         yield Diagnostic(spec.span("rig"), "rig-level", message, "remove it, or use level hil")
     if spec.rig is None:
@@ -246,7 +193,3 @@ def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[D
 
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
     yield from resolved_goals(context.test).problems
-
-
-def check_baseline(context: RuleContext) -> Iterator[Diagnostic]:
-    yield from resolved_baseline(context.spec).problems

@@ -1,21 +1,9 @@
-"""Rules on what services and application give one another: messages, shared memories, and the test's variables.
-
-Each message or memory that a service consumes has a producer in the test, or is required of the application:
-``no-producer``, ``no-sample`` (the same for an evaluator, which could then never judge), ``two-producers`` of one
-message and sender stamp or of one memory, ``application-input`` (the application consumes what no service produces),
-``true-pose`` (it consumes what only a simulation knows, and the test hides that).
-``application-memory``: the shared memories that the application asks for are made by services of the test, and
-``application-pictures``: in the size and the format that it asks for.
-``application-variable``: a test sets only variables that are not DoDo's, to values that fit.
-``application-required``: no variable that the compose file requires (``${NAME:?why}``) is certain to be without a
-value, as compose would then refuse the test.
-``application-secret``: no value that a test sets looks like a secret.
-"""
+"""Rules on what services and application give one another: messages, shared memories, and the test's variables."""
 
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
-from dodo_dsl.application import opendlv_flags, secret_problems, slips
+from dodo_dsl.application import opendlv_flags, secret_problems
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
@@ -25,12 +13,11 @@ from dodo_dsl.application.variables import owner, split_by, with_variables
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
-from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring, message
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring, message
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import ResolvedService
+from dodo_dsl.spec.arguments import ResolvedService, default_value
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.values import default_value
 
 SENSORS = "opendlv.proxy."
 """Prefix of the messages that a car's devices send."""
@@ -123,26 +110,6 @@ def _names_of(manifest: Manifest, port: str) -> tuple[str, ...]:
     return parameter.choices if parameter else (name,)
 
 
-def _sensor_line(context: RuleContext, port: Port) -> str:
-    """A hint for a reading of the car's sensors: the line of a service that sends it; empty without one."""
-    sensors = [m for _, m in sorted(context.manifests.items()) if "environment" in m.layers and _sends(m, port.name)]
-    if not port.name.startswith(SENSORS) or not sensors:
-        return ""
-    manifest = sensors[0]
-    given = {name for use in context.spec.uses for name in use.parameters}
-    needed = [p for p in manifest.parameters.values() if p.required and not (p.shared and p.name in given)]
-    written = {p.name: "..." if p.example is None else str(p.example) for p in needed}
-    for output in manifest.all_messages.outputs:
-        name, _, stamp = output.partition("/")
-        if port.name in _names_of(manifest, output):
-            for each, value in ((name, port.name), (stamp, "" if port.stamp is None else str(port.stamp))):
-                parameter = manifest.parameters.get(each.strip("{}")) if each.startswith("{") else None
-                if parameter and value and value != str(parameter.default):
-                    written[parameter.name] = f"[{value}]" if parameter.type == "list" else value
-    values = ", ".join(f"{name}: {value}" for name, value in written.items())
-    return f"add under 'environment': {manifest.name}: {{uses: {manifest.name}, with: {{{values}}}}}"
-
-
 def _twice(wiring: Wiring) -> Iterator[Diagnostic]:
     first: dict[tuple[str, str, int | None], End] = {}
     for end in (*wiring.produced, *wiring.application_produces):
@@ -172,7 +139,7 @@ def _unsatisfied_application(context: RuleContext, wiring: Wiring) -> Iterator[D
         own = any(end.port.consumes(other.port) for other in wiring.application_produces)
         if not own and not wiring.producers(end.port) and not wiring.undeclared:
             message = f"the application's '{end.service}' consumes {end.port}, which no service of the test sends"
-            hint = _sensor_line(context, end.port)
+            hint = _who_could(context, wiring, end) if end.port.name.startswith(SENSORS) else ""
             yield Diagnostic(end.span, "application-input", message, hint, severity="warning")
 
 
@@ -188,8 +155,6 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
         return
     set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
     services = with_variables(context.application, set_here).services.values()
-    for service in services:
-        yield from _slips(service, made)
     asked = {service.name: _asked(service) for service in services}
     players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
     shown = {end.port.name for end in ends if end.service not in players}
@@ -238,12 +203,9 @@ def _sizes(context: RuleContext, service: ResolvedService, asked: AskedPictures)
     written = [use.parameters[key].value.span for key in ("width", "height", "rec") if key in use.parameters]
     who = f"the application's '{asked.service}'"
     message = f"{who} asks for frames of {size} pixels, and '{use.name}' makes them of {other}"
-    flags = f"--width={made[0]} --height={made[1]}"
-    hint = f"{flags} in the command of '{asked.service}'"
-    if "width" in service.arguments and not (context.rig and not context.rig.is_emulated):
-        hint = f"write 'width: {wanted[0]}' and 'height: {wanted[1]}' under 'with' of '{use.name}', or {hint}"
-    else:
-        hint = f"write {hint}"
+    hint = f"write --width={made[0]} --height={made[1]} in the command of '{asked.service}'"
+    if "width" in service.arguments:
+        hint += f", or 'width: {wanted[0]}' and 'height: {wanted[1]}' under 'with' of '{use.name}'"
     yield Diagnostic(written[0] if written else use.span, _PICTURES, message, hint, "warning")
 
 
@@ -279,15 +241,6 @@ def _missing(service: str, name: str, span: Span, made: set[str], offer: str) ->
     alike = {each.rpartition(".")[0] for each in made if each.endswith(f".{format_}")}
     hint = hint if closest(stem, alike) else offer or hint
     return Diagnostic(span, "application-memory", message, hint, "warning")
-
-
-def _slips(service: ComposeService, made: set[str]) -> Iterator[Diagnostic]:
-    """Flags that are almost ``--name=``, with a memory of the test."""
-    for word, item in service.words:
-        flag = slips.meant(word, "--name")
-        if flag.partition("=")[2].removeprefix("/") in made:
-            message = f"'{word}' of the application's '{service.name}' is not the flag '--name'"
-            yield Diagnostic(item.span, "application-memory", message, f"did you mean '{flag}'?", "warning")
 
 
 def _asked(service: ComposeService) -> Asked:

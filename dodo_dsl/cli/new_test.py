@@ -20,10 +20,10 @@ from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.source import Mapping as Written
 from dodo_dsl.source import plain, read
 from dodo_dsl.spec import extends, vary
+from dodo_dsl.spec.arguments import ValueProblem, convert
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import LAYERS, LEVELS, Spec
 from dodo_dsl.spec.registry import KEYWORDS, SUFFIX
-from dodo_dsl.spec.values import ValueProblem, convert
 
 MAPS = ("maps/straight", "maps/rig-straight")
 TARGET = "targets/weave.csv"

@@ -11,7 +11,6 @@ from dodo_dsl import package_data
 from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import senders as check_senders
-from dodo_dsl.check.baseline import resolved_baseline
 from dodo_dsl.check.file_rules import MAP
 from dodo_dsl.check.goals import resolved_goals
 from dodo_dsl.check.needed_files import needed
@@ -25,14 +24,13 @@ from dodo_dsl.plan.application import plan_application
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.test_files import FileCopy, FilesError, standing_once
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import Argument, ResolvedService
+from dodo_dsl.spec.arguments import Argument, ResolvedService, default_value
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import LAYERS, VIRTUAL, RecordedValue
+from dodo_dsl.spec.model import LAYERS, VIRTUAL
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.values import default_value
 
 
 @dataclass(frozen=True)
@@ -215,16 +213,10 @@ class _Builder:
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
             goals=resolved_goals(self.test).goals,
-            baseline=self._baseline(),
             import_paths=self.shared.imports,
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),
         )
-
-    def _baseline(self) -> tuple[RecordedValue, ...]:
-        found = resolved_baseline(self.spec)
-        self.named |= {found.path.resolve()} if found.path else set()
-        return found.values
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from dodo_dsl.application.model import Access
 from dodo_dsl.spec import model as spec_model
-from dodo_dsl.spec.model import Goal, RecordedValue, ResourceLimits
+from dodo_dsl.spec.model import Goal, ResourceLimits
 from dodo_dsl.spec.rig import EMULATED_RIGS, KIND_TAGS
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -146,7 +146,7 @@ class Plan:
     ``lockstep`` is None in real time, ``rig`` empty below level hil, ``emulated`` says whether it is; ``more_tags`` are
     its runner's besides ``tag``; ``pool`` is None for a test that names its rig; ``messages`` are ODVD files of the
     deployment, relative to ``files/``; ``senders`` has the only senders of a message, as ``opendlv.sim.Frame/0=pose``.
-    ``goals`` score a passed test and never change its outcome; checks must not be worse than those of the ``baseline``.
+    ``goals`` score a passed test and never change its outcome.
     ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
@@ -183,7 +183,6 @@ class Plan:
     world: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
-    baseline: tuple[RecordedValue, ...] = ()
     import_paths: tuple[str, ...] = ()
     shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)

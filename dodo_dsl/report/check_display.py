@@ -8,7 +8,6 @@ from markupsafe import Markup
 
 from dodo_dsl.outcome import MEMORY_GROWTH, PEAK_MEMORY, PROCESSOR_SHARE, PROCESSOR_TIME, SAMPLE_TIMES, SLOW_ANSWERS
 from dodo_dsl.report.comparison import with_margins
-from dodo_dsl.spec.model import BASELINE
 
 Check = Mapping[str, Any]
 
@@ -79,9 +78,6 @@ _PREFIXES = {
 def meaning(check: Check, others: Collection[str] = ()) -> str:
     """What a check measures, in a few words; ``others`` are the names of its test's checks. Empty where unknown."""
     name = check["name"]
-    if name.startswith(BASELINE):
-        found = meaning({**check, "name": name.removeprefix(BASELINE)}, others)
-        return f"{found}; the limit is the recorded value with its tolerance" if found else ""
     if name == "distance" and "mean" in others:
         return _FROM_TARGET
     if name in _OF_RESPONDS and "delay" in others:

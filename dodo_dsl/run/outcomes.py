@@ -5,10 +5,9 @@ import os
 import re
 import signal
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
@@ -17,7 +16,6 @@ from dodo_dsl.plan.added_services import FRAMES, RECORDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError, Flooded, MemoryTaken, VerdictEvent
 from dodo_dsl.spec.manifest import load_manifests
-from dodo_dsl.spec.model import RecordedValue
 
 LOG = "logs/runner.log"
 """The traceback of an internal error, in the test's report."""
@@ -98,19 +96,6 @@ def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
     if len(verdicts) > 1:
         return [Finding("error", f"evaluator '{evaluator}' gave {len(verdicts)} verdicts, expected one", evaluator)]
     return [Finding("passed" if v.passed else "failed", v.reason, evaluator, is_timed=True) for v in verdicts]
-
-
-def worse(compared: Iterable[tuple[dict[str, Any], RecordedValue]]) -> Iterator[Finding]:
-    """That checks are worse than those of the baseline, in one finding."""
-    broken = [(check, before) for check, before in compared if not check["ok"]]
-    said = []
-    for check, before in broken:
-        value = "nothing" if check["value"] is None else f"{check['value']:.4g} {check['unit']}".rstrip()
-        side, bound = next(iter(check["limit"].items()))
-        most = f"at {'most' if side == 'max' else 'least'} {bound:.4g}"
-        said.append(f"{before.check} is {value}, worse than {before.value:.4g} in the baseline ({most})")
-    if said:
-        yield Finding("failed", "; ".join(said), is_timed=True)
 
 
 def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.check.senders import told_in_words
-from dodo_dsl.outcome import ON_EMULATED, MachineLoad, Outcome, Response, Result, ServiceUse, against_baseline
+from dodo_dsl.outcome import ON_EMULATED, MachineLoad, Outcome, Response, Result, ServiceUse
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
@@ -24,7 +24,6 @@ from dodo_dsl.run.outcomes import (
     outcome_of,
     unstartable,
     windowless,
-    worse,
 )
 from dodo_dsl.run.protocol import (
     Backend,
@@ -309,8 +308,7 @@ class RunState:
         use = judgement.judged_use(self.resources, plan.resources)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
-        base = tuple(against_baseline(judged, plan.baseline))
-        findings = (*answers.findings, *use.findings, *worse(base))
+        findings = (*answers.findings, *use.findings)
         considered = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
         found = self._explained(self._elsewhere(self._timed(considered.finding)))
         finding = self._without_display(self._with_told(self._with_printed(found)))
@@ -321,7 +319,7 @@ class RunState:
             execution_s=None if self.finished is None or self.began is None else self.finished - self.began,
             sim_s=self.time.seconds if self.time else None,
             services=tuple(self._service_rows()),
-            checks=(*judged, *answers.checks, *use.checks, *(check for check, _ in base)),
+            checks=(*judged, *answers.checks, *use.checks),
             verdicts=tuple(verdict.as_json() for verdict in verdicts),
             last_lines=self._tails.get(finding.service, ()) if finding.result != "passed" else (),
             notes=(

@@ -1,7 +1,6 @@
-"""The deployment: ``dodo.yml`` at the root of a user's repository, with the limits and services that it gives.
+"""The deployment: ``dodo.yml`` at the root of a user's repository.
 
-``sandbox`` has limits, with sizes that can be. ``services`` are folders that hold a folder with a manifest for each
-service.
+``services`` are folders that hold a folder with a manifest for each service.
 """
 
 import ipaddress
@@ -9,103 +8,31 @@ import os
 import posixpath
 import re
 import shlex
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl import __version__, package_data
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read, walk
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span
+from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.quantity import convert
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
-from dodo_dsl.spec.validation import validate
+from dodo_dsl.spec.slips import mended
+from dodo_dsl.spec.validation import schema_of_keys, valid_part
 
-_LEAST = {"memory": "6 MB", "file-size": "1 kB", "copies": "1 MB", "disk": "1 MB"}
-"""The least sizes; Docker takes no limit of memory below 6 MB."""
-_MOST = "1000000 GB"
-
-
-def size_problems(node: object) -> Iterator[Diagnostic]:
-    """Sizes in ``sandbox`` or a rig that are too small or beyond any computer; ``node`` is a valid one, or None."""
-    if not isinstance(node, Mapping):
-        return
-    for key, least in _LEAST.items():
-        size = node.get(key)
-        if isinstance(size, Scalar) and not convert(least, "B") <= convert(size.text, "B") <= convert(_MOST, "B"):
-            message = f"'{key}' is {size.text}, expected {least} to {_MOST}"
-            yield Diagnostic(size.span, "out-of-range", message)
-
-
-def sandbox_limits(entry: Entry | None) -> SandboxLimits:
-    """The limits that a valid ``dodo.yml`` sets."""
-    node = entry.value if entry else None
-    if not isinstance(node, Mapping):
-        return SandboxLimits()
-    default = SandboxLimits()
-    reads = node.get("read")
-    return SandboxLimits(
-        _bytes(node.get("memory"), default.memory),
-        _count(node.get("processes"), default.processes),
-        _count(node.get("files"), default.files),
-        _bytes(node.get("file-size"), default.file_size),
-        tuple(i.text for i in reads.items if isinstance(i, Scalar)) if isinstance(reads, Sequence) else (),
-        float(str(cpus.value)) if isinstance(cpus := node.get("cpus"), Scalar) else None,
-        _bytes(node.get("copies"), default.copies),
-        _count(node.get("copied-files"), default.copied_files),
-    )
-
-
-def _bytes(node: object, default: int) -> int:
-    return int(convert(node.text, "B")) if isinstance(node, Scalar) else default
-
-
-def _count(node: object, default: int) -> int:
-    return node.value if isinstance(node, Scalar) and isinstance(node.value, int) else default
-
-
-RULE = "service-folder"
 MANIFEST = "service.yml"
 _TAKEN = ("services", "dodo_dsl")
-
-
-def service_folder_problems(root: Path, node: Node | None) -> Iterator[Diagnostic]:
-    """Folders that are a service themselves, and warnings for those without any and those that DoDo's packages hide.
-
-    Folders that do not exist are reported elsewhere.
-    """
-    for item in walk(node) if node is not None else ():
-        folder = path_of(root, item.text) if isinstance(item, Scalar) else None
-        if folder is None or not isinstance(item, Scalar) or not folder.is_dir():
-            continue
-        if (folder / MANIFEST).is_file():
-            yield Diagnostic(item.span, RULE, f"'{item.text}' is the folder of one service", _above(root, folder))
-        elif not any(folder.glob(f"*/{MANIFEST}")):
-            message = f"'{item.text}' holds no service"
-            hint = f"a service is a folder in it with a {MANIFEST}: {item.text.rstrip('/')}/NAME/{MANIFEST}"
-            yield Diagnostic(item.span, RULE, message, hint, severity="warning")
-        elif folder.name in _TAKEN:
-            message = f"Python finds DoDo's own package '{folder.name}' before this folder"
-            hint = f"give it another name, such as my_{folder.name}, also in 'process' of its services"
-            yield Diagnostic(item.span, RULE, message, hint, severity="warning")
-
-
-def _above(root: Path, folder: Path) -> str:
-    above, root = folder.parent, root.resolve()
-    if above != root and above.is_relative_to(root):
-        return f"name the folder above it: {above.relative_to(root).as_posix()}"
-    return f"move it to my_services/{folder.name}, and name the folder above it: my_services"
-
-
 _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
 RESERVED_CIDS = frozenset({111, 112})
+_NO_CID = 0
+"""Of a rig whose own is not valid."""
 _FROM_HERE = "paths are relative to the folder of dodo.yml"
 _NOT_YET = f"dodo new NAME makes it, with a first test; {_FROM_HERE}"
-_OF_GANTRY = ("serial", "limits", "axes")
-_NETWORK = "for example 10.213.0.0/16"
 DEFAULT_SUBNETS = ipaddress.IPv4Network("10.213.0.0/16")
 
 
@@ -131,7 +58,7 @@ class Declarations:
         services = node.get("services")
         declared = services.entries if isinstance(services, Mapping) else {}
         own = {key: entry for key, entry in node.entries.items() if key not in ("files", "without", "services")}
-        return cls(files, tuple(_texts(node.entries.get("without"))), dict(declared), own)
+        return cls(files, tuple(_texts(node.get("without"))), dict(declared), own)
 
 
 @dataclass(frozen=True)
@@ -192,185 +119,181 @@ def load_deployment(path: Path | None, reader: Reader = read) -> tuple[Deploymen
     if node is None and not found:
         found = [Diagnostic(Span(str(path)), "missing-key", "the file is empty, expected at least 'dodo: 1'")]
     if node is not None:
-        found = [*found, *validate(node, "deployment")]
-    fallback = Deployment(path.parent, path, registry=(package_data.registry(),))
-    if not isinstance(node, Mapping) or has_errors(found):
-        return fallback, found
-    raw = plain(node)
-    images = raw.get("images", {})
-    problems: list[Diagnostic] = []
-    rigs = _rigs(node.entries.get("rigs"), problems)
-    reserved = {r.cid for r in rigs.values()}
-    registry, absent = _registry(path.parent, node.entries.get("registry"), problems)
-    about = node.entries.get("application")
-    named = about.value.entries.get("files") if about and isinstance(about.value, Mapping) else about
-    application = _files(path.parent, named, problems)
-    deployment = Deployment(
-        root=path.parent,
-        file=path,
-        registry=registry or (package_data.registry(),),
-        absent=absent,
-        services=_folders(path.parent, node.entries.get("services"), problems),
-        messages=_files(path.parent, node.entries.get("messages"), problems),
-        application=application,
-        declarations=Declarations.of(about, application),
-        image_prefix=images.get("prefix", "dodo"),
-        image_tag=images.get("tag", __version__),
-        cids=tuple(cid for cid in _cids(node.entries.get("cids"), problems) if cid not in reserved),
-        subnets=_subnets(node.entries.get("subnets"), problems),
-        gates=raw.get("gates", True),
-        environment=tuple(raw.get("environment", ())),
-        paths=_host_paths(node.entries.get("paths"), problems),
-        outside=raw.get("outside", False),
-        rigs=rigs,
-        sandbox=sandbox_limits(node.entries.get("sandbox")),
-    )
-    _odvd(node.entries.get("messages"), deployment.messages, problems)
-    problems += [*size_problems(node.get("sandbox")), *service_folder_problems(path.parent, node.get("services"))]
-    return deployment, [*found, *problems]
+        node, slipped = mended(node, schema_of_keys("deployment"))
+        node, problems, _ = valid_part(node, "deployment")
+        found = [*found, *slipped, *problems]
+    if not isinstance(node, Mapping):
+        return Deployment(path.parent, path, registry=(package_data.registry(),)), found
+    reading = _Reading(path.parent, node)
+    return reading.deployment(path), [*found, *reading.problems]
 
 
-def _texts(entry: Entry | None) -> Iterator[Scalar]:
+def _texts(node: Node | None) -> list[Scalar]:
     """The strings of a list, or the single string written instead of one."""
-    value = entry.value if entry else None
-    for item in value.items if isinstance(value, Sequence) else (value,):
-        if isinstance(item, Scalar):
-            yield item
+    items = node.items if isinstance(node, Sequence) else (node,)
+    return [item for item in items if isinstance(item, Scalar)]
 
 
-def _registry(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
-    """The folders with tests, and those that do not exist."""
-    found: list[Diagnostic] = []
-    folders = _folders(root, entry, found)
-    missing = (path for item in _texts(entry) if item.text != SHIPPED and (path := path_of(root, item.text)))
-    absent = tuple(path for path in missing if not path.exists() and path.is_relative_to(root.resolve()))
-    if absent and all(package_data.is_shipped(folder, root) for folder in folders):
-        found = [replace(d, hint=_NOT_YET) for d in found]
-    problems.extend(found)
-    return folders, absent
+class _Reading:
+    """What a valid ``dodo.yml`` says, and the problems of what it names."""
+
+    def __init__(self, root: Path, node: Mapping) -> None:
+        self.root, self.node, self.raw = root, node, plain(node)
+        self.problems: list[Diagnostic] = []
+
+    def deployment(self, path: Path) -> Deployment:
+        raw, rigs = self.raw, self._rigs()
+        images, reserved = raw.get("images", {}), {rig.cid for rig in rigs.values()}
+        about = self.node.entries.get("application")
+        value = self.node.get("application")
+        named = value.get("files") if isinstance(value, Mapping) else value
+        application, registry = self._files(named), self._folders("registry", _NOT_YET)
+        shipped = package_data.registry()
+        missing = (path_of(self.root, item.text) for item in _texts(self.node.get("registry")) if item.text != SHIPPED)
+        found = Deployment(
+            root=self.root,
+            file=path,
+            registry=registry or (shipped,),
+            absent=tuple(p for p in missing if p and not p.exists() and p.is_relative_to(self.root.resolve())),
+            services=self._folders("services"),
+            messages=self._files(self.node.get("messages")),
+            application=application,
+            declarations=Declarations.of(about, application),
+            image_prefix=images.get("prefix", "dodo"),
+            image_tag=images.get("tag", __version__),
+            cids=tuple(cid for cid in self._cids() if cid not in reserved),
+            subnets=self._subnets(),
+            gates=raw.get("gates", True),
+            environment=tuple(raw.get("environment", ())),
+            paths=self._paths(),
+            outside=raw.get("outside", False),
+            rigs=rigs,
+            sandbox=_sandbox(raw.get("sandbox", {})),
+        )
+        self._check_messages(found.messages)
+        self._check_services()
+        return found
+
+    def _tell(self, span: Span, rule: str, message: str, hint: str = "", severity: Severity = "error") -> None:
+        self.problems.append(Diagnostic(span, rule, message, hint, severity))
+
+    def _folders(self, key: str, hint: str = _FROM_HERE) -> tuple[Path, ...]:
+        folders = []
+        for item in _texts(self.node.get(key)):
+            folder = package_data.registry() if item.text == SHIPPED else path_of(self.root, item.text)
+            if folder is None or not folder.is_dir():
+                self._tell(item.span, "missing-file", f"there is no folder '{item.text}'", hint)
+            else:
+                folders.append(folder)
+        return tuple(folders)
+
+    def _files(self, node: Node | None) -> tuple[Path, ...]:
+        files = []
+        for item in _texts(node):
+            path = path_of(self.root, item.text)
+            if path is not None and path.is_file():
+                files.append(self.root / item.text)
+            else:
+                self._tell(item.span, "missing-file", f"there is no file '{item.text}'", _FROM_HERE)
+        return tuple(files)
+
+    def _paths(self) -> tuple[str, ...]:
+        paths = []
+        for item in _texts(self.node.get("paths")):
+            path = posixpath.normpath(os.path.expanduser(item.text))  # noqa: PTH111  (it never raises)
+            if not path.startswith("/") or path.strip("/") == "":
+                message = f"'{item.text}' is not the whole path of a file or folder"
+                self._tell(item.span, "wrong-value", message, "for example /etc/ros")
+            else:
+                paths.append(path)
+        return tuple(paths)
+
+    def _check_messages(self, files: tuple[Path, ...]) -> None:
+        if not files:
+            return
+        from dodo_dsl.opendlv.message_set import MessageSet  # slow to load, and rarely needed
+        from dodo_dsl.opendlv.odvd import OdvdError
+
+        try:
+            MessageSet.load(*files)
+        except OdvdError as error:
+            place = _ODVD_PLACE.fullmatch(str(error))
+            span, text = self.node.entries["messages"].key, str(error)
+            if place:
+                span, text = Span(place["file"], int(place["line"] or 1), int(place["column"] or 1)), place["text"]
+            self._tell(span, "wrong-messages", text)
+
+    def _check_services(self) -> None:
+        """Folders that are a service themselves, that hold none, and that DoDo's packages hide."""
+        for item in _texts(self.node.get("services")):
+            folder = path_of(self.root, item.text)
+            if folder is None or not folder.is_dir():
+                continue
+            if (folder / MANIFEST).is_file():
+                hint = "name the folder above it, which holds a folder for each service"
+                self._tell(item.span, "service-folder", f"'{item.text}' is the folder of one service", hint)
+            elif not any(folder.glob(f"*/{MANIFEST}")):
+                hint = f"a service is a folder in it with a {MANIFEST}: {item.text.rstrip('/')}/NAME/{MANIFEST}"
+                self._tell(item.span, "service-folder", f"'{item.text}' holds no service", hint, "warning")
+            elif folder.name in _TAKEN:
+                message = f"Python finds DoDo's own package '{folder.name}' before this folder"
+                hint = f"give it another name, such as my_{folder.name}, also in 'process' of its services"
+                self._tell(item.span, "service-folder", message, hint, "warning")
+
+    def _rigs(self) -> dict[str, Rig]:
+        rigs: dict[str, Rig] = {}
+        taken: dict[int | None, str] = {}
+        node = self.node.get("rigs")
+        for name, written in node.entries.items() if isinstance(node, Mapping) else ():
+            assert isinstance(written.value, Mapping)
+            raw = plain(written.value)
+            cid = None if raw.get("emulated") else raw.get("cid", _NO_CID)
+            found = rigs[name] = Rig(name, raw.get("kind", "dynamic"), cid, written.value)
+            if cid is not None and name in rig.EMULATED_RIGS:
+                message = f"the name '{name}' is reserved for the built-in rig"
+                self._tell(written.key, "rig-name", message, "choose another name")
+            elif cid not in (None, _NO_CID) and (cid in taken or cid in RESERVED_CIDS):
+                owner = f"rig '{taken[cid]}'" if cid in taken else "real cars"
+                message = f"CID {cid} is taken by {owner}, expected one that only this rig has"
+                self._tell(written.value.entries["cid"].value.span, "rig-cid", message)
+            taken.setdefault(cid, name)
+            for item in _texts(written.value.get("tags")):
+                if item.text in rig.RESERVED_TAGS - {*rig.KIND_TAGS[found.kind]}:
+                    message = f"'{item.text}' is the tag of other runners, those of rig '{name}' have '{found.tag}'"
+                    self._tell(item.span, "rig-tag", message, "remove it, or choose the rig's own tag")
+        return rigs
+
+    def _cids(self) -> tuple[int, ...]:
+        written = self.node.get("cids")
+        if not isinstance(written, Scalar):
+            return Deployment.cids
+        low, high = (int(part) for part in written.text.split("-"))
+        if not 1 <= low <= high <= 254:
+            message = f"'{written.text}' is not a range of CIDs, expected numbers from 1 to 254, the lower one first"
+            self._tell(written.span, "out-of-range", message)
+            return Deployment.cids
+        return tuple(cid for cid in range(low, high + 1) if cid not in RESERVED_CIDS)
+
+    def _subnets(self) -> ipaddress.IPv4Network:
+        written = self.node.get("subnets")
+        if not isinstance(written, Scalar):
+            return DEFAULT_SUBNETS
+        try:
+            network = ipaddress.IPv4Network(written.text)
+        except ValueError as error:
+            self._tell(written.span, "wrong-value", f"not an IPv4 network: {error}", "for example 10.213.0.0/16")
+            return DEFAULT_SUBNETS
+        if network.prefixlen > 28:
+            self._tell(written.span, "out-of-range", f"'{written.text}' is too small, every test needs a /28")
+            return DEFAULT_SUBNETS
+        return network
 
 
-def _folders(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
-    folders = []
-    for item in _texts(entry):
-        folder = package_data.registry() if item.text == SHIPPED else path_of(root, item.text)
-        if folder is None or not folder.is_dir():
-            problems.append(Diagnostic(item.span, "missing-file", f"there is no folder '{item.text}'", _FROM_HERE))
-        else:
-            folders.append(folder)
-    return tuple(folders)
-
-
-def _files(root: Path, entry: Entry | None, problems: list[Diagnostic]) -> tuple[Path, ...]:
-    files = []
-    for item in _texts(entry):
-        path = path_of(root, item.text)
-        if path is not None and path.is_file():
-            files.append(root / item.text)
-        else:
-            problems.append(Diagnostic(item.span, "missing-file", f"there is no file '{item.text}'", _FROM_HERE))
-    return tuple(files)
-
-
-def _host_paths(entry: Entry | None, problems: list[Diagnostic]) -> tuple[str, ...]:
-    paths = []
-    for item in _texts(entry):
-        path = posixpath.normpath(os.path.expanduser(item.text))  # noqa: PTH111  (it never raises)
-        if not path.startswith("/") or path.strip("/") == "":
-            message = f"'{item.text}' is not the whole path of a file or folder"
-            problems.append(Diagnostic(item.span, "wrong-value", message, "for example /etc/ros"))
-        else:
-            paths.append(path)
-    return tuple(paths)
-
-
-def _odvd(entry: Entry | None, files: tuple[Path, ...], problems: list[Diagnostic]) -> None:
-    """Problems of the deployment's ODVD files."""
-    if not files or entry is None:
-        return
-    from dodo_dsl.opendlv.message_set import MessageSet  # slow to load, and rarely needed
-    from dodo_dsl.opendlv.odvd import OdvdError
-
-    try:
-        MessageSet.load(*files)
-    except OdvdError as error:
-        place = _ODVD_PLACE.fullmatch(str(error))
-        span, text = entry.key, str(error)
-        if place:
-            span, text = Span(place["file"], int(place["line"] or 1), int(place["column"] or 1)), place["text"]
-        problems.append(Diagnostic(span, "wrong-messages", text))
-
-
-def _rigs(entry: Entry | None, problems: list[Diagnostic]) -> dict[str, Rig]:
-    rigs: dict[str, Rig] = {}
-    taken: dict[int | None, str] = {}
-    for name, written in entry.value.entries.items() if entry and isinstance(entry.value, Mapping) else ():
-        if not isinstance(written.value, Mapping):
-            continue
-        raw = plain(written.value)
-        cid = None if raw.get("emulated") else raw["cid"]
-        found = rigs[name] = Rig(name, raw["kind"], cid, written.value)
-        if cid is not None and name in rig.EMULATED_RIGS:
-            message = f"the name '{name}' is reserved for the built-in rig"
-            problems.append(Diagnostic(written.key, "rig-name", message, "choose another name"))
-        elif cid is not None and (cid in taken or cid in RESERVED_CIDS):
-            owner = f"rig '{taken[cid]}'" if cid in taken else "real cars"
-            message = f"CID {cid} is taken by {owner}, expected one that only this rig has"
-            problems.append(Diagnostic(written.value.entries["cid"].value.span, "rig-cid", message))
-        problems.extend(_octal(written.value.get("cid")))
-        taken.setdefault(cid, name)
-        problems.extend(_tags(found))
-        problems.extend(_unused(found))
-        problems.extend(size_problems(written.value))
-    return rigs
-
-
-def _octal(cid: Node | None) -> Iterator[Diagnostic]:
-    if isinstance(cid, Scalar) and cid.text.startswith("0") and cid.text.isdecimal():
-        message = f"'cid' is {cid.text}, which other readers of YAML take for an octal number"
-        hint = f"write {cid.value}"
-        yield Diagnostic(cid.span, "wrong-value", message, hint, fix=Fix(cid.text, str(cid.value)))
-
-
-def _unused(found: Rig) -> Iterator[Diagnostic]:
-    """Keys about what moves, of a rig that does not."""
-    for key in _OF_GANTRY if found.kind == "static" else ():
-        if key in found.node.entries:
-            message = f"a static rig does not use '{key}'"
-            hint = "remove it, or write the kind of a rig that moves: dynamic or circle"
-            yield Diagnostic(found.node.entries[key].key, "unknown-key", message, hint, "warning")
-
-
-def _tags(found: Rig) -> Iterator[Diagnostic]:
-    """Tags that would send a rig's jobs to a runner that is none of its kind's."""
-    node = found.node.get("tags")
-    for item in node.items if isinstance(node, Sequence) else ():
-        if isinstance(item, Scalar) and item.text in rig.RESERVED_TAGS - {*rig.KIND_TAGS[found.kind]}:
-            message = f"'{item.text}' is the tag of other runners, those of rig '{found.name}' have '{found.tag}'"
-            yield Diagnostic(item.span, "rig-tag", message, "remove it, or choose the rig's own tag")
-
-
-def _cids(entry: Entry | None, problems: list[Diagnostic]) -> tuple[int, ...]:
-    if entry is None or not isinstance(entry.value, Scalar):
-        return Deployment.cids
-    low, high = (int(part) for part in entry.value.text.split("-"))
-    if not 1 <= low <= high <= 254:
-        message = f"'{entry.value.text}' is not a range of CIDs, expected numbers from 1 to 254, the lower one first"
-        problems.append(Diagnostic(entry.value.span, "out-of-range", message))
-        return Deployment.cids
-    return tuple(cid for cid in range(low, high + 1) if cid not in RESERVED_CIDS)
-
-
-def _subnets(entry: Entry | None, problems: list[Diagnostic]) -> ipaddress.IPv4Network:
-    if entry is None or not isinstance(entry.value, Scalar):
-        return DEFAULT_SUBNETS
-    try:
-        network = ipaddress.IPv4Network(entry.value.text)
-    except ValueError as error:
-        problems.append(Diagnostic(entry.value.span, "wrong-value", f"not an IPv4 network: {error}", _NETWORK))
-        return DEFAULT_SUBNETS
-    if network.prefixlen > 28:
-        message = f"'{entry.value.text}' is too small, every test needs a /28"
-        problems.append(Diagnostic(entry.value.span, "out-of-range", message))
-        return DEFAULT_SUBNETS
-    return network
+def _sandbox(raw: dict[str, Any]) -> SandboxLimits:
+    values = {key.replace("-", "_"): value for key, value in raw.items() if key != "read"}
+    for key in ("memory", "file_size", "copies"):
+        if key in values:
+            values[key] = int(convert(values[key], "B"))
+    if "cpus" in values:
+        values["cpus"] = float(values["cpus"])
+    return SandboxLimits(reads=tuple(raw.get("read", ())), **values)

@@ -1,22 +1,22 @@
 """A file's tests: read, merged over what it extends, set by the command line, and made into instances.
 
-Settings of the command line override the specs before anything is checked or built. ``rig: {any: dynamic}``, a test
-that any rig of a kind, or any of some, may run, is an instance for each of them, as is ``rig: dynamic`` for several.
+Settings of the command line override the specs before anything is checked or built. ``rig: dynamic``, a test that any
+rig of a kind may run, is an instance for each of them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Known
 from dataclasses import dataclass, replace
 
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Mapping, Node, Reader, Scalar, read, walk
+from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, read
 from dodo_dsl.spec import extends, matrix, slips, vary
-from dodo_dsl.spec.matrix import Choice
-from dodo_dsl.spec.model import LAYERS, VIRTUAL, Pool, Spec, spec_of
-from dodo_dsl.spec.placeholders import MATRIX, Placeholders, without
+from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
+from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
-from dodo_dsl.spec.validation import validate
+from dodo_dsl.spec.validation import REPORTED, schema_of_keys, valid_part, validate, without_places
+from dodo_dsl.spec.validation import Path as ValuePath
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
 """The instances of a file, and its problems."""
@@ -29,46 +29,78 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     """The instances of a file, as far as it can be read, and its problems."""
     node, found = reader(location.path)
     if node is None:
-        if not found:
-            found = [extends.nothing_in(location.path)]
-        return [Spec(location)], found
-    node, problems = extends.resolve(slips.joined(node), location.path, location.root, reader)
-    is_whole = not has_errors(problems)
-    found = [*found, *problems]
+        return [Spec(location)], found or [extends.nothing_in(location.path)]
+    node, slipped = slips.mended(node, schema_of_keys("dodo"))
+    node, problems = extends.resolve(node, location.path, location.root, reader)
+    found, is_whole = [*found, *slipped, *problems], not has_errors(problems)
     if extends.is_open(node):
         return [_by_name(location, node)], [*found, *_surely_wrong(node)]
-    choices, problems = matrix.choices(node)
-    found.extend(problems)
     if not isinstance(node, Mapping):
         return [Spec(location)], [*found, *validate(node, "dodo")]
-    found.extend([*matrix.problems(node), *vary.problems(node)])
+    specs, problems = _instances(location, node, is_whole)
+    return specs, [*found, *problems]
+
+
+def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
+    """The instances of a test that is merged over what it extends."""
+    choices, found = matrix.choices(node)
+    of_matrix = list(matrix.PLACEHOLDERS.unknown(node, "matrix-unknown"))
+    of_ranges = list(vary.PLACEHOLDERS.unknown(node, "vary-unknown"))
+    unknown = [*of_matrix, *of_ranges]  # which may be meant to use any name
+    found += [] if of_matrix else matrix.PLACEHOLDERS.idle(node, "matrix-unused")
+    found += [] if of_ranges else vary.PLACEHOLDERS.idle(node, "vary-unused")
+    found += unknown
+    spans = {key: entry.value.span for key, entry in node.entries.items()}
+    are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
+    is_broken = len(choices[0].values) < len(getattr(node.get(MATRIX), "entries", ()))
+    reported = {problem.span for problem in unknown}
     specs = []
-    checked_by_rules, wrong = _only_in_parameters(node, matrix.PLACEHOLDERS), 0
-    for number, choice in enumerate(choices):
+    for choice in choices:
         if wrong >= _MOST_WRONG:
             break
         template = matrix.substitute(node, choice)
-        assert isinstance(template, Mapping)
         ranges, problems = vary.read(template)
-        found.extend(problems)
-        spec, instance, problems = _at(Spec(location, choice=choice, is_whole=is_whole), template, ranges, {})
-        found.extend(problems)
-        if number == 0 or not checked_by_rules:
-            checked = instance if number == 0 else without(instance, MATRIX)
-            problems = validate(checked, "dodo")
+        found += problems
+        if is_broken or has_errors(found):
+            template = _marked(template, reported, {each.name for each in ranges})
+        if places is None or not are_alike:
+            instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges))
+            _, problems, places = valid_part(instance if places is None else without(instance, MATRIX), "dodo")
+            found += [d for d in problems if is_whole or not _is_missing(d, node)]
             wrong += bool(problems)
-            found.extend(d for d in problems if is_whole or not _is_missing(d, node))
+        template = without_places(template, places)
+        spec = Spec(location, choice=choice, spans=spans, is_whole=is_whole and not _hides_services(node, places))
+        spec = _at(replace(spec, ranges=ranges, template=template), {})
         corners, problems = _corners(spec)
-        found.extend(problems)
-        unfilled = _unfilled(instance) if has_errors(found) else frozenset[Span]()
-        specs.append(replace(spec, corners=corners, unfilled=unfilled))
+        found += problems
+        specs.append(replace(spec, corners=corners, template=template if ranges else None))
     return specs, found
 
 
-def _unfilled(instance: Mapping) -> frozenset[Span]:
-    """Where placeholders are left, whose dimension or range has a problem."""
-    kinds = (matrix.PLACEHOLDERS, vary.PLACEHOLDERS)
-    return frozenset(one.span for one in walk(without(instance, MATRIX)) if any(kind.names(one) for kind in kinds))
+def _marked(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
+    """The test with a mark at values of which nothing more can be said: their placeholders have a problem."""
+
+    def marked(value: Node) -> Node:
+        if value.span in spans or matrix.PLACEHOLDERS.names_in(value) or vary.PLACEHOLDERS.names_in(value) - ranges:
+            return replace(value, tag=REPORTED)
+        if isinstance(value, Mapping):
+            entries = {key: Entry(entry.key, marked(entry.value)) for key, entry in value.entries.items()}
+            return replace(value, entries=entries)
+        return replace(value, items=tuple(map(marked, value.items))) if isinstance(value, Sequence) else value
+
+    entries = {k: e if k == MATRIX else Entry(e.key, marked(e.value)) for k, e in node.entries.items()}
+    return replace(node, entries=entries)
+
+
+def _hides_services(node: Mapping, places: Collection[ValuePath]) -> bool:
+    """Whether services may be in what is not valid: in a layer, or in an unknown key, most likely a misspelt layer."""
+    known = schema_of_keys("dodo")["properties"]
+    for first, *rest in places:
+        if first in LAYERS and (len(rest) < 2 or rest[1] in ("uses", "with")) and len(rest) <= 2:
+            return True
+        if first not in known and not rest and isinstance(node.get(str(first)), Mapping):
+            return True
+    return False
 
 
 def _by_name(location: Location, node: Node) -> Spec:
@@ -88,33 +120,33 @@ def _surely_wrong(node: Node) -> Iterator[Diagnostic]:
 
 def varied(spec: Spec, values: vary.Values, choice: Choice) -> Spec:
     """The instance with these values of its ranges, the nominal ones for others, and another choice as its name."""
+    return replace(_at(replace(spec, choice=choice), values), rig=spec.rig, pool=spec.pool)
+
+
+def _instance(spec: Spec, values: vary.Values) -> Mapping:
     assert spec.template is not None, "only for specs with ranges"
-    found, _, _ = _at(replace(spec, choice=choice), spec.template, spec.ranges, values)
-    return replace(found, rig=spec.rig, pool=spec.pool)
+    return vary.PLACEHOLDERS.filled(spec.template, vary.nominal(spec.ranges) | values)
 
 
-def _at(
-    spec: Spec, template: Mapping, ranges: tuple[vary.Range, ...], values: vary.Values
-) -> tuple[Spec, Mapping, list[Diagnostic]]:
-    """The spec that a template is with the values, the template with them, and the spec's problems."""
-    instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges) | values)
-    assert isinstance(instance, Mapping)
-    found, problems = spec_of(spec.location, instance, spec.choice, spec.is_whole)
-    return replace(found, ranges=ranges, template=template if ranges else None), instance, problems
+def _at(spec: Spec, values: vary.Values) -> Spec:
+    """The spec with these values of its ranges."""
+    found = spec_of(spec.location, _instance(spec, values), spec.choice, spec.spans, spec.is_whole)
+    return replace(found, ranges=spec.ranges, template=spec.template)
 
 
 def _corners(spec: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
-    """The spec at the ends of its ranges, and problems of values there that no rule checks."""
+    """The spec at the ends of its ranges, and what its schema says of these."""
     corners, found = [], []
-    checked_by_rules = spec.template is None or _only_in_parameters(spec.template, vary.PLACEHOLDERS)
+    if not spec.ranges or spec.template is None:
+        return (), []
+    are_alike = not spec.is_whole or _only_in_parameters(spec.template, vary.PLACEHOLDERS)
     for values in vary.corners(spec.ranges):
-        choice = Choice((*spec.choice.values, *values.items()))
-        assert spec.template is not None, "a spec with ranges has one"
-        corner, instance, problems = _at(replace(spec, choice=choice), spec.template, spec.ranges, values)
-        found.extend(problems)
-        if not checked_by_rules and spec.is_whole:
-            found.extend(validate(without(instance, MATRIX), "dodo"))
-        corners.append(corner)
+        corner = replace(spec, choice=Choice((*spec.choice.values, *values.items())))
+        if not are_alike:
+            _, problems, places = valid_part(without(_instance(spec, values), MATRIX), "dodo")
+            found += problems
+            corner = replace(corner, template=without_places(spec.template, places))
+        corners.append(_at(corner, values))
     return tuple(corners), found
 
 
@@ -168,23 +200,18 @@ def applied(spec: Spec, settings: Settings) -> Spec:
 DIMENSION = "rig"
 
 
-def members(pool: Pool, rigs: Known[str, Rig]) -> list[Rig]:
-    """The rigs of a pool that the deployment has, in its order or the test's; of a kind, real ones or one emulated."""
-    if pool.kind:
-        found = [rig for rig in rigs.values() if rig.kind == pool.kind.text]
-        return [rig for rig in found if not rig.is_emulated] or found[:1]
-    return [rigs[name] for name in dict.fromkeys(word.text for word in pool.names) if name in rigs]
+def members(kind: str, rigs: Known[str, Rig]) -> list[Rig]:
+    """The rigs of a kind, in the deployment's order: real ones, or one that is emulated."""
+    found = [rig for rig in rigs.values() if rig.kind == kind and rig.is_whole]
+    return [rig for rig in found if not rig.is_emulated] or found[:1]
 
 
 def on_each(spec: Spec, rigs: Known[str, Rig]) -> list[Spec]:
-    """A spec with a pool on each of its rigs, any other as it is; rigs of another kind than the first are mistakes."""
-    pool = spec.pool
-    if spec.rig in KIND_TAGS and spec.rig not in rigs:
-        pool = Pool(Scalar(spec.span(DIMENSION), spec.rig, spec.rig))
-        rigs = {name: rig for name, rig in rigs.items() if rig.is_whole}
-    found = members(pool, rigs) if pool else []
-    pool = pool if spec.pool or len(found) > 1 else None
-    return [_on(spec, rig, pool) for rig in found if rig.kind == found[0].kind] or [spec]
+    """A spec that names a kind of rigs on each of them, any other as it is."""
+    if spec.rig is None or spec.rig not in KIND_TAGS or spec.rig in rigs:
+        return [spec]
+    found = members(spec.rig, rigs)
+    return [_on(spec, rig, spec.rig if len(found) > 1 else "") for rig in found] or [spec]
 
 
 def of_test(spec: Spec) -> Spec:
@@ -196,7 +223,7 @@ def of_test(spec: Spec) -> Spec:
     return replace(spec, choice=replace(spec.choice, values=(*values[:place], *values[place + 1 :])))
 
 
-def _on(spec: Spec, rig: Rig, pool: Pool | None) -> Spec:
+def _on(spec: Spec, rig: Rig, pool: str) -> Spec:
     name = Scalar(spec.span(DIMENSION), rig.name, rig.name)
     corners = tuple(_on(corner, rig, pool) for corner in spec.corners)
     choice = Choice((*spec.choice.values, (DIMENSION, name))) if pool else spec.choice

@@ -1,14 +1,13 @@
 """Service manifests: a service with its layers, parameters and ports, and rules that the schema cannot express.
 
-``wrong-manifest``: what concerns two places of a manifest. ``manifest-name``: the service and its folder have the same
-name.
+``wrong-manifest``: what concerns two places of a manifest.
 """
 
 import functools
 import re
 from collections.abc import Iterator
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,37 +22,46 @@ RESERVED = ("cid", "help")
 _PLACEHOLDER = re.compile(r"\{(?P<name>[^{}]*)\}")
 FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames")
 """A placeholder for the frames at which a map has models, as in ``{map-path.frames}``."""
-_NUMBERS = ("number", "integer", "amount")
-_TEXTS = ("string", "memory", "message", "output")
-_DEFAULTS: dict[str, tuple[type, ...]] = {
-    "number": (int, float),
-    "amount": (int, float),
-    "integer": (int,),
-    "boolean": (bool,),
-    "list": (list,),
-    **dict.fromkeys(_TEXTS, (str,)),
+_OF_TYPES = {
+    "of": ("list",),
+    "per": ("list",),
+    "driving": ("list",),
+    "choices": ("string", "list"),
+    "or-share": ("amount",),
+    "multiple-of": ("integer",),
+    "not-empty": ("path",),
+    "format": ("path",),
+    "unit": ("number",),
+    **dict.fromkeys(("minimum", "maximum"), ("number", "integer", "amount")),
 }
+"""Keys that only parameters of some types may have, or lists of items of these types."""
 
 
 def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
     """Problems of ports, defaults, bounds and references in a manifest that its schema accepts."""
-    parameters = node.get("parameters")
+    parameters, messages = node.get("parameters"), node.get("messages")
     entries = parameters.entries if isinstance(parameters, Mapping) else {}
     types = {name: str(plain(entry.value)["type"]) for name, entry in entries.items()}
-    for key in ("messages", "memory", "devices"):
-        written = node.get(key)
-        if written is not None:
-            yield from _all_ports(written, types)
-    messages = node.get("messages")
     cases = messages.get("cases") if isinstance(messages, Mapping) else None
-    for item in cases.items if isinstance(cases, Sequence) else ():
-        if isinstance(item, Mapping):
-            yield from _conditions(item.get("when"), types)
-    groups = node.get("one-of")
-    for scalar in walk(groups) if groups is not None else ():
-        if isinstance(scalar, Scalar) and scalar.text not in types:
-            message = f"'one-of' names the unknown parameter '{scalar.text}'"
-            yield Diagnostic(scalar.span, RULE, message, did_you_mean(scalar.text, types))
+    conditions = (
+        [item.get("when") for item in cases.items if isinstance(item, Mapping)] if isinstance(cases, Sequence) else []
+    )
+    named = [(each.span, "one-of", each.text) for each in _scalars(node.get("one-of"))]
+    for when in [
+        *conditions,
+        *(entry.value.get("when") for entry in entries.values() if isinstance(entry.value, Mapping)),
+    ]:
+        named += (
+            [(entry.key, "when", name) for name, entry in when.entries.items()] if isinstance(when, Mapping) else []
+        )
+    for port in (each for key in ("messages", "memory", "devices") for each in _scalars(node.get(key))):
+        for match in _PLACEHOLDER.finditer(port.text):
+            frames = None if match["name"] in types else FRAMES.fullmatch(match["name"])
+            named.append((port.span, port.text, frames["map"] if frames else match["name"]))
+    for span, what, name in named:
+        if name not in types:
+            message = f"'{what}' names the unknown parameter '{name}'"
+            yield Diagnostic(span, RULE, message, did_you_mean(name, types))
     for name, entry in entries.items():
         if name in RESERVED:
             message = f"'--{name}' is a flag of every service, so it cannot name a parameter"
@@ -62,96 +70,41 @@ def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
             yield from _parameter(name, entry.value, types)
 
 
-def _conditions(node: Node | None, types: dict[str, str]) -> Iterator[Diagnostic]:
-    for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
-        if name not in types:
-            yield Diagnostic(entry.key, RULE, f"'when' names the unknown parameter '{name}'", did_you_mean(name, types))
-
-
-def name_inconsistencies(name: str, path: Path) -> Iterator[Diagnostic]:
-    """A warning if the service of a manifest has another name than its folder; ``my-name`` may be in ``my_name``."""
-    folder = path.parent.name
-    if folder.replace("_", "-") != name.replace("_", "-"):
-        message = f"the service is named '{name}', and its folder '{folder}'"
-        hint = f"tests use the name: 'uses: {name}'; give both the same"
-        yield Diagnostic(Span(str(path)), "manifest-name", message, hint, severity="warning")
-
-
-def _all_ports(node: Node, types: dict[str, str]) -> Iterator[Diagnostic]:
-    for scalar in walk(node):
-        if not isinstance(scalar, Scalar):
-            continue
-        for match in _PLACEHOLDER.finditer(scalar.text):
-            frames = None if match["name"] in types else FRAMES.fullmatch(match["name"])
-            for name in [match["name"]] if frames is None else filter(None, frames.groups()):
-                if name not in types:
-                    message = f"'{scalar.text}' names the unknown parameter '{name}'"
-                    yield Diagnostic(scalar.span, RULE, message, did_you_mean(name, types))
-
-
-_KINDS_OF_KEY: dict[str, tuple[tuple[str, ...], str]] = {
-    "of": (("list",), "lists"),
-    "per": (("list",), "lists"),
-    "driving": (("list",), "lists"),
-    "choices": (("string", "list"), "strings and lists"),
-    "or-share": (("amount",), "amounts"),
-    "not-empty": (("path",), "paths"),
-    "format": (("path",), "paths"),
-    "unit": (("number",), "numbers"),
-    "minimum": (_NUMBERS, "numbers"),
-    "maximum": (_NUMBERS, "numbers"),
-}
-"""Keys that only parameters of some types may have, with these types in words."""
+def _scalars(node: Node | None) -> list[Scalar]:
+    return [each for each in walk(node) if isinstance(each, Scalar)] if node is not None else []
 
 
 def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diagnostic]:
     raw = plain(node)
     kind = raw["type"]
-    for key, (kinds, words) in _KINDS_OF_KEY.items():
-        of_items = raw.get("of", kind) if words == "numbers" else kind
-        if raw.get(key) not in (None, False) and of_items not in kinds:
-            verb = "are" if key == "choices" else "is"
-            yield _misplaced(node, key, f"'{key}' {verb} for {words}, but '{name}' is of type {kind}")
+
+    def wrong(key: str, message: str, hint: str = "") -> Diagnostic:
+        return Diagnostic(node.entries[key].key, RULE, message, hint)
+
+    for key, kinds in _OF_TYPES.items():
+        if raw.get(key) not in (None, False) and kind not in kinds and raw.get("of") not in kinds:
+            yield wrong(key, f"'{key}' is for parameters of type {' or '.join(kinds)}, but '{name}' is of type {kind}")
     for key in ("within-timeout", "setup-times"):
         if raw.get(key) and raw.get("unit") != "s":
-            yield _misplaced(node, key, f"'{name}' is not a duration", "add 'unit: s'")
+            yield wrong(key, f"'{name}' is not a duration", "add 'unit: s'")
     if raw.get("minimum", 0) > raw.get("maximum", raw.get("minimum", 0)):
-        yield _misplaced(node, "minimum", f"the minimum of '{name}' is larger than its maximum")
+        yield wrong("minimum", f"the minimum of '{name}' is larger than its maximum")
     source = str(raw.get("among", "")).partition(".")[0]
-    for key, named, wanted in (("among", source, "path"), ("per", raw.get("per"), "list")):
-        if named and types.get(named) != wanted:
-            message = f"'{key}' names '{named}', expected a parameter of type {wanted}"
-            yield _misplaced(node, key, message, did_you_mean(named, [n for n, t in types.items() if t == wanted]))
-    yield from _conditions(node.get("when"), types)
-    below = list(types)[list(types).index(name) :]
-    for other in raw.get("when", {}):
-        if other in below:
-            yield _misplaced(node, "when", f"'{name}' is above '{other}', on which it depends", "put it below")
-    yield from _default(name, node, raw)
+    for key, other, wanted in (("among", source, "path"), ("per", raw.get("per"), "list")):
+        if other and types.get(other) != wanted:
+            message = f"'{key}' names '{other}', expected a parameter of type {wanted}"
+            yield wrong(key, message, did_you_mean(other, [n for n, t in types.items() if t == wanted]))
+    if set(raw.get("when", {})) & set(list(types)[list(types).index(name) :]):
+        yield wrong("when", f"'{name}' is above what it depends on", "put it below")
+    if kind == "path" and "default" in raw:
+        yield wrong("default", f"'{name}' is a path in a test, so it cannot have a default")
+    elif "default" in raw:
+        from dodo_dsl.spec.arguments import ValueProblem, convert
 
-
-def _default(name: str, node: Mapping, raw: dict[str, Any]) -> Iterator[Diagnostic]:
-    if "default" not in raw:
-        return
-    kind, default = raw["type"], raw["default"]
-    if kind == "path":
-        yield _misplaced(node, "default", f"'{name}' is a path in a test, so it cannot have a default")
-        return
-    if not _is_of(kind, default) or ("of" in raw and not all(_is_of(raw["of"], item) for item in default)):
-        yield _misplaced(node, "default", f"the default of '{name}' is not of type {kind}")
-    elif kind in _NUMBERS and not raw.get("minimum", default) <= default <= raw.get("maximum", default):
-        yield _misplaced(node, "default", f"the default of '{name}' is not between its minimum and its maximum")
-    elif kind == "string" and default not in raw.get("choices", [default]):
-        yield _misplaced(node, "default", f"the default of '{name}' is not one of its choices")
-
-
-def _is_of(kind: str, value: object) -> bool:
-    return isinstance(value, _DEFAULTS[kind]) and (kind == "boolean" or not isinstance(value, bool))
-
-
-def _misplaced(node: Mapping, key: str, message: str, hint: str = "") -> Diagnostic:
-    span: Span = node.entries[key].key
-    return Diagnostic(span, RULE, message, hint)
+        try:
+            convert(replace(_read(name, raw), unit=""), node.entries["default"].value, Path())
+        except ValueProblem as problem:
+            yield wrong("default", f"the default does not fit: {problem}")
 
 
 Value = str | int | float | bool | list[str | int | float] | None
@@ -200,6 +153,7 @@ class Parameter:
     shared: bool | str = False
     minimum: float | None = None
     maximum: float | None = None
+    multiple_of: int = 1
     choices: tuple[str, ...] = ()
     rig: str = ""
     among: str = ""
@@ -273,7 +227,12 @@ class Manifest:
         return "/" not in self.image and ":" not in self.image
 
 
-_TRANSLATED = ("within-timeout", "setup-times", "or-share", "choices", "words", "not-empty", "when")
+_LISTS = ("choices", "words", "not-empty")
+
+
+def _read(name: str, raw: dict[str, Any]) -> Parameter:
+    values: dict[str, Any] = {k.replace("-", "_"): tuple(v) if k in _LISTS else v for k, v in raw.items()}
+    return Parameter(name, **{"help": "", **values, "when": _when(raw.get("when", {}))})
 
 
 def _ports(raw: dict[str, Any] | None) -> Ports:
@@ -293,20 +252,7 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
     if node is None or has_errors(found):
         return None, found
     raw = plain(node)
-    parameters = {
-        name: Parameter(
-            name,
-            within_timeout=p.get("within-timeout", False),
-            setup_times=p.get("setup-times", 0),
-            or_share=p.get("or-share", False),
-            choices=tuple(p.get("choices", ())),
-            words=tuple(p.get("words", ())),
-            not_empty=tuple(p.get("not-empty", ())),
-            when=_when(p.get("when", {})),
-            **{k: v for k, v in p.items() if k not in _TRANSLATED},
-        )
-        for name, p in (raw.get("parameters") or {}).items()
-    }
+    parameters = {name: _read(name, each) for name, each in (raw.get("parameters") or {}).items()}
     manifest = Manifest(
         folder=path.parent,
         name=raw["name"],
@@ -345,5 +291,4 @@ def load_manifests(
                 found.append(Diagnostic(Span(str(path)), "name-taken", message, "choose another name"))
             elif manifest:
                 manifests[manifest.name] = manifest
-                found.extend(name_inconsistencies(manifest.name, path))
     return manifests, tuple(found)

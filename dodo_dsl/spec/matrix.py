@@ -1,19 +1,173 @@
-"""``matrix``: an instance of a spec for each choice of values, which replace placeholders as ``${matrix.light}``."""
+"""``matrix``: an instance of a spec for each choice of values, which replace placeholders as ``${matrix.light}``.
 
+Placeholders of ``vary`` are of the same form.
+"""
+
+import functools
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from collections.abc import Mapping as Values
 from dataclasses import dataclass
 
-from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.source import Mapping, Node, Scalar, Sequence
-from dodo_dsl.spec.placeholders import MATRIX, Placeholders
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
+
+MATRIX = "matrix"
+_MAX_ATTEMPT = 200
+_TYPOGRAPHIC = "\u2018\u2019\u201a\u201c\u201d\u201e\u00ab\u00bb\u2039\u203a"
+
+
+def without(node: Mapping, key: str) -> Mapping:
+    return Mapping(node.span, {name: entry for name, entry in node.entries.items() if name != key}, node.tag)
+
+
+def _written(node: Node) -> str:
+    """A scalar, or what is meant as one: ``{vary.light}`` is a mapping with an empty value; empty for other nodes."""
+    if isinstance(node, Scalar):
+        return node.text
+    if isinstance(node, Mapping) and len(node.entries) == 1:
+        ((key, entry),) = node.entries.items()
+        return f"{{{key}}}" if isinstance(entry.value, Scalar) and not entry.value.text else ""
+    return ""
+
+
+@dataclass(frozen=True)
+class Placeholders:
+    """Those of one ``key`` of specs.
+
+    ``lacks`` is the message about a name that the key does not have, with ``{}`` for the name, and ``advice`` the hint
+    if it has no names at all; ``why_idle`` is what a name is for that nothing uses.
+    With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so
+    that problems are shown there and not at the placeholder.
+    """
+
+    key: str
+    lacks: str
+    advice: str
+    why_idle: str
+    points_at_value: bool = False
+
+    @functools.cached_property
+    def _one(self) -> re.Pattern[str]:
+        return re.compile(rf"\$\{{{self.key}\.(?P<name>[a-z][a-z0-9-]*)\}}")
+
+    @functools.cached_property
+    def _near(self) -> re.Pattern[str]:
+        """A name, with the key or signs around it."""
+        return re.compile(rf"(?P<begin>\W*)(?P<key>{self.key}\.)?(?P<name>[a-z][a-z0-9-]*)(?P<end>\W*)")
+
+    @functools.cached_property
+    def _attempt(self) -> re.Pattern[str]:
+        return re.compile(rf"\$\{{\s*{self.key}\b[^}}]*\}}?")
+
+    def names(self, node: Node) -> set[str]:
+        """The names that placeholders below a node have."""
+        return {name for below in walk(node) for name in self.names_in(below)}
+
+    def names_in(self, node: Node) -> set[str]:
+        """The names that placeholders in a scalar have."""
+        text = node.text if isinstance(node, Scalar) and "${" in node.text else ""
+        return {match["name"] for match in self._one.finditer(text)}
+
+    def used(self, node: Mapping) -> set[str]:
+        """The names that a spec uses outside the key itself."""
+        others = (entry.value for key, entry in node.entries.items() if key != self.key)
+        return {name for value in others for name in self.names(value)}
+
+    def _known(self, node: Mapping) -> dict[str, Entry]:
+        written = node.get(self.key)
+        return written.entries if isinstance(written, Mapping) else {}
+
+    def idle(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
+        """Names without placeholders, unless ranges come from an extended test."""
+        used = self.used(node)
+        for name, entry in self._known(node).items():
+            if name not in used and (self.key == MATRIX or entry.key.file == node.span.file):
+                message = f"nothing uses ${{{self.key}.{name}}}, {self.why_idle}"
+                yield Diagnostic(entry.key, rule, message, severity="warning")
+
+    def unknown(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
+        """Placeholders of a spec with names that are not known, or without one."""
+        known = self._known(node)
+        for key, part in node.entries.items():
+            for one in walk(part.value) if key != self.key else ():
+                if name := self._meant(one, known):
+                    right = f"${{{self.key}.{name}}}"
+                    message = f"'{_written(one)[:60]}' is not a placeholder, expected {right}"
+                    yield Diagnostic(one.span, rule, message, f'write "{right}"')
+                elif isinstance(one, Scalar) and "${" in one.text:
+                    yield from self._unknown(one, known, rule)
+
+    def _meant(self, node: Node, known: Collection[str]) -> str:
+        """The known name in a value that is nothing but an attempt at its placeholder; empty for any other value."""
+        written = _written(node)
+        match = self._near.fullmatch(written) if known and len(written) <= _MAX_ATTEMPT else None
+        if match is None or match["name"] not in known:
+            return ""
+        around = match["begin"] + match["end"]
+        if self._one.search(match[0]):  # the signs around it may be meant, but for quotation marks as in books
+            return match["name"] if around.strip("${}") and not around.strip(_TYPOGRAPHIC + "${}") else ""
+        return match["name"] if match["key"] or "$" in around else ""
+
+    def _unknown(self, scalar: Scalar, known: Collection[str], rule: str) -> Iterator[Diagnostic]:
+        for attempt in self._attempt.finditer(scalar.text):
+            match = self._one.fullmatch(attempt[0])
+            if match is None:
+                message = f"'{attempt[0][:60]}' is not a placeholder, expected one such as ${{{self.key}.light}}"
+                yield Diagnostic(scalar.span, rule, message)
+            elif match["name"] not in known:
+                hint = did_you_mean(match["name"], known) if known else self.advice
+                yield Diagnostic(scalar.span, rule, self.lacks.format(match["name"]), hint)
+
+    def filled(self, node: Mapping, values: Values[str, Scalar]) -> Mapping:
+        """The node with values for the placeholders; nodes without placeholders stay the same objects.
+
+        A spec's matrix, which may be large, stays as it is: its values are filled where they are used.
+        """
+        filled = self._filled(without(node, MATRIX), values) if values else node
+        assert isinstance(filled, Mapping)
+        return Mapping(
+            node.span, {key: filled.entries.get(key, entry) for key, entry in node.entries.items()}, node.tag
+        )
+
+    def _filled(self, node: Node, values: Values[str, Scalar]) -> Node:
+        if isinstance(node, Scalar):
+            return self._scalar(node, values)
+        if isinstance(node, Sequence):
+            items = tuple(self._filled(item, values) for item in node.items)
+            same = all(a is b for a, b in zip(items, node.items, strict=True))
+            return node if same else Sequence(node.span, items, node.tag)
+        entries = {}
+        changed = False
+        for key, entry in node.entries.items():
+            value = self._filled(entry.value, values)
+            changed = changed or value is not entry.value
+            entries[key] = entry if value is entry.value else Entry(entry.key, value)
+        return Mapping(node.span, entries, node.tag) if changed else node
+
+    def _scalar(self, node: Scalar, values: Values[str, Scalar]) -> Scalar:
+        if "${" not in node.text:
+            return node
+        whole = self._one.fullmatch(node.text)
+        if whole:
+            chosen = values.get(whole["name"])
+            span = chosen.span if chosen and self.points_at_value else node.span
+            return Scalar(span, chosen.value, chosen.text, node.tag) if chosen else node
+        text = self._one.sub(lambda m: values[m["name"]].text if m["name"] in values else m[0], node.text)
+        return node if text == node.text else Scalar(node.span, text, text, node.tag)
+
 
 KEY = MATRIX
 MAX_INSTANCES = 2_000
 MAX_SLUG = 180
 
-PLACEHOLDERS = Placeholders(KEY, "the matrix has no dimension '{}'", "add it with its values under 'matrix'")
+PLACEHOLDERS = Placeholders(
+    KEY,
+    "the matrix has no dimension '{}'",
+    "add it with its values under 'matrix'",
+    "so its instances are all the same",
+)
 _NOT_SLUG = re.compile(r"[^a-z0-9]+")
 SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 """The slug of any test or instance."""
@@ -99,21 +253,6 @@ def _otherwise(text: str) -> str:
     )
 
 
-def problems(node: Mapping) -> Iterator[Diagnostic]:
-    """Placeholders of unknown dimensions, and dimensions without placeholders."""
-    entry = node.entries.get(KEY)
-    dimensions = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
-    wrong = list(PLACEHOLDERS.unknown(node, dimensions, "matrix-unknown"))
-    yield from wrong
-    if wrong:
-        return  # which may be meant to use any dimension
-    used = PLACEHOLDERS.used(node)
-    for name, dimension in dimensions.items():
-        if name not in used:
-            message = f"nothing uses ${{matrix.{name}}}, so its instances are all the same"
-            yield Diagnostic(dimension.key, "matrix-unused", message, severity="warning")
-
-
-def substitute(node: Node, choice: Choice) -> Node:
+def substitute(node: Mapping, choice: Choice) -> Mapping:
     """The node with the choice's values for the placeholders; nodes without placeholders stay the same objects."""
     return PLACEHOLDERS.filled(node, dict(choice.values))

@@ -75,30 +75,23 @@ def convert(value: object, unit: str) -> Decimal:
 
     Raises QuantityError for a bare number, an unknown unit and a unit of another dimension.
     """
+    expected = "a share" if unit == SHARE else f"a quantity in {unit}"
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise QuantityError(f"expected a quantity in {unit}", _example("1", unit))
-    text = str(value)
-    if len(text) > _MAX_TEXT:
-        raise QuantityError(f"'{text[:20]}...' is not a quantity in {unit}", _example("1", unit))
-    match = _QUANTITY.fullmatch(text)
-    if unit == SHARE and (not match or _DIMENSION.get(match["unit"] or SHARE) != "share"):
-        hint, fix = repaired(text, lambda other: _is_quantity(other, unit))
-        raise QuantityError(f"'{text}' is not a share", hint or _SHARES, fix)
-    if not match:
-        hint, fix = repaired(text, lambda other: _is_quantity(other, unit))
-        hint = hint or _pointed(text, unit) or _example("1", unit)
-        raise QuantityError(f"'{text}' is not a quantity in {unit}", hint, fix)
-    if match["unit"] is None and unit == SHARE:
-        return _converted(match["number"], SHARE, unit)
-    if match["unit"] is None:
+        raise QuantityError(f"expected {expected}", _example("1", unit))
+    text, siblings = str(value), _FACTORS[_DIMENSION[unit]]
+    match = _QUANTITY.fullmatch(text) if len(text) <= _MAX_TEXT else None
+    written = (match["unit"] or (SHARE if unit == SHARE else "")) if match else None
+    if match is None or (unit == SHARE and written not in siblings):
+        hint, fix = repaired(text, lambda other: _is_quantity(other, unit)) if len(text) <= _MAX_TEXT else ("", None)
+        shown = text if len(text) <= _MAX_TEXT else f"{text[:20]}..."
+        raise QuantityError(f"'{shown}' is not {expected}", hint or _pointed(text, unit) or _example("1", unit), fix)
+    if not written:
         raise QuantityError(f"'{text}' has no unit, expected {_a(_DIMENSION[unit])} in {unit}", _example(text, unit))
-    written = match["unit"]
     if written not in _DIMENSION:
-        siblings = _FACTORS[_DIMENSION[unit]]
-        if fix := unit_meant(written, text, siblings):
-            raise QuantityError(f"unknown unit '{written}'", f"did you mean '{fix.new.strip()}'?", fix)
-        raise QuantityError(f"unknown unit '{written}'", did_you_mean(written, siblings), only_fix(written, siblings))
-    if _DIMENSION[written] != _DIMENSION[unit]:
+        fix = unit_meant(written, text, siblings)
+        hint = f"did you mean '{fix.new.strip()}'?" if fix else did_you_mean(written, siblings)
+        raise QuantityError(f"unknown unit '{written}'", hint, fix or only_fix(written, siblings))
+    if written not in siblings:
         message = f"'{text}' is {_a(_DIMENSION[written])}, expected {_a(_DIMENSION[unit])} in {unit}"
         raise QuantityError(message, _example(match["number"], unit))
     return _converted(match["number"], written, unit)

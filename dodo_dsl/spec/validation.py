@@ -1,37 +1,36 @@
-"""JSON Schema errors as diagnostics at the line and column of their value."""
+"""A document against its JSON Schema: what is wrong, at its line and column, and the part of it that is valid.
 
+An error is explained by the keyword of the schema that it violates, and by the schema around that keyword.
+"""
+
+import contextlib
 import functools
 import itertools
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import PurePath
 from typing import Any
 
 import yaml
 
-from dodo_dsl import __version__
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix, shown_path
-from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
+from dodo_dsl import __version__, package_data
+from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, shown_path
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.registry import SUFFIX, as_file
-from dodo_dsl.spec.schema_errors import (
-    OF_COMPOSE,
-    UNIT,
-    WORDS,
-    check_quantity,
-    is_valid,
-    is_whole,
-    schema_of,
-    unindented,
-    without_consequences,
-)
-from dodo_dsl.spec.slips import boolean_meant, slip_in_key
+from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
 
-_HINT = "x-hint"
-_PAIRS = tuple(f" of '{key}'" for key in ("environment", "labels", "args", "sysctls"))
-"""What items of a list with NAME=value are called."""
+OF_COMPOSE = "application"
+REPORTED = "\0"
+"""The tag of values with a problem that is known already, which no file can have."""
+UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
+"""The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
+_WHOLE = "x-whole"
+"""Beside ``type: integer``, for JSON Schema takes 1.0 for a whole number."""
+_OF_TYPE = ("type", UNIT, _WHOLE)
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
     "array": "a list",
@@ -41,138 +40,235 @@ _TYPE_NAMES = {
     "boolean": "true or false",
     "null": "no value",
 }
+_MOST_READ = 200
+_DEFS = "#/$defs/"
+
+Path = tuple[str | int, ...]
 
 
 @functools.cache
-def _validator(name: str) -> Any:
-    from jsonschema import Draft202012Validator, ValidationError
-    from jsonschema.validators import extend
-
-    def is_quantity(_: Any, unit: str, instance: object, schema: dict[str, Any]) -> Iterator[Any]:
-        try:
-            check_quantity(unit, instance, schema)
-        except quantity.QuantityError as error:
-            yield ValidationError(str(error))
-
-    valid: set[tuple[int, str]] = set()
-
-    def properties(validator: Any, known: dict[str, Any], instance: Any, _: Any) -> Iterator[Any]:
-        """The keyword ``properties``; a value that was valid once is not looked at again, as instances have many."""
-        for key, schema in known.items() if isinstance(instance, dict) else ():
-            if key in instance and (known_as := (id(schema), repr(instance[key]))) not in valid:
-                error = None
-                for error in validator.descend(instance[key], schema, path=key, schema_path=key):
-                    yield error
-                if error is None:
-                    valid.add(known_as)
-
-    checker = Draft202012Validator.TYPE_CHECKER
-    if name != OF_COMPOSE:
-        checker = checker.redefine("integer", is_whole)
-    keywords = {
-        UNIT: is_quantity,
-        "properties": properties,
-        "required": _required_keys,
-        "dependentRequired": _companions,
-    }
-    return extend(Draft202012Validator, keywords, type_checker=checker)(schema_of(name))  # type: ignore[no-untyped-call]
+def schema_of(name: str) -> dict[str, Any]:
+    """``schemas/<name>.schema.json`` without what is for editors alone."""
+    text = (package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text, object_hook=None if name == OF_COMPOSE else _exact)
+    if (use := schema.get("$defs", {}).get("use")) is not None:
+        use.pop("allOf")  # parameters are read by their manifests
+        use["properties"]["with"].pop("additionalProperties")
+        use["required"] = ["uses"]  # what a test extends is merged here, of which editors know nothing
+        schema["else"].pop("properties")
+    return schema
 
 
-def _required_keys(_: Any, names: list[str], instance: Any, __: Any) -> Iterator[Any]:
-    """The keyword ``required``, with an error a key, whose ``validator_value`` is that key alone."""
-    from jsonschema import ValidationError
+@functools.cache
+def schema_of_keys(name: str) -> dict[str, Any]:
+    """The same without references within it."""
+    schema = schema_of(name)
 
-    for name in names if isinstance(instance, dict) else ():
-        if name not in instance:
-            yield ValidationError(f"{name!r} is missing", validator_value=name)
+    def inlined(part: Any) -> Any:
+        if isinstance(part, list):
+            return [inlined(each) for each in part]
+        if not isinstance(part, dict):
+            return part
+        reference = str(part.get("$ref", ""))
+        base = inlined(schema["$defs"][reference.removeprefix(_DEFS)]) if reference.startswith(_DEFS) else {}
+        return {**base, **{key: inlined(value) for key, value in part.items() if key != "$ref"}}
+
+    found: dict[str, Any] = inlined({key: value for key, value in schema.items() if key != "$defs"})
+    return found
 
 
-def _companions(_: Any, needed: dict[str, list[str]], instance: Any, __: Any) -> Iterator[Any]:
-    """The keyword ``dependentRequired``, with an error a key; its ``validator_value`` is what that stands without."""
-    from jsonschema import ValidationError
+def _exact(part: dict[str, Any]) -> dict[str, Any]:
+    return part | {_WHOLE: True} if part.get("type") == "integer" else part
 
-    for name, others in needed.items() if isinstance(instance, dict) else ():
-        for other in others if name in instance else ():
-            if other not in instance:
-                yield ValidationError(f"{name!r} without {other!r}", validator_value=(name, other))
+
+class _Quantity:
+    def __init__(self, schema: dict[str, Any], unit: str, _: object) -> None:
+        self._words, self._unit = schema.get(WORDS, ()), unit
+
+    def validate(self, instance: object) -> None:
+        if isinstance(instance, str | int | float) and instance not in self._words:
+            quantity.convert(instance, self._unit)
+
+
+class _Range:
+    def __init__(self, schema: dict[str, Any], bounds: list[str], _: object) -> None:
+        self._unit = schema[UNIT]
+        self._low, self._high = (quantity.convert(bound, self._unit) for bound in bounds)
+
+    def validate(self, instance: object) -> None:
+        with contextlib.suppress(quantity.QuantityError):  # of which the unit is wrong
+            if not self._low <= quantity.convert(instance, self._unit) <= self._high:
+                raise _OutOfRange
+
+
+class _OutOfRange(Exception):
+    """A quantity is beyond its bounds."""
+
+
+class _Whole:
+    def __init__(self, *_: object) -> None: ...
+
+    def validate(self, instance: object) -> None:
+        if isinstance(instance, float):
+            raise TypeError(instance)
+
+
+def _validator(schema: dict[str, Any]) -> Any:
+    import jsonschema_rs
+
+    return jsonschema_rs.Draft202012Validator(
+        schema, keywords={UNIT: _Quantity, RANGE: _Range, _WHOLE: _Whole}, retriever=_by_address
+    )
+
+
+def _by_address(address: str) -> dict[str, Any]:
+    """The schema that a reference means: ``application.schema.json``."""
+    text = (package_data.schemas() / address.rpartition("/")[2]).read_text(encoding="utf-8")
+    return json.loads(text, object_hook=_exact)  # type: ignore[no-any-return]
+
+
+@functools.cache
+def _validator_of(name: str) -> Any:
+    return _validator(schema_of(name))
+
+
+class Violation:
+    """A keyword of a schema that a value violates, where that is, and what is there.
+
+    ``wanted`` is the keyword's value. ``of_key`` is a key that is wrong itself, and not its value. ``span`` is that of
+    the value, or of its key where it is a collection. ``known`` are the keys that may stand there, ``is_closed`` if no
+    others may. ``inherited`` is what is next to it in a file that its own extends.
+    """
+
+    def __init__(self, error: Any, root: Node, name: str) -> None:
+        *steps, self.keyword = error.evaluation_path
+        self.path: Path = tuple(error.instance_path)
+        self.schema = _part(schema_of(name), steps)
+        self.wanted = error.kind.property if self.keyword == "required" else self.schema[self.keyword]
+        is_of_key = error.kind.name == "propertyNames"
+        self.instance: Any = error.kind.error.instance if is_of_key else error.instance
+        self.of_key: str | None = self.instance if is_of_key else None
+        around = self.schema if self.path else schema_of(name)
+        self.known, self.is_closed = around.get("properties", {}), around.get("additionalProperties") is False
+        self._find(root)
+
+    def _find(self, root: Node) -> None:
+        node, key, name = root, None, "the file"
+        beside: dict[str, Entry] = {}
+        for step in self.path:
+            if isinstance(node, Mapping):
+                beside, entry = node.entries, node.entries[str(step)]
+                node, key, name = entry.value, entry.key, f"'{step}'"
+            elif isinstance(node, Sequence):
+                node, key, name = node.items[int(step)], None, f"item {int(step) + 1} of {name}"
+        self.node, self.name = node, name
+        self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
+        self.key = name[1:-1] if name.startswith("'") else ""
+        self.text = node.text if isinstance(node, Scalar) else ""
+        self.entries: dict[str, Entry] = dict(node.entries) if isinstance(node, Mapping) else {}
+        self.inherited = {k: e for k, e in beside.items() if key is not None and e.key.file != key.file}
+
+    @property
+    def of_file(self) -> str:
+        """A hint for the name of a test, which is that of its file."""
+        file = PurePath(self.span.file).name
+        is_name = self.path == ("name",) and file.endswith(SUFFIX)
+        return as_file(file.removesuffix(SUFFIX), SUFFIX) if is_name else ""
+
+    @property
+    def places(self) -> Iterator[Path]:
+        """What is not valid: without it the rest is, as far as this violation goes."""
+        if self.keyword == "additionalProperties":
+            known = self.schema.get("properties", {})
+            yield from ((*self.path, name) for name in self.instance if name not in known)
+        elif self.path or self.of_key:
+            yield self.path if self.of_key is None else (*self.path, self.of_key)
+
+
+def _violations(document: object, root: Node, name: str) -> list[Violation]:
+    """At most MAX_PROBLEMS; of several about one value the first about its type alone."""
+    errors = itertools.islice(_validator_of(name).iter_errors(document), MAX_PROBLEMS)
+    found = [Violation(error, root, name) for error in errors]
+    typed = {v.path: v for v in reversed(found) if v.keyword in _OF_TYPE and v.of_key is None}
+    return [v for v in found if v.of_key or typed.get(v.path, v) is v]
+
+
+def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
+    root, part = schema, schema
+    for step in steps:
+        part = part[step]  # type: ignore[index]
+        if step == "$ref":
+            file, _, pointer = str(part).partition("#/")
+            root = _by_address(file) if file else root
+            part = functools.reduce(lambda below, key: below[key], pointer.split("/"), root)
+    return part
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
     """All violations of ``schemas/<schema>.schema.json``; tags are refused as well."""
-    found, document = list(_tags(node)), plain(node)
-    if is_valid(document, schema):
-        return found
-    validator = _validator(schema)
-    errors = itertools.islice(validator.iter_errors(document), MAX_PROBLEMS)
-    for error in without_consequences(error for error in errors if not _is_of_rules(error)):
-        place = _locate(node, error.absolute_path)
-        place.is_of_file = len(error.absolute_path) == 1
-        place.fits = validator.evolve(schema=error.schema).is_valid
-        if not error.absolute_path:
-            place.about = validator.schema.get("properties", {})
-        found.extend(_TRANSLATORS.get(error.validator, _fallback)(error, place))
-    return found
+    return valid_part(node, schema)[1]
 
 
-def _is_of_rules(error: Any) -> bool:
-    """Whether a rule says more: which type and unit a parameter's value has."""
-    path = error.absolute_path
-    return (
-        error.validator == "type" and len(path) == 4 and path[2] == "with" and isinstance(error.instance, dict | None)
-    )
+def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], set[Path]]:
+    """What of a document its schema allows, what is wrong with the rest, and where that is.
+
+    Values with the tag REPORTED are not judged. A service's parameters stay, as they are read by its manifest.
+    """
+    found, places, tagged = list[Diagnostic](), set[Path](), list[tuple[Path, Node]]()
+    document = _document(node, schema, (), tagged)
+    for path, one in tagged:
+        if "with" not in path:
+            places.add(path)
+        if one.tag != REPORTED:
+            tag = one.tag.replace("tag:yaml.org,2002:", "!!")
+            hint = "remove the tag, or write a text in quotes"
+            found.append(Diagnostic(one.span, "yaml-tag", f"tag '{tag}' is not supported", hint))
+    known = set(places)
+    for violation in _violations(document, node, schema):
+        missing = {(*violation.path, violation.wanted)} if violation.keyword == "required" else set()
+        if violation.path in known or missing & known:
+            continue
+        found += _TRANSLATORS.get(violation.keyword, _other)(violation)
+        places |= {*violation.places}
+    return _without(node, (), places), found, places
 
 
-def _tags(node: Node) -> Iterator[Diagnostic]:
+def _document(node: Node, schema: str, path: Path, tagged: list[tuple[Path, Node]]) -> Any:
+    """As ``plain``, but for numbers that JSON does not have: their texts, or for compose the largest one.
+
+    What is ``tagged`` is added to the list.
+    """
     if node.tag:
-        tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-        yield Diagnostic(
-            node.span, "yaml-tag", f"tag '{tag}' is not supported", "remove the tag, or write a text in quotes"
-        )
+        tagged.append((path, node))
     if isinstance(node, Mapping):
-        for entry in node.entries.values():
-            yield from _tags(entry.value)
-    elif isinstance(node, Sequence):
-        for item in node.items:
-            yield from _tags(item)
+        return {key: _document(entry.value, schema, (*path, key), tagged) for key, entry in node.entries.items()}
+    if isinstance(node, Sequence):
+        return [_document(item, schema, (*path, number), tagged) for number, item in enumerate(node.items)]
+    if isinstance(node.value, float) and not math.isfinite(node.value):
+        return sys.float_info.max if schema == OF_COMPOSE else node.text
+    return node.value
 
 
-class _Place:
-    """A node with the span to report: its own, or its key's where the value is a collection."""
-
-    def __init__(self, node: Node, key: Span | None, name: str) -> None:
-        self.node = node
-        self.span = node.span if isinstance(node, Scalar) and node.text else key or node.span
-        self.name = name
-        self.is_of_file = False
-        """Whether it is the file's own key."""
-        self.about: dict[str, Any] = {}
-        self.fits: Callable[[object], bool] = lambda _: True
-        """Whether another value would comply with what is wrong here."""
-        self.extended: dict[str, Entry] = {}
-        """What is next to it in a file that its own extends."""
-
-    @property
-    def entries(self) -> dict[str, Entry]:
-        return dict(self.node.entries) if isinstance(self.node, Mapping) else {}
-
-    def key(self, name: str) -> Span:
-        entries = self.entries
-        return entries[name].key if name in entries else self.span
+def without_places(node: Mapping, places: Collection[Path]) -> Mapping:
+    """The same without what is at these places."""
+    rest = _without(node, (), places)
+    return rest if isinstance(rest, Mapping) else Mapping(node.span, {})
 
 
-def _locate(root: Node, path: Iterable[str | int]) -> _Place:
-    node, key, name = root, None, "the file"
-    beside: dict[str, Entry] = {}
-    for step in path:
-        if isinstance(node, Mapping) and str(step) in node.entries:
-            entry, beside = node.entries[str(step)], node.entries
-            node, key, name = entry.value, entry.key, f"'{step}'"
-        elif isinstance(node, Sequence) and isinstance(step, int):
-            node, key, name = node.items[step], None, f"item {step + 1} of {name}"
-    place = _Place(node, key, name)
-    if key is not None:
-        place.extended = {other: entry for other, entry in beside.items() if entry.key.file != key.file}
-    return place
+def _without(node: Node, path: Path, places: Collection[Path]) -> Node | None:
+    if not places:
+        return node
+    if path in places:
+        return None
+    if isinstance(node, Mapping):
+        below = {key: (entry, _without(entry.value, (*path, key), places)) for key, entry in node.entries.items()}
+        return Mapping(
+            node.span, {key: Entry(entry.key, value) for key, (entry, value) in below.items() if value is not None}
+        )
+    if isinstance(node, Sequence):
+        items = (_without(item, (*path, number), places) for number, item in enumerate(node.items))
+        return Sequence(node.span, tuple(item for item in items if item is not None))
+    return node
 
 
 def _shown(value: object) -> str:
@@ -180,108 +276,8 @@ def _shown(value: object) -> str:
     return f"'{text if len(text) <= 60 else text[:57] + '...'}'"
 
 
-_USE = {"uses", "with"}
-
-
-def _additional(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    known = error.schema.get("properties", {})
-    beside = unindented(error.instance, known)
-    unknown = (name for name in error.instance if name not in known)
-    for name in itertools.islice(unknown, MAX_PROBLEMS):
-        found = slip_in_key(name, known, is_empty=error.instance[name] is None)
-        if found:
-            yield Diagnostic(place.key(name), "unknown-key", found.message, found.hint, fix=found.fix)
-        elif name not in beside:
-            message, fix = f"unknown key {_shown(name)}", only_fix(name, known, error.instance)
-            hint = did_you_mean(name, known)
-            if set(known) == _USE and not fix:
-                hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
-            yield Diagnostic(place.key(name), "unknown-key", message, hint, fix=fix)
-        elif name == next(key for key in beside if beside[key] == beside[name]):
-            message = f"{_shown(name)} is next to '{beside[name]}', which is empty"
-            hint = f"indent what belongs to '{beside[name]}'"
-            yield Diagnostic(place.key(name), "unknown-key", message, hint)
-
-
-def _required(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    missing = error.validator_value
-    known = error.schema.get("properties") or place.about
-    almost = next((key for key in error.instance if key not in known and only_fix(key, [missing])), None)
-    if almost is not None:
-        hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
-        yield Diagnostic(place.key(almost), "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
-        return
-    schema = known.get(missing, {})
-    schema = schema if isinstance(schema, dict) else {}
-    hint = f"write '{missing}: {schema['const']}'" if "const" in schema else schema.get("description", "")
-    if near := closest(place.name.strip("'"), place.extended):
-        hint = f"did you mean '{near[0]}' of {shown_path(place.extended[near[0]].key.file)}?"
-    about = () if error.absolute_path else (missing,)
-    yield Diagnostic(place.span, "missing-key", f"{place.name} has no key '{missing}'", hint, about=about)
-
-
-def _companion(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    name, missing = error.validator_value
-    yield Diagnostic(place.span, "missing-key", f"{place.name} has '{name}' without '{missing}'")
-
-
-def _type(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    if UNIT in error.schema:
-        yield from _quantity(error, place)
-        return
-    wanted = error.validator_value
-    names = [_TYPE_NAMES[w] for w in ([wanted] if isinstance(wanted, str) else wanted)]
-    found = "is empty" if error.instance is None else f"is {_TYPE_NAMES[_kind(error.instance)]}"
-    written = place.node.text if isinstance(place.node, Scalar) else ""
-    if error.instance == math.inf and written.isdigit():
-        found = f"has {len(written)} digits"
-    names = names if error.schema.get("x-expect") != _TYPE_NAMES["boolean"] else [_TYPE_NAMES["boolean"]]
-    message = f"{place.name} {found}, expected {' or '.join(names)}"
-    hint, fix = error.schema.get(_HINT) or _of_file(place) or _in_quotes(error, place), None
-    if not hint and wanted == "array" and "examples" in error.schema:
-        hint = f"write for example {place.name[1:-1]}: {_in_line(error.schema['examples'][0])}"
-    if wanted == "string" and place.name.endswith(_PAIRS) and isinstance(error.instance, dict) and error.instance:
-        name, value = next((key, entry.value) for key, entry in place.entries.items())
-        text = value.text if isinstance(value, Scalar) else "value"
-        hint = f'write {name}: "{text}" without the dash, or - {name}={text}'
-    if not hint:
-        hint, fix = _meant(error.instance, wanted, place)
-    span = place.span
-    if isinstance(place.node, Sequence) and wanted == "object":
-        span, hint = place.node.span, hint or "write 'key: value' in place of list items"
-    yield Diagnostic(span, "wrong-type", message, hint, fix=fix)
-
-
-def _of_file(place: _Place) -> str:
-    """A hint for the name of a test, which is that of its file; empty elsewhere."""
-    file = PurePath(place.span.file).name
-    is_name = place.is_of_file and place.name == "'name'" and file.endswith(SUFFIX)
-    return as_file(file.removesuffix(SUFFIX), SUFFIX) if is_name else ""
-
-
-def _in_quotes(error: Any, place: _Place) -> str:
-    """A hint for a number or a word that YAML takes for something else than the text that it is."""
-    is_text = error.validator == "enum" or error.validator_value == "string"
-    if not is_text or not isinstance(place.node, Scalar) or error.instance is None:
-        return ""
-    text = place.node.text
-    expected = error.schema.get("x-expect", "")
-    return f'write it in quotes: "{text}"' if place.fits(text) else f"write {expected}" if expected else ""
-
-
-def _meant(value: object, wanted: object, place: _Place) -> tuple[str, Fix | None]:
-    """A hint how to write a value of another type, and the only fix; empty and None for most values."""
-    if wanted == "boolean" and isinstance(value, str):
-        return boolean_meant(value)
-    if isinstance(wanted, list) and "boolean" in wanted and value in (0, 1):
-        meant = "true" if value else "false"
-        return f"write {meant}; compose takes no number here", Fix(str(value), meant)
-    if wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
-        return (f"write {value}, without quotation marks" if place.fits(int(value)) else ""), None
-    names = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
-    if wanted == "array" and names and place.name.startswith("'") and place.fits(names):
-        return f"write {place.name[1:-1]}: {_in_line(names)}", None
-    return "", None
+def _fits(schema: dict[str, Any], value: object) -> bool:
+    return bool(_validator(schema).is_valid(value))
 
 
 def _in_line(value: object) -> str:
@@ -289,103 +285,173 @@ def _in_line(value: object) -> str:
     return str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf)).strip()
 
 
-def _kind(value: object) -> str:
-    kinds: list[tuple[type, str]] = [(bool, "boolean"), (int, "integer"), (float, "number"), (str, "string")]
-    kinds += [(dict, "object"), (list, "array")]
-    return next((name for kind, name in kinds if isinstance(value, kind)), "null")
+def _additional(v: Violation) -> Iterator[Diagnostic]:
+    known = v.schema.get("properties", {})
+    for *_, name in itertools.islice(v.places, MAX_PROBLEMS):
+        is_empty = v.instance[name] is None
+        slip, hint, fix = unknown_key(str(name), known, v.instance, is_empty=is_empty)
+        if set(known) == {"uses", "with"} and not fix and not slip:
+            hint = f"parameters of a service belong into 'with': {{{name}: ...}}"
+        message = slip or f"unknown key {_shown(name)}"
+        yield Diagnostic(v.entries[str(name)].key, "unknown-key", message, hint, fix=fix)
 
 
-def _quantity(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    words = error.schema.get(WORDS, ())
-    if words and isinstance(error.instance, str) and error.instance[:1].isalpha():
-        message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(words)}"
-        hint = did_you_mean(error.instance, words)
-        yield Diagnostic(place.span, "wrong-value", message, hint if hint.startswith("did") else "")
+def _required(v: Violation) -> Iterator[Diagnostic]:
+    missing, known = v.wanted, v.known
+    unknown = {name: value for name, value in v.instance.items() if name not in known}
+    if missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
+        almost = next((name for name in unknown if only_fix(name, [missing])), "")
+        if not v.is_closed and almost:  # else it is reported as an unknown key
+            hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
+            yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
+        if v.is_closed or almost:
+            return
+    hint = _to_write(missing, known.get(missing, {}))
+    if near := closest(v.key, v.inherited):
+        hint = f"did you mean '{near[0]}' of {shown_path(v.inherited[near[0]].key.file)}?"
+    yield Diagnostic(v.span, "missing-key", f"{v.name} has no key '{missing}'", hint)
+
+
+def _to_write(key: str, schema: Any) -> str:
+    """A hint for a key that is missing: ``write 'kind: closed-loop'``."""
+    examples = schema.get("examples", schema.get("enum", ())) if isinstance(schema, dict) else ()
+    examples = [schema["const"]] if isinstance(schema, dict) and "const" in schema else examples
+    if not examples:
+        return ""
+    others = [_in_line(other).removesuffix("\n...") for other in schema.get("enum", ()) if other != examples[0]]
+    return f"write '{key}: {_in_line(examples[0]).removesuffix(chr(10) + '...')}'" + (
+        f", or {', '.join(others)}" if others else ""
+    )
+
+
+def _companion(v: Violation) -> Iterator[Diagnostic]:
+    for name, others in v.wanted.items():
+        for missing in others if name in v.instance else ():
+            if missing not in v.instance:
+                yield Diagnostic(v.span, "missing-key", f"{v.name} has '{name}' without '{missing}'")
+
+
+def _type(v: Violation) -> Iterator[Diagnostic]:
+    schema, value = v.schema, v.instance
+    if UNIT in schema:
+        yield from _quantity(v)
+        return
+    wanted = schema["type"]
+    names = [_TYPE_NAMES[each] for each in ([wanted] if isinstance(wanted, str) else wanted)]
+    found = _shown(v.text) if v.text else "empty"
+    if isinstance(value, dict | list):
+        found = _TYPE_NAMES["object" if isinstance(value, dict) else "array"]
+    if schema.get(EXPECT) == _TYPE_NAMES["boolean"]:
+        names = names[:1]
+    hint, fix = schema.get("x-hint") or v.of_file or _in_quotes(v), None
+    items = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
+    if hint or wanted is None:
+        pass
+    elif wanted == "array" and v.key and (items or "examples" in schema):
+        is_meant = items and not any(" " in item for item in items) and _fits(schema, items)
+        shown = items if is_meant else schema.get("examples", [None])[0]
+        hint = f"write {'' if is_meant else 'for example '}{v.key}: {_in_line(shown)}" if shown else ""
+    elif wanted == "boolean" and isinstance(value, str):
+        hint, fix = boolean_meant(value)
+    elif wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
+        hint = f"write {value}, without quotation marks" if _fits(schema, int(value)) else ""
+    span = v.span
+    if isinstance(v.node, Sequence) and wanted == "object":
+        span, hint = v.node.span, hint or "write 'key: value' in place of list items"
+    yield Diagnostic(span, "wrong-type", f"{v.name} is {found}, expected {' or '.join(names)}", hint, fix=fix)
+
+
+def _in_quotes(v: Violation) -> str:
+    """A hint for a number or a word that YAML takes for something else than the text that it is."""
+    is_text = v.keyword == "enum" or v.schema.get("type") == "string"
+    if not is_text or not v.text or v.instance is None:
+        return ""
+    expected = v.schema.get(EXPECT, "")
+    is_right = _fits(v.schema, v.text)
+    return f'write it in quotes: "{v.text}"' if is_right else f"write {expected}" if expected else ""
+
+
+def _quantity(v: Violation) -> Iterator[Diagnostic]:
+    words = v.schema.get(WORDS, ())
+    if words and isinstance(v.instance, str) and v.text[:1].isalpha():
+        yield from _choices(v)
         return
     try:
-        quantity.convert(place.node.text if isinstance(place.node, Scalar) else None, error.schema[UNIT])
+        quantity.convert(v.text if isinstance(v.node, Scalar) else None, v.schema[UNIT])
     except quantity.QuantityError as problem:
-        yield Diagnostic(place.span, "wrong-unit", f"{place.name}: {problem}", problem.hint, fix=problem.fix)
+        yield Diagnostic(v.span, "wrong-unit", f"{v.name}: {problem}", problem.hint, fix=problem.fix)
 
 
-def _choices(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    choices = [str(v) for v in error.validator_value]
-    message = f"{_shown(error.instance)} is not a value of {place.name}, expected {', '.join(choices)}"
-    plain_ones = [choice for choice in choices if resolve(choice) == choice]
-    hint = did_you_mean(str(error.instance), plain_ones)
-    hint = hint if hint.startswith("did") else ""
-    fix = only_fix(str(error.instance), plain_ones)
-    if isinstance(place.node, Scalar) and place.node.text in choices:
-        hint, fix = _in_quotes(error, place), None
-    if "#" in str(error.instance):
-        hint, fix = "a comment begins with ' #', after a space", None
-    yield Diagnostic(place.span, "wrong-value", message, hint, fix=fix)
+def _choices(v: Violation) -> Iterator[Diagnostic]:
+    choices = [str(v) for v in v.schema.get("enum") or v.schema[WORDS]]
+    message = f"{_shown(v.instance)} is not a value of {v.name}, expected {', '.join(choices)}"
+    near = [choice for choice in closest(str(v.instance), choices) if resolve(choice) == choice]
+    hint, fix = did_you_mean(str(v.instance), near), only_fix(str(v.instance), near)
+    if not near:
+        hint, fix = repaired(str(v.instance), choices.__contains__)
+    if v.text in choices:
+        hint, fix = _in_quotes(v), None
+    yield Diagnostic(v.span, "wrong-value", message, hint, fix=fix)
 
 
-def _const(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    message = f"{place.name} is {_shown(error.instance)}, expected {error.validator_value}"
-    hint = f"write '{place.name[1:-1]}: {error.validator_value}'"
-    if place.name == "'dodo'" and type(error.instance) is int and error.instance > error.validator_value:
-        message = f"the file is of language version {error.instance}, the installed DoDo {__version__} reads "
-        message += f"{error.validator_value}"
-        hint = f"install a DoDo that reads version {error.instance}, or, if the number is a mistake, {hint}"
-    yield Diagnostic(place.span, "wrong-value", message, hint)
+def _const(v: Violation) -> Iterator[Diagnostic]:
+    message = f"{v.name} is {_shown(v.instance)}, expected {v.wanted}"
+    hint = f"write '{v.key}: {v.wanted}'"
+    if v.key == "dodo" and type(v.instance) is int and v.instance > v.wanted:
+        message = f"the file is of language version {v.instance}, the installed DoDo {__version__} reads "
+        message += f"{v.wanted}"
+        hint = f"install a DoDo that reads version {v.instance}, or, if the number is a mistake, {hint}"
+    yield Diagnostic(v.span, "wrong-value", message, hint)
 
 
-_MOST_READ = 200
+def _pattern(v: Violation) -> Iterator[Diagnostic]:
+    value = str(v.instance)
+    expected = v.schema.get(EXPECT, f"a string that matches {v.schema.get('pattern')}")
+    span = v.span if v.of_key is None else v.entries[v.of_key].key
+    name = re.sub(r"[^a-z0-9]+", "-", value[:_MOST_READ].lower()).strip("-")[:40]
+    is_text = name != value and resolve(name) == name != "" and _fits(v.schema, name)
+    hint = v.of_file or (f"for example '{name}'" if is_text else "")
+    yield Diagnostic(span, "wrong-value", f"{_shown(value)} is not allowed here, expected {expected}", hint)
 
 
-def _pattern(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    expected = error.schema.get("x-expect", f"a string that matches {error.schema.get('pattern')}")
-    span = place.span
-    if "propertyNames" in error.absolute_schema_path:
-        span = place.key(str(error.instance))
-    hint = _of_file(place)
-    if not hint and isinstance(error.instance, str):
-        name = re.sub(r"[^a-z0-9]+", "-", error.instance[:_MOST_READ].lower()).strip("-")[:40]
-        is_text = name != error.instance and resolve(name) == name != ""
-        hint = f"for example '{name}'" if is_text and place.fits(name) else ""
-    yield Diagnostic(span, "wrong-value", f"{_shown(error.instance)} is not allowed here, expected {expected}", hint)
+def _bounds(v: Violation) -> Iterator[Diagnostic]:
+    schema = v.schema
+    low, high = schema.get(RANGE) or (schema.get("minimum"), schema.get("maximum"))
+    shown = v.text if len(v.text) <= 60 else f"{v.text[:57]}..."
+    yield Diagnostic(v.span, "out-of-range", f"{v.name} is {shown}, expected {low} to {high}")
 
 
-def _bounds(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    low, high = error.schema.get("minimum"), error.schema.get("maximum")
-    message = f"{place.name} is {_shown(error.instance)[1:-1]}, expected {low} to {high}"
-    yield Diagnostic(place.span, "out-of-range", message)
-
-
-def _too_long(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    if "x-expect" in error.schema:
-        yield from _pattern(error, place)
+def _too_many(v: Violation) -> Iterator[Diagnostic]:
+    if EXPECT in v.schema:
+        yield from _pattern(v)
         return
-    message = f"{place.name} has {len(error.instance)} characters, expected at most {error.validator_value}"
-    yield Diagnostic(place.span, "too-large", message)
+    what = "characters" if v.keyword == "maxLength" else "entries"
+    message = f"{v.name} has {len(v.instance)} {what}, expected at most {v.wanted}"
+    yield Diagnostic(v.span, "too-large", message)
 
 
-def _too_few(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    expected = "a string" if isinstance(error.instance, str) else "at least one entry"
-    yield Diagnostic(place.span, "missing-key", f"{place.name} is empty, expected {expected}")
+def _too_few(v: Violation) -> Iterator[Diagnostic]:
+    expected = "a string" if v.keyword == "minLength" else "at least one entry"
+    yield Diagnostic(v.span, "missing-key", f"{v.name} is empty, expected {expected}")
 
 
-def _too_many(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    message = f"{place.name} has {len(error.instance)} entries, expected at most {error.validator_value}"
-    yield Diagnostic(place.span, "too-large", message)
+def _other(v: Violation) -> Iterator[Diagnostic]:
+    message = f"{v.name} does not fit '{v.keyword}' of its schema: {_shown(v.wanted)}"
+    yield Diagnostic(v.span, "wrong-value", message)
 
 
-def _fallback(error: Any, place: _Place) -> Iterator[Diagnostic]:
-    yield Diagnostic(place.span, "wrong-value", f"{place.name}: {error.message[:200]}")
-
-
-_TRANSLATORS: dict[str, Callable[[Any, _Place], Iterator[Diagnostic]]] = {
+_TRANSLATORS: dict[str, Callable[[Violation], Iterator[Diagnostic]]] = {
     "additionalProperties": _additional,
     "required": _required,
     "dependentRequired": _companion,
     "type": _type,
+    _WHOLE: _type,
     UNIT: _quantity,
+    RANGE: _bounds,
     "enum": _choices,
     "const": _const,
     "pattern": _pattern,
-    "maxLength": _too_long,
+    "maxLength": _too_many,
     "minimum": _bounds,
     "maximum": _bounds,
     "maxProperties": _too_many,

@@ -10,10 +10,16 @@ from decimal import Decimal
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.placeholders import Placeholders
+from dodo_dsl.spec.matrix import Placeholders
 
 KEY = "vary"
-PLACEHOLDERS = Placeholders(KEY, "'vary' has no range '{}'", "add it with its range under 'vary'", points_at_value=True)
+PLACEHOLDERS = Placeholders(
+    KEY,
+    "'vary' has no range '{}'",
+    "add it with its range under 'vary'",
+    "so a search would vary nothing by it",
+    points_at_value=True,
+)
 Values = dict[str, Scalar]
 """One value of each range, by its name."""
 
@@ -129,18 +135,3 @@ def _of_numbers(middle: Scalar, low: Scalar, high: Scalar, unit: str) -> Iterato
         yield Diagnostic(low.span, "vary-range", f"'from' is {low.text}, expected less than 'to', {high.text}")
     elif not numbers["from"] <= numbers["nominal"] <= numbers["to"]:
         yield Diagnostic(middle.span, "vary-range", f"'nominal' is {middle.text}, expected {low.text} to {high.text}")
-
-
-def problems(node: Mapping) -> Iterator[Diagnostic]:
-    """Placeholders of unknown ranges, and ranges without placeholders, unless they come from an extended test."""
-    entry = node.entries.get(KEY)
-    ranges = entry.value.entries if entry and isinstance(entry.value, Mapping) else {}
-    wrong = list(PLACEHOLDERS.unknown(node, ranges, "vary-unknown"))
-    yield from wrong
-    if wrong:
-        return  # which may be meant to use any range
-    used = PLACEHOLDERS.used(node)
-    for name, one in ranges.items():
-        if name not in used and one.key.file == node.span.file:
-            message = f"nothing uses ${{vary.{name}}}, so a search would vary nothing by it"
-            yield Diagnostic(one.key, "vary-unused", message, severity="warning")

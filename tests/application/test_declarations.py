@@ -7,7 +7,7 @@ import pytest
 from dodo_dsl.compiler import load
 from dodo_dsl.compiler import plan as planned
 from dodo_dsl.plan.model import ApplicationService
-from dodo_dsl.spec.schema_errors import written_schema
+from dodo_dsl.spec.validation import schema_of
 from tests.application.compiled import FILE, repository
 
 COMPOSE = """\
@@ -77,8 +77,8 @@ def test_they_are_about_the_files_that_they_name(folder: Path) -> None:
 
 
 def test_a_service_has_the_keys_of_x_dodo() -> None:
-    declared = written_schema("deployment")["properties"]["application"]["properties"]["services"]
-    keys = written_schema("application")["$defs"]["service"]["properties"]["x-dodo"]["properties"]
+    declared = schema_of("deployment")["properties"]["application"]["properties"]["services"]
+    keys = schema_of("application")["$defs"]["service"]["properties"]["x-dodo"]["properties"]
     assert set(declared["additionalProperties"]["properties"]) == {*keys, "process"}
 
 

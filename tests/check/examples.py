@@ -37,7 +37,15 @@ FILES = {
     "docker-compose.yml": "services: {driver: {image: driver, command: --cid=111}}\n",
 }
 EXAMPLE = "tests/example/example.dodo.yml"
-MERGED = (EXAMPLE, "dodo.yml")
+MANIFEST = "my_services/judge/service.yml"
+FILES[MANIFEST] = """\
+name: judge
+layers: [evaluation]
+image: judge
+process: [python, -m, my_services.judge]
+description: Judges the steering.
+"""
+MERGED = (EXAMPLE, "dodo.yml", MANIFEST)
 _HEADER = re.compile(r"^# (?P<path>[\w./-]+(\.\w+|/))\n", re.MULTILINE)
 
 
@@ -45,7 +53,8 @@ def files(example: str) -> dict[str, str]:
     """An example's files by path; the test and the deployment have the keys that the example leaves out."""
     first, *rest = _HEADER.split(example + "\n")
     written = {EXAMPLE: first, **dict(zip(rest[::3], rest[2::3], strict=True))}
-    return {**FILES, **{path: with_keys_of(path, text) if path in MERGED else text for path, text in written.items()}}
+    others = {path: text for path, text in FILES.items() if f"{path}/" not in written}
+    return {**others, **{path: with_keys_of(path, text) if path in MERGED else text for path, text in written.items()}}
 
 
 def with_keys_of(path: str, text: str) -> str:

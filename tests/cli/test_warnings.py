@@ -142,7 +142,7 @@ def test_one_warning_of_several_tests_is_shown_once_with_their_names_or_number(t
 
 def test_the_same_warning_in_the_files_of_several_tests_is_shown_once() -> None:
     def warning(file: str, line: int = 7, severity: Literal["error", "warning"] = "warning") -> Diagnostic:
-        return Diagnostic(Span(f"tests/{file}", line), "clock-answers", "no message", severity=severity)
+        return Diagnostic(Span(f"tests/{file}", line), "clock-timed", "no message", severity=severity)
 
     same = [warning(f"{name}.dodo.yml", line) for line, name in enumerate("abcd", 1)]
     other = [warning("c.json"), warning("d.json"), warning("a.dodo.yml", 9, "error"), warning("b.dodo.yml", 9, "error")]

@@ -254,7 +254,7 @@ def _files(service: Document, folder: Path, repository: Path) -> Iterator[str]:
 
 def _content(about: Document, folder: Path, repository: Path) -> Iterator[str]:
     yield from _others(about, {"file", "content", "environment", "labels"}, "")
-    if about.get("file") and not _is_own(str(about["file"]), folder, repository):
+    if about.get("file", "/dev/null") != "/dev/null" and not _is_own(str(about["file"]), folder, repository):
         yield f"file: {about['file']}"
     if re.match("CI_|DODO_", str(about.get("environment") or "")):
         yield f"environment: {about['environment']}"

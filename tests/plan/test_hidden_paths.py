@@ -1,6 +1,5 @@
 """What no application sees, by the folders and files that DoDo knows."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -17,7 +16,6 @@ environment:
   camera: {uses: virtual-camera, with: {map-path: ../maps/plain}}
 evaluation:
   boxes: {uses: object-detection, with: {truth: "../truths/${matrix.x}.json"}}
-baseline: ../results.json
 """
 CHECK = {"name": "mean", "value": 0, "limit": {"max": 1}}
 RESULTS = {"dodo": "results", "version": 1, "tests": [{"slug": f"sil-a--x-{x}", "checks": [CHECK]} for x in "ab"]}
@@ -33,7 +31,6 @@ def compiled(root: Path, spec: str, application: str, deployment: str = "") -> c
         "own/README.md": "",
         ".git/config": "",
         "my.odvd": "",
-        str(beside / "results.json"): json.dumps(RESULTS),
     }
     files |= {str(beside / name): "{}" for name in ("maps/plain/map.json", "truths/a.json", "truths/b.json")}
     if deployment:
@@ -46,7 +43,7 @@ def compiled(root: Path, spec: str, application: str, deployment: str = "") -> c
     )
 
 
-NAMED = ("maps/plain", "results.json", "sil-a/sil-a.dodo.yml", "truths/a.json", "truths/b.json")
+NAMED = ("maps/plain", "sil-a/sil-a.dodo.yml", "truths/a.json", "truths/b.json")
 
 
 @pytest.mark.parametrize(

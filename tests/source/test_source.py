@@ -116,11 +116,3 @@ def test_a_tag_is_kept() -> None:
     value = node.get("a")
     assert isinstance(value, Scalar)
     assert value.tag == "tag:yaml.org,2002:python/object:os.system"
-
-
-def test_a_text_of_several_words_behind_an_anchor_that_nothing_refers_to() -> None:
-    _, problems = parse("a: &Drive to the line\nb: &one word\nc: &two two words\nd: *two\ne: &Wide to see\n", "x.yml")
-    assert [(d.severity, d.span.line, d.message.split()[0]) for d in problems] == [
-        ("warning", 1, "'&Drive'"),
-        ("warning", 5, "'&Wide'"),
-    ]

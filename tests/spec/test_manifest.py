@@ -83,7 +83,7 @@ def test_what_depends_on_unknown_parameters(tmp_path: Path) -> None:
     manifest, problems = load_manifest(write(tmp_path, "own", text))
     assert manifest is None
     assert sorted(problem.message for problem in problems) == [
-        "'driving' is for lists, but 'fast' is of type boolean",
+        "'driving' is for parameters of type list, but 'fast' is of type boolean",
         *["'when' names the unknown parameter 'kin'"] * 2,
     ]
 

@@ -66,7 +66,7 @@ def test_when_pictures_are_kept(tmp_path: Path, record: str, frames: tuple[str, 
         ("resources: {max-memory: 1 kB}", ResourceLimits(), ["out-of-range"]),
         ("resources: {max-memory: 200}", ResourceLimits(), ["wrong-unit"]),
         ("resources: {memory: 200 MB}", ResourceLimits(), ["unknown-key"]),
-        ("resources: {}", ResourceLimits(), ["missing-key"]),
+        ("resources: {}", None, ["missing-key"]),
     ],
 )
 def test_limits_of_resources(

@@ -32,7 +32,6 @@ from dodo_dsl.report.viewer.encoded import packed, script, shown
 from dodo_dsl.report.viewer.names import BEFORE, DATA, LOGS, PAGE, SHARED
 from dodo_dsl.report.viewer.record import read
 from dodo_dsl.report.viewer.recorded import Channel, RecordedTest
-from dodo_dsl.spec.model import BASELINE
 
 _OF_THE_TEST = {SLOW_ANSWERS: "max", SAMPLE_TIMES: "sample-times"}
 """Checks of no evaluator, and the key of the test's ``response`` that asks for them."""
@@ -100,8 +99,6 @@ def limit_places(plan: Plan, check: str, recorded: Parameters) -> Iterator[tuple
     """Where the spec sets the limit of a check, each with the parameter's name, empty for a service's default."""
     if check in _OF_THE_TEST and "response" in plan.source_map:
         yield _OF_THE_TEST[check], plan.source_map["response"]
-    if check.startswith(BASELINE) and "baseline" in plan.source_map:
-        yield "", plan.source_map["baseline"]
     for name, flag in _OF_USE.items():
         if check.startswith(f"{name}-") and "resources" in plan.source_map:
             yield flag, plan.source_map["resources"]

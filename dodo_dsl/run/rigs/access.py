@@ -23,11 +23,10 @@ from dodo_dsl.run.rigs.leases import devices_in, leased, release, taken
 from dodo_dsl.run.rigs.permission import Motion, motion_of
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import Argument, resolved
+from dodo_dsl.spec.arguments import Argument, ValueProblem, convert, default_value, resolved
 from dodo_dsl.spec.manifest import Manifest, Parameter, load_manifests
 from dodo_dsl.spec.model import Spec, Use
 from dodo_dsl.spec.rig import CIRCLE, MEMORY, Rig
-from dodo_dsl.spec.values import ValueProblem, convert, default_value
 
 MANUAL = ("python", "-m", "services.gantry.manual")
 PATIENCE_S = 180.0

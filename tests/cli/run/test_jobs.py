@@ -75,7 +75,7 @@ def test_a_changed_isolation_is_checked_and_built(folder: Path) -> None:
 
 def test_any_rig_of_a_pool_is_one_job(folder: Path) -> None:
     """The compiled folders are those of the instances; name, report and history are the test's."""
-    text = "level: hil\nrig: {any: static}\n"
+    text = "level: hil\nrig: static\n"
     examples.write(text, folder)
     path = folder / "dodo.yml"
     rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
@@ -94,7 +94,7 @@ def test_any_rig_of_a_pool_is_one_job(folder: Path) -> None:
 def test_samples_on_any_rig_of_a_pool_are_a_job_each(folder: Path) -> None:
     vary = "vary: {wait: {from: 40 s, to: 50 s, nominal: 40 s}}\n"
     track = "evaluation:\n  track: {uses: collision, with: {goal: finish, max-time: '${vary.wait}'}}\n"
-    examples.write(f"level: hil\nrig: {{any: static}}\n{vary}{track}", folder)
+    examples.write(f"level: hil\nrig: static\n{vary}{track}", folder)
     path = folder / "dodo.yml"
     rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
     path.write_text(f"{path.read_text()}rigs: {rigs}\n")

@@ -101,7 +101,7 @@ def test_everything(tmp_path: Path) -> None:
         ),
         (
             "rigs: {a: {kind: static, emulated: maybe}}",
-            ("wrong-type", "'emulated' is a string, expected true or false"),
+            ("wrong-type", "'emulated' is 'maybe', expected true or false"),
         ),
         ("rigs: {a: {kind: static, emulated: false}}", ("missing-key", "'a' has no key 'cid'")),
         (

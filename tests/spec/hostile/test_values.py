@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.spec.deployment import load_deployment
-from dodo_dsl.spec.model import MAX_SERVICES
 from tests.check import examples
 from tests.emit.readers import compose
 
@@ -39,6 +38,7 @@ TEXTS = [
     "::error::no %0A",
     "\U0001f697, \u00e9, \u05d0",
 ]
+MAX_SERVICES = 100
 quick = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 

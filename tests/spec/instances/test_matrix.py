@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.matrix import MAX_INSTANCES, PLACEHOLDERS, SLUG, choices, problems, substitute
+from dodo_dsl.spec.matrix import MAX_INSTANCES, PLACEHOLDERS, SLUG, choices, substitute
 from tests.source.nodes import mapping
 
 
@@ -35,24 +35,18 @@ def test_names_of_folders_are_unique_or_reported(values: list[str]) -> None:
     assert wrong or (len(set(slugs)) == len(slugs) and all(SLUG.fullmatch(f"t{slug}") for slug in slugs))
 
 
-def test_values_that_are_alike() -> None:
-    _, wrong = choices(mapping("matrix: {yaw: [+1 deg, -1 deg, '!']}"))
-    assert [problem.message for problem in wrong] == [
-        "'-1 deg' and '+1 deg' of 'yaw' would both be called '1-deg'",
-        "'!' has no letter or digit, so it cannot name an instance of 'yaw'",
-    ]
-
-
-def test_too_many_instances() -> None:
-    ten = "[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]"
-    found, (problem,) = choices(mapping(f"matrix: {{a: {ten}, b: {ten}, c: {ten}, d: [0, 1, 2]}}"))
-    assert len(found) == 1
-    assert problem.message == f"the matrix has 3000 instances, expected at most {MAX_INSTANCES}"
-
-
-def test_names_that_are_too_long() -> None:
-    _, (problem,) = choices(mapping(f"matrix: {{a: [{'x' * 180}]}}"))
-    assert problem.rule == "matrix-size"
+@pytest.mark.parametrize(
+    ("text", "rules"),
+    [
+        ("{yaw: [+1 deg, -1 deg, '!']}", ["matrix-value", "matrix-value"]),
+        (f"{{a: {list(range(20))}, b: {list(range(20))}, c: {list(range(6))}}}", ["matrix-size"]),
+        (f"{{a: [{'x' * 180}]}}", ["matrix-size"]),
+    ],
+)
+def test_values_that_cannot_name_instances(text: str, rules: list[str]) -> None:
+    found, wrong = choices(mapping(f"matrix: {text}"))
+    assert [problem.rule for problem in wrong] == rules
+    assert len(found) <= MAX_INSTANCES
 
 
 def test_placeholders_and_their_problems() -> None:
@@ -60,15 +54,8 @@ def test_placeholders_and_their_problems() -> None:
         "matrix: {a: [1], b: [2]}\nx: ${matrix.a}\ny: ['at ${matrix.c}', '${ matrix.a }', '${matrix}', '${HOME}']\n"
     )
     assert PLACEHOLDERS.names(node) == {"a", "c"}
-    assert [(problem.rule, problem.message) for problem in problems(node)] == [
-        ("matrix-unknown", "the matrix has no dimension 'c'"),
-        ("matrix-unknown", "'${ matrix.a }' is not a placeholder, expected ${matrix.a}"),
-        ("matrix-unknown", "'${matrix}' is not a placeholder, expected one such as ${matrix.light}"),
-    ]
-    unused = mapping("matrix: {a: [1], b: [2]}\nx: ${matrix.a}\n")
-    assert [(problem.rule, problem.message) for problem in problems(unused)] == [
-        ("matrix-unused", "nothing uses ${matrix.b}, so its instances are all the same")
-    ]
+    assert [problem.span.column for problem in PLACEHOLDERS.unknown(node, "matrix-unknown")] == [5, 23, 40]
+    assert [problem.span.column for problem in PLACEHOLDERS.idle(node, "matrix-unused")] == [18]
 
 
 def test_substitution() -> None:

@@ -5,7 +5,7 @@ from decimal import Decimal
 import pytest
 
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.vary import PLACEHOLDERS, Range, corners, nominal, problems, read
+from dodo_dsl.spec.vary import PLACEHOLDERS, Range, corners, nominal, read
 from tests.source.nodes import mapping
 
 RANGES = (
@@ -18,13 +18,6 @@ def ranges(text: str = RANGES) -> tuple[Range, ...]:
     found, wrong = read(mapping(f"vary: {text}"))
     assert wrong == []
     return found
-
-
-def said(text: str) -> list[tuple[str, str, str]]:
-    """The rule, what it underlines, and the message."""
-    line = f"vary: {{a: {text}}}"
-    _, wrong = read(mapping(line))
-    return [(d.rule, line[d.span.column - 1 :][: d.span.length], d.message) for d in wrong]
 
 
 def test_ranges_in_order() -> None:
@@ -60,27 +53,23 @@ def test_every_end_is_in_a_corner_and_the_rest_is_nominal() -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("{from: 2, to: 1, nominal: 1}", ("vary-range", "2", "'from' is 2, expected less than 'to', 1")),
-        ("{from: 1, to: 2, nominal: 3}", ("vary-range", "3", "'nominal' is 3, expected 1 to 2")),
-        ("{from: 1 m, to: 2 m, nominal: 99 cm}", ("vary-range", "99 cm", "'nominal' is 99 cm, expected 1 m to 2 m")),
-        ("{from: 1 m, to: 2, nominal: 1 m}", ("wrong-unit", "2", "'to': '2' has no unit, expected a length in m")),
-        ("{from: 1, to: 2 m, nominal: 1}", ("wrong-unit", "2 m", "'to': '2 m' is not a number without a unit")),
-        (
-            "{from: .inf, to: 2, nominal: 1}",
-            ("vary-range", ".inf", "'from' is '.inf', expected a number or a quantity"),
-        ),
-        ("{among: [x, y], nominal: z}", ("vary-range", "z", "'nominal' is 'z', expected one of x, y")),
-        ("{among: [x, x], nominal: x}", ("vary-range", "x", "'x' stands twice in 'among'")),
-        ("{from: 1, nominal: 1}", ("missing-key", "a", "range 'a' has no 'to'")),
-        ("{among: [x, y]}", ("missing-key", "a", "range 'a' has no 'nominal'")),
-        (
-            "{from: 1, to: 2, among: [1], nominal: 1}",
-            ("vary-range", "a", "range 'a' has 'among' beside 'from' or 'to', expected one of them"),
-        ),
+        ("{from: 2, to: 1, nominal: 1}", "vary-range 2,"),
+        ("{from: 1, to: 2, nominal: 3}", "vary-range 3}"),
+        ("{from: 1 m, to: 2 m, nominal: 99 cm}", "vary-range 99"),
+        ("{from: 1 m, to: 2, nominal: 1 m}", "wrong-unit 2,"),
+        ("{from: 1, to: 2 m, nominal: 1}", "wrong-unit 2 m"),
+        ("{from: .inf, to: 2, nominal: 1}", "vary-range .inf"),
+        ("{among: [x, y], nominal: z}", "vary-range z"),
+        ("{among: [x, x], nominal: x}", "vary-range x], "),
+        ("{from: 1, nominal: 1}", "missing-key a:"),
+        ("{among: [x, y]}", "missing-key a:"),
+        ("{from: 1, to: 2, among: [1], nominal: 1}", "vary-range a:"),
     ],
 )
-def test_problems_of_a_range(text: str, expected: tuple[str, str, str]) -> None:
-    assert said(text) == [expected]
+def test_problems_of_a_range(text: str, expected: str) -> None:
+    line = f"vary: {{a: {text}}}"
+    _, (problem,) = read(mapping(line))
+    assert f"{problem.rule} {line[problem.span.column - 1 :]}".startswith(expected)
 
 
 def test_a_range_with_a_problem_keeps_its_nominal_value() -> None:
@@ -88,47 +77,29 @@ def test_a_range_with_a_problem_keeps_its_nominal_value() -> None:
     assert (one.nominal.text, one.ends) == ("1", ())
 
 
-def test_placeholders_and_their_problems() -> None:
-    node = mapping(f"vary: {RANGES}\nx: ${{vary.light}}\ny: ['at ${{vary.c}}', '${{ vary.start }}', '${{matrix.b}}']\n")
-    assert [(problem.rule, problem.message) for problem in problems(node)] == [
-        ("vary-unknown", "'vary' has no range 'c'"),
-        ("vary-unknown", "'${ vary.start }' is not a placeholder, expected ${vary.start}"),
-    ]
-    unused = mapping(f"vary: {RANGES}\nx: ${{vary.light}}\n")
-    assert [(problem.rule, problem.message) for problem in problems(unused)] == [
-        ("vary-unused", "nothing uses ${vary.start}, so a search would vary nothing by it"),
-        ("vary-unused", "nothing uses ${vary.map}, so a search would vary nothing by it"),
-    ]
+def unknown(written: str) -> list[str]:
+    """The hints about a value."""
+    node = mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n")
+    return [problem.hint for problem in PLACEHOLDERS.unknown(node, "vary-unknown")]
 
 
 @pytest.mark.parametrize(
     "written",
     [
-        "${light}",
-        "{vary.light}",
-        "'{vary.light}'",
-        "$(vary.light)",
-        "${{ vary.light }}",
-        "${vary.light",
-        "$vary.light",
-        "vary.light",
-        "\u201c${vary.light}\u201d",
+        *("${light}", "{vary.light}", "'{vary.light}'", "$(vary.light)", "${{ vary.light }}", "${vary.light"),
+        *("$vary.light", "vary.light", "\u201c${vary.light}\u201d"),
     ],
 )
 def test_what_is_meant_as_a_placeholder(written: str) -> None:
-    (problem,) = problems(mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n"))
-    assert (problem.rule, problem.hint) == ("vary-unknown", 'write "${vary.light}"')
+    assert unknown(written) == ['write "${vary.light}"']
 
 
-@pytest.mark.parametrize("written", ["-${vary.light}", "(${vary.light})", "'${vary.light} %'", "'${vary.light}'"])
-def test_signs_beside_a_placeholder(written: str) -> None:
-    assert list(problems(mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n"))) == []
-
-
-@pytest.mark.parametrize("written", ["light", "$HOME", "${HOME}", "{light}", "${light} lux", "varying.light"])
-def test_what_is_no_placeholder(written: str) -> None:
-    (problem,) = problems(mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n"))
-    assert problem.rule == "vary-unused"
+@pytest.mark.parametrize(
+    "written",
+    ["-${vary.light}", "(${vary.light})", "'${vary.light} %'", "light", "$HOME", "${HOME}", "{light}", "${light} lux"],
+)
+def test_what_is_fine_as_it_is(written: str) -> None:
+    assert unknown(written) == []
 
 
 def test_a_value_keeps_the_place_where_it_is_written() -> None:

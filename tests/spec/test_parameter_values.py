@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Scalar
+from dodo_dsl.spec.arguments import Value, ValueProblem, convert, default_value
 from dodo_dsl.spec.manifest import Parameter
-from dodo_dsl.spec.values import Value, ValueProblem, convert, default_value
 from tests.source.nodes import mapping, value
 
 ROOT = Path("/registry")
@@ -40,46 +40,32 @@ CASES: list[tuple[Parameter, str, Value]] = [
     (parameter("list", of="number", unit="m"), "8 cm", Value("0.08")),
     (parameter("list", of="integer"), "[0, 2]", Value("0,2")),
 ]
-MEMORY = "parameter 'p' is 'a/b', expected a shared memory's name such as video0.argb"
 REFUSED = [
-    (RATE, "50", "wrong-unit", "parameter 'p': '50' has no unit, expected a frequency in Hz"),
-    (RATE, "101 Hz", "out-of-range", "parameter 'p' is 101 Hz, expected 1 to 100 Hz"),
-    (RATE, "", "wrong-type", "parameter 'p' is empty, expected a quantity in Hz"),
-    (parameter("number", minimum=2), "1", "out-of-range", "parameter 'p' is 1, expected at least 2"),
-    (parameter("number", unit="1", maximum=1), "2", "out-of-range", "parameter 'p' is 2, expected at most 1"),
-    (parameter("number"), "1 m", "wrong-unit", "parameter 'p' is '1 m', expected a number without a unit"),
-    (parameter("number"), ".inf", "wrong-type", "parameter 'p' is '.inf', expected a finite number"),
-    (parameter("integer"), "1.5", "wrong-type", "parameter 'p' is '1.5', expected a whole number without a unit"),
-    (parameter("integer"), "true", "wrong-type", "parameter 'p' is 'true', expected a whole number without a unit"),
-    (parameter("amount"), "25 %", "wrong-unit", "parameter 'p': '25 %' is not a number or a quantity"),
-    (parameter("amount"), "1 parsec", "wrong-unit", "parameter 'p': '1 parsec' is not a number or a quantity"),
-    (parameter("amount", minimum=0), "-1 m", "out-of-range", "parameter 'p' is -1 m, expected at least 0"),
-    (parameter("string"), "[a]", "wrong-type", "parameter 'p' is a list, expected a string"),
-    (parameter("string", choices=("a", "b")), "c", "wrong-value", "parameter 'p' is 'c', expected one of a, b"),
-    (parameter("boolean"), "yes", "wrong-type", "parameter 'p' is 'yes', expected true or false"),
-    (parameter("memory"), "a/b", "wrong-value", MEMORY),
-    (parameter("message"), "a.", "wrong-value", "parameter 'p' is 'a.', expected a message's full name"),
-    (
-        parameter("list", of="integer"),
-        "[0, 1.5]",
-        "wrong-type",
-        "parameter 'p' is '1.5', expected a whole number without a unit",
-    ),
-    (
-        parameter("list", of="number", unit="m"),
-        "[1 m, 2]",
-        "wrong-unit",
-        "parameter 'p': '2' has no unit, expected a length in m",
-    ),
-    (
-        parameter("list", of="number", unit="m", maximum=1),
-        "[1 m, 2 m]",
-        "out-of-range",
-        "parameter 'p' is 2 m, expected at most 1 m",
-    ),
-    (parameter("list"), "['a,b']", "wrong-value", "parameter 'p': 'a,b' must not contain a comma"),
-    (parameter("path"), "/etc", "path-escape", "parameter 'p' is '/etc', expected a path relative to the spec"),
-]  # fmt: skip
+    (RATE, "50", "wrong-unit"),
+    (RATE, "101 Hz", "out-of-range"),
+    (RATE, "", "wrong-type"),
+    (parameter("number", minimum=2), "1", "out-of-range"),
+    (parameter("number", unit="1", maximum=1), "2", "out-of-range"),
+    (parameter("number"), "1 m", "wrong-unit"),
+    (parameter("number"), ".inf", "wrong-type"),
+    (parameter("integer"), "1.5", "wrong-type"),
+    (parameter("integer"), "true", "wrong-type"),
+    (parameter("amount"), "25 %", "wrong-unit"),
+    (parameter("amount"), "1 parsec", "wrong-unit"),
+    (parameter("amount", minimum=0), "-1 m", "out-of-range"),
+    (parameter("string"), "[a]", "wrong-type"),
+    (parameter("string", choices=("a", "b")), "c", "wrong-value"),
+    (parameter("boolean"), "yes", "wrong-type"),
+    (parameter("memory"), "a/b", "wrong-value"),
+    (parameter("message"), "a.", "wrong-value"),
+    (parameter("output"), "a/b", "path-escape"),
+    (parameter("list", of="integer"), "[0, 1.5]", "wrong-type"),
+    (parameter("list", of="number", unit="m"), "[1 m, 2]", "wrong-unit"),
+    (parameter("list", of="number", unit="m", maximum=1), "[1 m, 2 m]", "out-of-range"),
+    (parameter("list"), "['a,b']", "wrong-value"),
+    (parameter("list"), "{a: b}", "wrong-type"),
+    (parameter("path"), "/etc", "path-escape"),
+]
 
 
 @pytest.mark.parametrize(("parameter", "written", "expected"), CASES)
@@ -87,11 +73,11 @@ def test_values(parameter: Parameter, written: str, expected: Value) -> None:
     assert convert(parameter, value(written), ROOT) == expected
 
 
-@pytest.mark.parametrize(("parameter", "written", "rule", "message"), REFUSED)
-def test_values_that_do_not_fit(parameter: Parameter, written: str, rule: str, message: str) -> None:
+@pytest.mark.parametrize(("parameter", "written", "rule"), REFUSED)
+def test_values_that_do_not_fit(parameter: Parameter, written: str, rule: str) -> None:
     with pytest.raises(ValueProblem) as problem:
         convert(parameter, value(written), ROOT)
-    assert (problem.value.diagnostic.rule, problem.value.diagnostic.message) == (rule, message)
+    assert problem.value.diagnostic.rule == rule
 
 
 @pytest.mark.parametrize(
@@ -139,22 +125,23 @@ def test_paths_are_relative_to_the_spec(registry: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "rule", "message"),
+    ("text", "rule", "hint"),
     [
-        ("../map", "missing-file", "there is no file or folder '../map'"),
-        ("../..", "path-escape", "'../..' leaves the registry"),
-        ("../up", "path-escape", "'../up' leaves the registry"),
-        ("../pipe", "unreadable-file", "'../pipe' is a pipe or a device, expected a file or a folder"),
-        ("a" * 300, "missing-file", f"'{'a' * 60}' is too long for a path, or a symlink loop"),
-        ("../loop", "missing-file", "'../loop' is too long for a path, or a symlink loop"),
+        ("../map", "missing-file", "did you mean '../maps'?"),
+        ("maps", "missing-file", "did you mean '../maps'?"),
+        ("../..", "path-escape", ""),
+        ("../up", "path-escape", ""),
+        ("../pipe", "unreadable-file", ""),
+        ("a" * 300, "missing-file", ""),
+        ("../loop", "missing-file", ""),
     ],
 )
-def test_paths_that_are_refused(text: str, rule: str, message: str, registry: Path) -> None:
+def test_paths_that_are_refused(text: str, rule: str, hint: str, registry: Path) -> None:
     (registry / "loop").symlink_to("loop")
     with pytest.raises(ValueProblem) as problem:
         path(registry, text)
-    found = problem.value.diagnostic
-    assert (found.rule, found.message) == (rule, f"parameter 'p': {message}")
+    assert problem.value.diagnostic.rule == rule
+    assert hint in problem.value.diagnostic.hint
 
 
 @pytest.mark.parametrize(("text", "hint"), [("90", "write '90 %'"), ("150", ""), ("-1", ""), ("120 %", "")])

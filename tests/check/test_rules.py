@@ -1,0 +1,227 @@
+"""Each change of a valid test or its files, and which rules say where that it is wrong."""
+
+from pathlib import Path
+
+import pytest
+
+from dodo_dsl.opendlv.odvd import STANDARD_0_9
+from tests.check import examples
+from tests.check.contexts import checked, resolved
+
+S, P, F = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest", "opendlv.sim.Frame"
+OLD = "float x; float y; float z; float roll; float pitch; float yaw;"
+END = "path: {uses: beacon, with: {length: 1 m}}"
+HOLD = "path: {uses: beacon, with: {length: 1 m, hold: true}}"
+
+
+def app(takes: str = "", sends: str = f"{S}, {P}") -> str:
+    return (
+        "# docker-compose.yml\nservices: {driver: {image: driver, command: --cid=1, "
+        f"x-dodo: {{in: [{takes}], out: [{sends}]}}}}}}\n"
+    )
+
+
+def cmd(*words: str) -> str:
+    services = (f'  s{number}: {{image: x, command: "--cid=111 {word}"}}\n' for number, word in enumerate(words))
+    return "# docker-compose.yml\nservices:\n" + "".join(services)
+
+
+def cam(values: str) -> str:
+    return f"environment: {{camera: {{uses: virtual-camera, with: {{map-path: ../maps/plain, {values}}}}}}}\n"
+
+
+def track(values: str) -> str:
+    return f"evaluation: {{track: {{uses: collision, with: {{{values}}}}}}}\n"
+
+
+def rig(test: str) -> str:
+    return test + "# dodo.yml\nrigs: {kiwi: {kind: dynamic, cid: 121}}\n"
+
+
+def source(name: str, width: int = 640, height: int = 480) -> str:
+    camera = f"{{source: {name}, width: {width}, height: {height}}}"
+    return (
+        "level: hil\nrig: kiwi\nenvironment:\n  camera: {uses: camera, with: {map-path: ../maps/plain}}\n"
+        f"# dodo.yml\nrigs: {{kiwi: {{kind: static, cid: 121, camera: {camera}}}}}\n"
+    )
+
+
+def own(definition: str, takes: str = "") -> str:
+    text = f"# dodo.yml\nmessages: [my.odvd]\n# my.odvd\nmessage {definition}\n"
+    return text + (app(takes) if takes else "")
+
+
+def signal(path: str, limits: str, begin: float, end: float) -> str:
+    return (
+        "kind: open-loop\nclock: lockstep\ntimeout: 90 s\nenvironment:\n"
+        f"  camera: {{uses: virtual-camera, with: {{map-path: ../maps/plain, freq: 10 Hz}}}}\n  {path}\n"
+        "evaluation:\n  judge:\n    uses: continuous-signal\n"
+        f"    with: {{message: {S}, field: groundSteering, target: ../t.csv, max-mean: 1{limits}}}\n"
+        f"# tests/t.csv\ntime,value\n{begin},0\n{end},0\n"
+    )
+
+
+CHANGES = [
+    ("name: other\n", "13:7 name-differs"),
+    ("name: pages\n", "13:7 name-reserved"),
+    ("level: dil\nkind: closed-loop\n", "13:7 level-kind"),
+    ("level: dil\nkind: open-loop\nclock: lockstep\n", ""),
+    ("level: hil\nclock: lockstep\nrig: emulated\n", "14:8 clock-level"),
+    ("level: hil\n", "13:8 rig-level"),
+    (rig("level: hil\nrig: kiwi\nisolation: network\n"), "15:12 rig-isolation"),
+    (rig("level: hil\nrig: kiwi\nisolation: host\n"), ""),
+    (rig("level: sil\nrig: none\n"), "14:6 rig-level, 14:6 unknown-rig"),
+    (rig("level: hil\nrig: kiwy\n"), "14:6 unknown-rig"),
+    (
+        "clock: lockstep\naction:\n  vehicle: {uses: dynamic-model, with: {freq: 75 Hz}}\n  pose: {uses: integrator}\n",
+        "13:41 clock-rate",
+    ),
+    (
+        "clock: realtime\naction:\n  vehicle: {uses: dynamic-model, with: {freq: 75 Hz}}\n  pose: {uses: integrator}\n",
+        "",
+    ),
+    (
+        "clock: lockstep\naction:\n  vehicle: {uses: dynamic-model, with: {freq: 2.5 Hz}}\n"
+        "  pose: {uses: integrator, with: {freq: 1 kHz}}\n",
+        "",
+    ),
+    ("evaluation: {track: {uses: colision}}\n", "12:28 unknown-service"),
+    ("evaluation: {sandbox: {uses: collision, with: {goal: finish}}}\n", "12:14 service-reserved"),
+    ("evaluation: {camera: {uses: collision, with: {goal: finish}}}\n", "12:14 service-taken"),
+    ("environment: {pose: {uses: integrator}}\n", "9:3 service-taken, 11:3 missing-parameter, 12:28 wrong-layer"),
+    (cam("freq: 10 Hz"), ""),
+    (cam("fre: 10 Hz"), "12:78 unknown-parameter"),
+    (cam("freq: 10"), "12:84 wrong-unit"),
+    (cam("freq: 10 m"), "12:84 wrong-unit"),
+    (cam("width: wide"), "12:85 wrong-type"),
+    (cam("freq: 0 Hz"), "12:84 out-of-range"),
+    (cam("width: 641"), "12:85 out-of-range"),
+    ("environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/none}}}\n", "12:63 missing-file"),
+    ("environment: {camera: {uses: virtual-camera, with: {map-path: /etc}}}\n", "12:63 path-escape"),
+    ("environment: {camera: {uses: virtual-camera}}\n", "12:15 missing-parameter"),
+    (
+        "environment:\n  camera: {uses: virtual-camera, with: {map-path: ../maps/plain}}\n"
+        "  other: {uses: virtual-camera, with: {map-path: ../maps, name.argb: b.argb, name.i420: b.i420, "
+        "frame-id: 1}}\n",
+        "11:3 missing-parameter, 14:3 no-producer, map.json:1:1 wrong-file",
+    ),
+    (cam("id: [0, 2], yaw: [0 deg, 90 deg]").replace("virtual-camera", "range-finder"), ""),
+    (cam("id: [0, 2], yaw: [0 deg, 90 deg, 9 deg]").replace("virtual-camera", "range-finder"), "12:93 wrong-value"),
+    (source("/dev/video0", 600), ""),
+    (source("rpicam"), ""),
+    (source("drive.rec", 600), ""),
+    (source("rpicam", 600), "dodo.yml:4:56 camera-source"),
+    (source("emulated"), "dodo.yml:4:56 camera-source"),
+    (source("rpicm"), "dodo.yml:4:56 camera-source"),
+    (source("file"), "dodo.yml:4:56 camera-source"),
+    (source("/dev/video0", 641, 479), "dodo.yml:4:76 out-of-range, dodo.yml:4:89 out-of-range"),
+    (track("goal: finnish"), "12:52 unknown-name"),
+    (track("goal: finish, walls: [a, finish, b]"), "12:68 unknown-name, 12:79 unknown-name"),
+    (
+        track("walls: ['*', blocks, hedge, obstacle-1, obstacle-2]")
+        + '# tests/maps/plain/map.json\n{"obstacles": [{"lines": [0, 0, 1, 1]}], "block": [{"name": "hedge"}]}\n',
+        "base.dodo.yml:14:41 unknown-name, 12:86 unknown-name",
+    ),
+    (track("goal: finish") + "# tests/maps/plain/map.json\n{\n", "map.json:1:1 wrong-file"),
+    ("timeout: 40 s\n" + track("goal: finish, max-time: 40 s"), "12:70 short-timeout"),
+    ("timeout: 1 min\n" + track("goal: finish, max-time: 40 s"), ""),
+    (track("goal: finish, length: 36"), "12:68 wrong-unit"),
+    (signal(END, "", 1.7e9, 1.7e9 + 9), "7:3 two-producers, 17:89 input-limit"),
+    (signal(END, ", align: sample-time", 0, 9), "7:3 two-producers, 17:89 input-limit"),
+    (signal(HOLD, "", 0, 89), "7:3 two-producers, 15:3 input-limit"),
+    (signal(HOLD, ", max-time: 60 s", 0, 89), "7:3 two-producers"),
+    (signal(END, "", 0, 89), "7:3 two-producers"),
+    (
+        f"evaluation:\n  signal: {{uses: continuous-signal, with: {{message: {S[:-1]}, "
+        f"field: groundSteering, target: ../maps/plain, max-mean: 1}}}}\n",
+        "13:53 unknown-message, plain:1:1 wrong-file",
+    ),
+    (app("my.Own/3"), "docker-compose.yml:1:68 application-input, docker-compose.yml:1:68 unknown-message"),
+    (app("", f"{S}, {P}, my.Own"), "docker-compose.yml:1:150 unknown-message"),
+    (
+        "# dodo.yml\nmessages: [my.odvd]\n# my.odvd\nmessage my.Own [id = 3000] { float x [id = 1]; }\n"
+        + app("my.Own/3"),
+        "docker-compose.yml:1:68 application-input",
+    ),
+    (own(f"{S} [id = 1090] {{ float groundSteering; float rate; }}"), ""),
+    (own(f"{S} [id = 1090] {{ double groundSteering; }}"), "my.odvd:1:9 wrong-messages"),
+    (own(f"{S} [id = 1071] {{ float groundSteering; }}"), "my.odvd:1:9 wrong-messages"),
+    (own("team.Angle [id = 1090] { float angle; }"), "my.odvd:1:9 wrong-messages"),
+    (own("team.Angle [id = 1130] { float angle; }"), ""),
+    (own(f"{F} [id = 1001] {{ {OLD} }}"), ""),
+    (own(f"{F} [id = 1001] {{ {OLD} }}", F), ""),
+    (own(f"{F} [id = 1001] {{ float x; float y; float yaw; }}", F), "my.odvd:1:9 wrong-messages"),
+    (app(), ""),
+    (app("", S), "base.dodo.yml:11:3 no-producer, 10:3 no-producer"),
+    (app("", f"{S}, opendlv.proxy.Pedal"), "docker-compose.yml:1:114 unknown-message"),
+    (app("", f"{S}, {P}, {F}"), "docker-compose.yml:1:150 two-producers"),
+    (app(f"opendlv.proxy.DistanceReading, {F}"), "docker-compose.yml:1:68 application-input"),
+    (cam("frame-id: 7"), "12:15 no-producer"),
+    (track("goal: finish, frame-id: 1"), "12:14 no-sample"),
+    ("action: {vehicle: {uses: dynamic-model}}\n", "8:3 no-producer, 10:3 no-sample"),
+    (
+        "action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator}, ghost: {uses: integrator}}\n",
+        "11:68 two-producers",
+    ),
+    (
+        "environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain}}, "
+        "ranges: {uses: range-finder, with: {id: [0, 2]}}}\n"
+        + app("opendlv.proxy.DistanceReading/2, opendlv.proxy.DistanceReading/21"),
+        "docker-compose.yml:1:68 application-input, docker-compose.yml:1:101 application-input, "
+        "docker-compose.yml:1:101 application-input",
+    ),
+    (cmd("--name=vido0.argb"), "docker-compose.yml:2:27 application-memory"),
+    (cmd("--name=${MEMORY:-pictures}"), "docker-compose.yml:2:27 application-memory"),
+    (cmd("--name=/video0.argb"), ""),
+    (cmd("--name.in=video0.argb --name.out=seen"), ""),
+    (cmd("--name=${MEMORY}"), ""),
+    (cmd("--name=seen", "--name=seen"), ""),
+    (
+        cam("width: 1280, height: 720") + cmd("--name=video0.argb --width=1280 --height=720"),
+        "base.dodo.yml:9:3 application-pictures",
+    ),
+    (
+        cam("width: 1280, height: 720") + cmd("--name video0.argb --width 640 --height 480"),
+        "12:85 application-pictures",
+    ),
+    (cam("width: 1280, height: 720") + cmd("--name=/video0.argb --width=${W:-640}"), "12:85 application-pictures"),
+    (cmd("--name.bgr=video0.argb"), "base.dodo.yml:9:3 application-pictures, 8:3 application-pictures"),
+    ("goals: {time-to-goal: {better: less, zero: 20 s, one: 5 s}}\n", ""),
+    ("goals: {time-to-goal: {better: less, zero: 5 s, one: 20 s}}\n", "14:54 goal-values"),
+    ("goals: {time-to-gaol: {better: less, zero: 20 s, one: 5 s}}\n", "14:9 unknown-check"),
+    ("goals: {time-to-goal: {better: less, zero: 20, one: 5 s}}\n", "14:44 wrong-unit"),
+    ("goals: {time-to-goal: {better: less, zero: 20 s}}\n", "14:9 missing-key"),
+]
+
+
+def told(change: str, folder: Path) -> str:
+    found = checked(change, folder).diagnostics
+    places = {problem: f"{Path(problem.span.file).name}:{problem.span.line}:{problem.span.column}" for problem in found}
+    return ", ".join(f"{place.removeprefix('example.dodo.yml:')} {problem.rule}" for problem, place in places.items())
+
+
+@pytest.mark.parametrize(("change", "expected"), CHANGES, ids=range(len(CHANGES)))
+def test_a_change_and_what_is_said_of_it(change: str, expected: str, tmp_path: Path) -> None:
+    assert told(change, tmp_path) == expected
+
+
+def test_the_base_of_all_changes_is_valid(tmp_path: Path) -> None:
+    assert told("", tmp_path) == ""
+    assert examples.problems(tmp_path) == []
+
+
+@pytest.mark.parametrize("takes", [F, S])
+def test_an_application_of_set_0_9_gets_its_frames(takes: str, tmp_path: Path) -> None:
+    example = f"# dodo.yml\nmessages: [my.odvd]\n# my.odvd\n{STANDARD_0_9.read_text()}\n"
+    test = resolved(example + app(takes, ""), tmp_path)
+    (pose,) = (service for service in test.services if service.manifest.name == "integrator")
+    assert pose.texts["euler"] == ("true" if takes == F else "false")
+
+
+def test_where_the_input_ends_by_itself_it_is_judged_for_the_tests_timeout(tmp_path: Path) -> None:
+    for name, path, limit in (("a", END, "90"), ("b", HOLD, "60")):
+        (tmp_path / name).mkdir()
+        judge = next(
+            each for each in resolved(signal(path, "", 0, 9), tmp_path / name).services if each.use.name == "judge"
+        )
+        assert judge.texts["max-time"] == limit

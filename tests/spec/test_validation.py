@@ -1,0 +1,174 @@
+"""Each change of a valid file, and what its schema says of it: rule, place, and what to write instead."""
+
+import random
+from typing import Any
+
+import pytest
+
+from dodo_dsl.source import Node, parse, plain
+from dodo_dsl.spec.slips import joined, mended
+from dodo_dsl.spec.validation import schema_of_keys, valid_part, validate
+from tests.source.nodes import mapping
+
+BLOCK = """\
+dodo: 1
+name: example
+description: Drive to the finish line.
+level: sil
+kind: closed-loop
+timeout: 60 s
+environment:
+  camera:
+    uses: virtual-camera
+    with:
+      map-path: ../maps/plain
+      freq: 10 Hz
+action:
+  vehicle:
+    uses: dynamic-model
+  pose: {uses: integrator}
+evaluation:
+  track:
+    uses: collision
+    with:
+      goal: finish
+"""
+ENTRIES = ", ".join(f"s{n}: {{uses: a}}" for n in range(101))
+CHANGES = [
+    ("level: sil", "levl: sil", "4:1 unknown-key", "did you mean 'level'?"),
+    ("uses: dynamic-model", "freq: 1 Hz", "14:3 missing-key, 15:5 unknown-key", "write 'uses: virtual-camera'"),
+    ("pose: {uses: i", "pose: {uses:i", "16:10 unknown-key", "write 'uses: integrator'"),
+    ("timeout: 60 s", "seed: one", "1:1 missing-key, 6:7 wrong-type", "write 'timeout: 60 s'"),
+    ("kind: closed-loop\n", "", "1:1 missing-key", "write 'kind: closed-loop', or perception, open-loop"),
+    ("Drive to the finish line.", "1.0", "3:14 wrong-type", 'write it in quotes: "1.0"'),
+    ("Drive to the finish line.", "''", "3:1 missing-key", ""),
+    ("Drive to the finish line.", "!!binary abc", "3:14 yaml-tag", "remove the tag, or write a text in quotes"),
+    ("timeout: 60 s", "timeout: 60", "6:10 wrong-unit", "write for example '60 s'"),
+    ("timeout: 60 s", "timeout: 60 m", "6:10 wrong-unit", "write for example '60 s'"),
+    ("level: sil", "level:", "4:1 wrong-value", ""),
+    ("level: sil", "level: sill", "4:8 wrong-value", "did you mean 'sil'?"),
+    ("level: sil", "level: sil#simulated", "4:8 wrong-value", "a comment begins with ' #', after a space"),
+    ("dodo: 1", "dodo: 0", "1:7 wrong-value", "write 'dodo: 1'"),
+    ("name: example", "name: My Test", "2:7 wrong-value", "for example 'my-test'"),
+    ("name: example", "name: example\nseed: 1.0", "3:7 wrong-type", ""),
+    ("name: example", "name: example\nseed: -1", "3:7 out-of-range", ""),
+    ("name: example", "name: example\nseed: .inf", "3:7 wrong-type", ""),
+    ("name: example", f"name: example\nseed: {'9' * 300}", "3:7 out-of-range", ""),
+    ("name: example", "name: example\nresponse: {over: 5 %}", "3:1 missing-key", ""),
+    ("name: example", "name: example\nmatrix: {a: x}", "3:13 wrong-type", "write a: [x]"),
+    ("name: example", "name: example\nmatrix: {A: [x]}", "3:10 wrong-value", "for example 'a'"),
+    ("  track:\n    uses: collision\n    with:\n      goal: finish\n", " {}\n", "17:1 missing-key", ""),
+    ("action:\n", f"action: {{{ENTRIES}}}\nactoin:\n", "13:1 too-large, 14:1 unknown-key", ""),
+    ("  pose: {uses: integrator}", "  Pose: {uses: integrator}", "16:3 wrong-value", "for example 'pose'"),
+]
+
+
+def said(text: str, schema: str = "dodo") -> tuple[str, str]:
+    """Places and rules, and the first hint."""
+    node, slipped = mended(mapping(text), schema_of_keys(schema))
+    found = sorted([*slipped, *validate(node, schema)])
+    return ", ".join(f"{d.span.line}:{d.span.column} {d.rule}" for d in found), found[0].hint if found else ""
+
+
+@pytest.mark.parametrize(("old", "new", "expected", "hint"), CHANGES, ids=lambda text: text[:24])
+def test_a_change_of_a_valid_test(old: str, new: str, expected: str, hint: str) -> None:
+    assert said(BLOCK) == ("", "")
+    changed = BLOCK.replace(old, new, 1)
+    assert changed != BLOCK
+    assert said(changed) == (expected, hint)
+
+
+MOVED = [
+    (10, 12, -2, "10:3 unknown-key: 'with' stands beside 'camera'; indent it by 4 spaces"),
+    (11, 12, -2, "11:5 unknown-key: 'map-path' stands beside 'with'; indent it by 6 spaces"),
+    (12, 12, -2, "12:5 unknown-key: 'freq' stands beside 'with'; indent it by 6 spaces"),
+    (8, 12, -2, "8:1 unknown-key: 'camera' stands beside 'environment'; indent it by 2 spaces"),
+    (14, 16, -2, "14:1 unknown-key: 'vehicle' stands beside 'action'; indent it by 2 spaces"),
+    (16, 16, -2, "16:1 unknown-key: 'pose' stands beside 'action'; indent it by 2 spaces"),
+    (13, 16, 2, "13:3 unknown-key: 'action' stands below 'environment'; indent it by 0 spaces"),
+    (17, 21, 2, "17:3 unknown-key: 'evaluation' stands below 'action'; indent it by 0 spaces"),
+]
+
+
+@pytest.mark.parametrize(("first", "last", "deep", "expected"), MOVED)
+def test_lines_that_are_indented_one_level_off_are_one_error(first: int, last: int, deep: int, expected: str) -> None:
+    lines = BLOCK.splitlines()
+    for number in range(first - 1, last):
+        lines[number] = " " * deep + lines[number] if deep > 0 else lines[number][-deep:]
+    node, (slip,) = mended(mapping("\n".join(lines)), schema_of_keys("dodo"))
+    assert f"{slip.span.line}:{slip.span.column} {slip.rule}: {slip.message}" == expected
+    assert validate(node, "dodo") == []
+    assert plain(node) == plain(mapping(BLOCK))
+
+
+@pytest.mark.parametrize(
+    ("text", "schema", "expected"),
+    [
+        ("dodo: 1\nregistry: [a, 3]\n", "deployment", "2:15 wrong-type"),
+        ("dodo: 1\nrigs: {Kiwi: {kind: static, cid: 121}}\n", "deployment", "2:8 wrong-value"),
+        ("dodo: 1\nrigs: {kiwi: {kind: static, cid: 121.0}}\n", "deployment", "2:34 wrong-type"),
+        ("dodo: 1\napplication: {files: a.yml, cid: x}\n", "deployment", "2:34 wrong-type"),
+        ("dodo: 1\nsandbox: {memory: 2}\n", "deployment", "2:19 wrong-unit"),
+        ("dodo: 1\nother: 1\n", "deployment", "2:1 unknown-key"),
+        ("services: {a: {image: 3}}\n", "application", "1:23 wrong-type"),
+    ],
+)
+def test_other_files(text: str, schema: str, expected: str) -> None:
+    assert said(text, schema)[0] == expected
+
+
+def test_what_is_not_valid_is_left_out_and_the_rest_stays() -> None:
+    text = (
+        BLOCK.replace("60 s", "60").replace("{uses: integrator}", "3") + "other: 1\nrecord: {frames: 1, limit: 2 MB}\n"
+    )
+    node, _, places = valid_part(mapping(text), "dodo")
+    assert places == {("timeout",), ("action", "pose"), ("other",), ("record", "frames")}
+    expected = plain(mapping(BLOCK.replace("timeout: 60 s\n", "").replace("  pose: {uses: integrator}\n", "")))
+    assert node is not None
+    assert plain(node) == {**expected, "record": {"limit": "2 MB"}}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("{z: 9,5 cm}", {"z": "9,5 cm"}),
+        ("{z: -9,5, x: 1,25 m/s}", {"z": "-9,5", "x": "1,25 m/s"}),
+        ("{a: {z: 9,5 %}}", {"a": {"z": "9,5 %"}}),
+        ("{z: 9, 5 cm}", {"z": 9, "5 cm": None}),
+        ("{z: a,5 cm}", {"z": "a", "5 cm": None}),
+        ("z: 9\n5 cm:\n", {"z": 9, "5 cm": None}),
+    ],
+)
+def test_decimal_commas_in_braces(text: str, expected: object) -> None:
+    assert plain(joined(mapping(text))) == expected
+
+
+VALUES = (
+    "",
+    "true",
+    "12",
+    "1.5",
+    "x",
+    "A b",
+    "1 m",
+    "5 Hz",
+    "[]",
+    "[x, x]",
+    "{}",
+    "{x: }",
+    "{uses: x, with: 1}",
+    ".nan",
+)
+
+
+@pytest.mark.parametrize("schema", ["dodo", "deployment", "machine", "service", "application"])
+def test_whatever_stands_at_a_key_the_rest_is_valid(schema: str) -> None:
+    chosen, known = random.Random(1), [*schema_of_keys(schema)["properties"], "other"]
+    for _ in range(60):
+        text = "".join(f"{key}: {chosen.choice(VALUES)}\n" for key in chosen.sample(known, min(3, len(known))))
+        node: Node | None = parse(text, "x.yml")[0]
+        assert node
+        rest, found, _ = valid_part(node, schema)
+        again: list[Any] = validate(rest, schema) if rest else []
+        assert {d.rule for d in again} <= {"missing-key"}, (text, again)
+        assert all(d.message and "\n" not in d.message for d in found)
