@@ -154,7 +154,7 @@ def load(
     source = None
     if files := application or deployment.application:
         source, of_application = read_application(
-            files, access(deployment), deployment.sandbox, reader, deployment.declarations, keeps_wrong=True
+            files, access(deployment), deployment.sandbox, reader, deployment.declarations
         )
         found = [*found, *of_application]
         if source:

@@ -4,12 +4,13 @@ A service has names, commands, references, and what cannot be isolated; together
 dependencies, and no service that takes a CID.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from graphlib import CycleError, TopologicalSorter
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
 from dodo_dsl.application.compose_paths import is_local
-from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.construction import construction_of
 from dodo_dsl.application.interpolation import filled, literal
 from dodo_dsl.application.model import (
     COMMANDS,
@@ -19,14 +20,14 @@ from dodo_dsl.application.model import (
     ComposeService,
     declared_cid,
     image_variable,
-    is_true,
     plain,
     references,
     words_of,
 )
+from dodo_dsl.application.part import spot
 from dodo_dsl.application.slips import cid_slips, is_cid, missing_program
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, has_errors, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
 
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
@@ -44,7 +45,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         return
     found: list[Diagnostic] = []
     of_stack = stack.parts(application)
-    construction = Construction(application, Setting(1, "network", application.folder, limits=application.limits))
+    construction = construction_of(application)
     for name, service in application.services.items():
         own = [*_problems(service, application), *_missing_files(service, application)]
         own += [*_missing_folder(service, application), *missing_program(service, application.folder)]
@@ -56,26 +57,11 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(construction.check())
     found.extend(_cycles(application))
-    found.extend(_never_healthy(application))
     found.extend(_same_variable(application))
     found.extend(_several_cids(application, of_stack))
     yield from found
     if not has_errors(found):
         yield from _without_cid(application)
-
-
-def place(node: Node, steps: Sequence[str | int], key: Span) -> Span:
-    """The position of the value that the steps lead to, or of its key if it has no text."""
-    span = key
-    for step in steps:
-        if isinstance(node, source.Mapping) and step in node.entries:
-            entry = node.entries[str(step)]
-            node = entry.value
-            span = node.span if isinstance(node, source.Scalar) and node.text else entry.key
-        elif isinstance(node, source.Sequence) and isinstance(step, int) and step < len(node.items):
-            node = node.items[step]
-            span = node.span
-    return span
 
 
 def _missing_files(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -99,54 +85,16 @@ def _missing_folder(service: ComposeService, application: ApplicationSource) -> 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Services that depend on themselves, directly or through others."""
-    containers = dict(application.containers)
-    needs = {
-        name: {other for _, other in references(plain(s.node), containers) if other in application.services}
-        for name, s in application.services.items()
-    }
-    waiting = set(_never_ready(needs))
-    wanted_by: dict[str, set[str]] = {name: set() for name in needs}
-    for name in waiting:
-        for other in needs[name]:
-            wanted_by[other].add(name)
-    cycle = [name for name in _never_ready(wanted_by) if name in waiting]
-    if cycle:
-        message = f"services depend on one another: {', '.join(cycle[:6])}{', ...' if len(cycle) > 6 else ''}"
+    containers, services = dict(application.containers), application.services
+    needs = {n: {o for _, o in references(plain(s.node), containers) if o in services} for n, s in services.items()}
+    try:
+        TopologicalSorter(needs).prepare()
+    except CycleError as error:
+        first, *others = (name for name in services if name in error.args[1])
+        more = ", ..." if len(others) > 5 else ""
+        message = f"services depend on one another: {', '.join([first, *others[:5]])}{more}"
         hint = "remove one of the dependencies, so that one service can start first"
-        yield Diagnostic(application.services[cycle[0]].span, "application-file", message, hint)
-
-
-def _never_healthy(application: ApplicationSource) -> Iterator[Diagnostic]:
-    """Services that wait for the health of one whose health check is turned off; an image may have one as well."""
-    for service in application.services.values():
-        needed = plain(service.node).get("depends_on")
-        for name, about in needed.items() if isinstance(needed, dict) else ():
-            other = application.services.get(str(name))
-            is_waiting = isinstance(about, dict) and about.get("condition") == "service_healthy"
-            check = plain(other.node).get("healthcheck") if other and is_waiting else None
-            if isinstance(check, dict) and (
-                is_true(check.get("disable") or False) or check.get("test") in ("NONE", ["NONE"])
-            ):
-                message = f"'{service.name}' waits for '{name}' to be healthy, whose health check is turned off"
-                hint = f"give '{name}' a healthcheck, or wait with 'condition: service_started'"
-                span = place(service.node, ("depends_on", str(name), "condition"), service.span)
-                yield Diagnostic(span, "application-file", message, hint)
-
-
-def _never_ready(needs: Mapping[str, set[str]]) -> Iterator[str]:
-    """Those that depend on themselves, or on such a service."""
-    left = {name: len(others) for name, others in needs.items()}
-    wanted_by: dict[str, list[str]] = {}
-    for name, others in needs.items():
-        for other in others:
-            wanted_by.setdefault(other, []).append(name)
-    ready = [name for name, count in left.items() if not count]
-    while ready:
-        for name in wanted_by.get(ready.pop(), ()):
-            left[name] -= 1
-            if not left[name]:
-                ready.append(name)
-    yield from (name for name, count in left.items() if count)
+        yield _bad(services[first].span, message, hint)
 
 
 def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -229,11 +177,9 @@ def takes_cid(service: ComposeService) -> bool:
 def _problems(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
     """What is wrong with one service beside its keys: its name, commands, and the services that it names."""
     yield from _name(service)
-    yield from _display(service)
     yield from _commands(service)
     yield from _references(service, application)
     yield from _conditions(service)
-    yield from _unmounted(service)
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
@@ -243,9 +189,6 @@ def unknown_keys(service: Node) -> Iterator[Diagnostic]:
         if word.startswith("x-dodo") and word not in KEYS:
             hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
             yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, fix=fix)
-        elif word not in KEYS and word.startswith("x-do") and did_you_mean(word, KEYS).startswith("did"):
-            message = f"neither compose nor DoDo uses the key '{word}'"
-            yield Diagnostic(entry.key, "unknown-key", message, did_you_mean(word, KEYS), "warning")
 
 
 def _name(service: ComposeService) -> Iterator[Diagnostic]:
@@ -258,51 +201,34 @@ def _name(service: ComposeService) -> Iterator[Diagnostic]:
         yield _bad(service.span, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
 
 
-def _display(service: ComposeService) -> Iterator[Diagnostic]:
-    """A warning of an X server that only a process gets."""
-    if service.has_display and KEYS[1] not in service.node.entries:
-        message = f"'display' of '{service.name}' has no effect in a container, whose image brings its own X server"
-        hint = "start it with xvfb-run there, or give it x-dodo-process; docs/reference/applications.md, Windows"
-        span = place(service.node, (KEYS[0], "display"), service.span)
-        yield Diagnostic(span, "application-file", message, hint, "warning")
-
-
 def _commands(service: ComposeService) -> Iterator[Diagnostic]:
     for key in ("entrypoint", "command"):
-        value = plain(service.node).get(key)
-        if isinstance(value, str):
+        node = service.node.get(key)
+        if isinstance(node, source.Scalar) and isinstance(node.value, str):
             try:
-                opendlv_flags.split(value)
+                opendlv_flags.split(node.value)
             except ValueError as error:
-                yield _bad(place(service.node, (key,), service.span), f"'{key}' of '{service.name}': {error}")
+                yield _bad(node.span, f"'{key}' of '{service.name}': {error}")
 
 
 def _references(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    others, dropped = application.services, application.dropped
+    others = application.services
     named = list(references(plain(service.node), application.containers))
     for key, name in named:
-        if name in others or (name in dropped and key != "volumes_from"):
-            continue
-        if name in dropped:
-            message = f"'{name}', whose volumes '{service.name}' uses, does not start: {dropped[name]}"
-            yield _bad(place(service.node, (key,), service.span), message)
-        else:
+        if name not in others and name not in application.dropped:
             message = f"'{key}' of '{service.name}' names the unknown service '{name}'"
             taken = [service.name, *(other for of, other in named if of == key)]
-            span = _of_name(service, key, name)
-            yield _bad(span, message, did_you_mean(name, others), only_fix(name, others, taken))
+            yield _bad(_of_name(service, key, name), message, did_you_mean(name, others), only_fix(name, others, taken))
 
 
 def _conditions(service: ComposeService) -> Iterator[Diagnostic]:
     """What compose does not know of ``depends_on``."""
-    needed = plain(service.node).get("depends_on")
-    for name, about in needed.items() if isinstance(needed, dict) else ():
-        condition = about.get("condition") if isinstance(about, dict) else None
-        if isinstance(condition, str) and condition not in _CONDITIONS:
-            message = f"'{condition}' is not a condition of 'depends_on'"
-            near = closest(condition, _CONDITIONS)
-            hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(_CONDITIONS)}"
-            yield _bad(place(service.node, ("depends_on", name, "condition"), service.span), message, hint)
+    needed = service.node.get("depends_on")
+    for entry in needed.entries.values() if isinstance(needed, source.Mapping) else ():
+        word = entry.value.get("condition") if isinstance(entry.value, source.Mapping) else None
+        if isinstance(word, source.Scalar) and isinstance(word.value, str) and word.value not in _CONDITIONS:
+            message = f"'{word.value}' is not a condition of 'depends_on'"
+            yield _bad(word.span, message, f"known: {', '.join(_CONDITIONS)}")
 
 
 def _of_name(service: ComposeService, key: str, name: str) -> Span:
@@ -312,22 +238,7 @@ def _of_name(service: ComposeService, key: str, name: str) -> Span:
         return node.entries[name].key
     items = node.items if isinstance(node, source.Sequence) else ()
     fits = (item.span for item in items if isinstance(item, source.Scalar) and name in item.text.split(":"))
-    return next(fits, place(service.node, (key,), service.span))
-
-
-def _unmounted(service: ComposeService) -> Iterator[Diagnostic]:
-    """A warning of a volume that a process lacks; it has its own folder, the test's ``/tmp`` and devices."""
-    volumes = service.node.get("volumes") if KEYS[1] in service.node.entries else None
-    for item in volumes.items if isinstance(volumes, source.Sequence) else ():
-        about = plain(item)
-        parts = [about.get("source"), about.get("target")] if isinstance(about, dict) else str(about).split(":")
-        origin, target = ([str(part or "") for part in parts] + [""])[:2]
-        if origin in (target, ".", "./") or origin.startswith(("/tmp", "/dev", "/sys")) or not target:
-            continue
-        what = f"the process of '{service.name}' has no '{target}', as volumes are mounted in containers only"
-        hint = f"it starts in this file's folder: name '{origin}' there in its command, or use --backend docker"
-        yield Diagnostic(item.span, "application-file", what, hint, "warning")
-        return
+    return next(fits, spot(service.node.entries[key]))
 
 
 def _bad(span: Span, message: str, hint: str = "", fix: Fix | None = None) -> Diagnostic:

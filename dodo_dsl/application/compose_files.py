@@ -3,15 +3,15 @@
 import os
 import re
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application.host_paths import HostPaths, repository
+from dodo_dsl.application import compose_paths
+from dodo_dsl.application.host_paths import HostPaths
 from dodo_dsl.application.interpolation import dotenv, filled, literal, slip_in
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Entry, Node, Reader, Scalar, read
+from dodo_dsl.source import Node, Reader, Scalar
 
 TEST_FILLED = ("command", "entrypoint", "environment", "healthcheck")
 """The keys of a service whose variables a test may set, so that they are filled in for each test."""
@@ -37,13 +37,14 @@ def is_late(name: str, others: Collection[str]) -> bool:
 
 
 class ComposeFiles:
-    """Documents by path with their variables filled in, and ``problems``; ``roots`` hold all of them.
+    """Documents with their variables filled in and paths relative to ``folder``; ``roots`` hold all of them.
 
     ``known`` are the variables of their ``.env`` files, and ``secrets`` those that no compiled test holds, with their
     files; ``passed`` are of DoDo's own environment. ``written`` are the texts with variables by their places.
     """
 
-    def __init__(self, reader: Reader = read, roots: tuple[Path, ...] = (), passed: Collection[str] = ()) -> None:
+    def __init__(self, folder: Path, reader: Reader, roots: tuple[Path, ...], passed: Collection[str] = ()) -> None:
+        self.folder = folder
         self._reader = reader
         self._roots = roots
         self.passed = passed
@@ -54,7 +55,7 @@ class ComposeFiles:
         self.secrets: dict[str, Path] = {}
         self.written: dict[Span, str] = {}
         self._read: dict[Path, source.Mapping | None] = {}
-        self._documents: dict[tuple[Path, frozenset[tuple[str, str]]], source.Mapping | None] = {}
+        self._documents: dict[tuple[Path, Path, frozenset[tuple[str, str]]], source.Mapping | None] = {}
         self._nodes = 0
 
     def filled(self, text: str, *, is_path: bool = True) -> str:
@@ -102,57 +103,41 @@ class ComposeFiles:
             if node is not None and not isinstance(node, source.Mapping):
                 message = "the file is not a mapping, expected a compose file with services"
                 found = [*found, Diagnostic(node.span, "wrong-type", message)]
-            self.problems.extend(found)
+            self.problems += [problem for problem in found if problem not in self.problems]
             fits = isinstance(node, source.Mapping) and self.grow(node, Span(str(file)))
             self._read[file] = node if isinstance(node, source.Mapping) and fits else None
         return self._read[file]
 
-    def document(self, file: Path) -> source.Mapping | None:
-        """A file with its variables filled in."""
-        node, key = self.read(file), (file, frozenset(self.included.items()))
+    def document(self, file: Path, folder: Path) -> source.Mapping | None:
+        """A file whose paths are relative to ``folder``, with them relative to the application's own folder."""
+        node, key = self.read(file), (file, folder, frozenset(self.included.items()))
         if key not in self._documents:
-            self._documents[key] = None if node is None else self._filled(node)
+            self._documents[key] = None if node is None else self._changed(node, folder)
         return self._documents[key]
 
-    def _filled(self, document: source.Mapping) -> source.Mapping:
-        """The document with variables filled in, but for keys of services that each test fills in, and for own keys."""
-        entries = {
-            key: Entry(e.key, self._of_services(e.value) if key == "services" else self._of_node(e.value))
-            if key in _FILLED
-            else e
-            for key, e in document.entries.items()
-        }
-        return replace(document, entries=entries)
+    def _changed(self, node: Node, folder: Path) -> source.Mapping | None:
+        document = compose_paths.changed(node, self._filled)
+        if folder != self.folder and isinstance(document, source.Mapping):
+            document = compose_paths.relocated(document, self.relative(folder))
+        return document if isinstance(document, source.Mapping) else None
 
-    def _of_services(self, node: Node) -> Node:
-        if not isinstance(node, source.Mapping):
-            return node
-        return replace(node, entries={k: Entry(e.key, self._of_service(e.value)) for k, e in node.entries.items()})
+    def relative(self, folder: Path) -> str:
+        """A folder as seen from the application's own, as compose reads it."""
+        return compose_paths.rebased(".", compose_paths.escaped(Path(os.path.relpath(folder, self.folder)).as_posix()))
 
-    def _of_service(self, node: Node) -> Node:
-        if not isinstance(node, source.Mapping):
-            return self._of_node(node)
-        entries = {}
-        for key, e in node.entries.items():
-            is_filled = key not in TEST_FILLED and not key.startswith("x-")
-            entries[key] = Entry(e.key, self._of_node(e.value, is_filled=is_filled, is_path=key in _PATHS))
-        return replace(node, entries=entries)
-
-    def _of_node(self, node: Node, *, is_filled: bool = True, is_path: bool = True) -> Node:
-        def below(each: Node) -> Node:
-            return self._of_node(each, is_filled=is_filled, is_path=is_path)
-
-        if isinstance(node, source.Mapping):
-            return replace(node, entries={k: Entry(e.key, below(e.value)) for k, e in node.entries.items()})
-        if isinstance(node, source.Sequence):
-            return replace(node, items=tuple(map(below, node.items)))
-        if not isinstance(node.value, str) or "$" not in node.value:
-            return node
-        if slip := slip_in(node.value):
-            self.problems.append(Diagnostic(node.span, "application-file", *slip))
-        self.written[node.span] = node.value
-        text = self.filled(node.value, is_path=is_path) if is_filled else self._of_include(node.value)
-        return replace(node, value=text, text=text)
+    def _filled(self, word: Scalar, place: compose_paths.Place, _: Node | None) -> str:
+        """A text with variables filled in, but for keys of services that each test fills in, and for own keys."""
+        text = str(word.value)
+        if "$" not in text or not place or place[0] not in _FILLED:
+            return text
+        if slip := slip_in(text):
+            problem = Diagnostic(word.span, "application-file", *slip)
+            self.problems += [problem] if problem not in self.problems else []
+        self.written[word.span] = text
+        key = place[2] if place[0] == "services" and len(place) > 2 else ""
+        if key in TEST_FILLED or key.startswith("x-"):
+            return self._of_include(text)
+        return self.filled(text, is_path=place[0] != "services" or key in _PATHS)
 
     def other(self, word: Scalar, folder: Path) -> Path | None:
         """The file that another one in ``folder`` names; None, with a problem, when it is not one of the repository."""
@@ -175,8 +160,7 @@ class ComposeFiles:
 
     def holds(self, word: Scalar, folder: Path) -> bool:
         """Whether the repository holds what a file in ``folder`` names; a problem says so where it does not."""
-        roots = self._roots or repository(folder.resolve())
-        problem = HostPaths(folder.resolve(), roots).file_problem(word.text)
+        problem = HostPaths(folder.resolve(), self._roots).file_problem(word.text)
         if problem:
             self.problems.append(Diagnostic(word.span, "application-isolation", problem, "keep it in the repository"))
         return not problem

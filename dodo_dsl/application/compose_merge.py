@@ -41,8 +41,6 @@ def _merge(base: Node, over: Node, path: Path) -> Node:
     form = _FORMS.get(place)
     if form is not None:
         base, over = form(base), form(over)
-    if place == ("logging",) and not _same_driver(base, over):
-        return over
     if isinstance(base, Mapping) and isinstance(over, Mapping):
         return _merge_mappings(base, over, path)
     if isinstance(base, Sequence) and isinstance(over, Sequence):
@@ -78,11 +76,6 @@ def _target(item: Node) -> str:
         return str(value.get("target", value.get("source")))
     parts = split_outside(str(value), ":")
     return parts[1] if len(parts) > 1 else parts[0]
-
-
-def _same_driver(base: Node, over: Node) -> bool:
-    drivers = [plain(n).get("driver") if isinstance(n, Mapping) else None for n in (base, over)]
-    return None in drivers or drivers[0] == drivers[1]
 
 
 def _as_pairs(node: Node) -> Node:
@@ -132,13 +125,12 @@ _REPLACED = {("command",), ("entrypoint",), ("healthcheck", "test")}
 _BY_TARGET = {("volumes",), ("devices",), ("secrets",), ("configs",)}
 _LISTS = (
     "cap_add", "cap_drop", "device_cgroup_rules", "dns", "dns_opt", "dns_search", "env_file", "expose",
-    "external_links", "group_add", "links", "ports", "profiles", "security_opt", "tmpfs", "volumes_from",
+    "group_add", "links", "profiles", "security_opt", "tmpfs", "volumes_from",
 )  # fmt: skip
 _FORMS: dict[Path, Callable[[Node], Node]] = {
-    **{(key,): _as_pairs for key in ("environment", "labels", "annotations", "sysctls")},
-    **{("build", key): _as_pairs for key in ("args", "labels", "additional_contexts")},
+    **{(key,): _as_pairs for key in ("environment", "sysctls")},
+    **{("build", key): _as_pairs for key in ("args", "additional_contexts")},
     **{(key,): _as_list for key in _LISTS},
-    ("deploy", "labels"): _as_pairs,
     ("build",): _as_build,
     ("depends_on",): _as_waits,
     ("networks",): _as_networks,

@@ -1,4 +1,4 @@
-"""Paths in compose files, which are relative to the file's folder, as seen from another folder."""
+"""Texts of compose files by the keys below which they stand: variables, and paths relative to a file's folder."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -6,11 +6,60 @@ from dataclasses import replace
 from typing import Any
 
 from dodo_dsl import source
+from dodo_dsl.application.interpolation import filled
 from dodo_dsl.source import Entry, Node, Scalar
 
-Change = Callable[[str], str]
+Place = tuple[str, ...]
+Change = Callable[[Scalar, Place, Node | None], str]
 
 _REMOTE = ("/", "~", "$", "git@", "github.com/", "service:", "target:")
+
+
+def changed(node: Node, change: Change, place: Place = (), holder: Node | None = None) -> Node:
+    """A node with each text changed, by the keys that lead to it and by what holds it; every part keeps its place."""
+    if isinstance(node, source.Mapping):
+        entries = {k: Entry(e.key, changed(e.value, change, (*place, k), node)) for k, e in node.entries.items()}
+        return replace(node, entries=entries)
+    if isinstance(node, source.Sequence):
+        return replace(node, items=tuple(changed(item, change, place, node) for item in node.items))
+    if not isinstance(node.value, str):
+        return node
+    text = change(node, place, holder)
+    return node if text == node.value else replace(node, value=text, text=text)
+
+
+def filled_node(node: Node, known: Mapping[str, str], late: Callable[[str], bool]) -> Node:
+    """A node with its variables filled in."""
+    return changed(node, lambda word, *_: filled(str(word.value), known, late))
+
+
+def relocated(document: source.Mapping, base: str) -> Node:
+    """A file with its paths as seen from the folder from which ``base`` leads to its own."""
+
+    def moved(word: Scalar, place: Place, holder: Node | None) -> str:
+        text, key = str(word.value), (place[0], *place[2:4]) if place else ()
+        if key in _PATHS or (key in _BINDS and _is_bind(holder, _BINDS[key])):
+            return rebased(text, base)
+        if key == ("services", "build", "additional_contexts") and len(place) == len(key) + 1:
+            name, sign, path = text.partition("=")
+            return name + sign + rebased(path, base)
+        if key == ("services", "volumes"):
+            origin, sign, rest = text.partition(":")
+            return f"{rebased(origin, base)}{sign}{rest}" if sign and is_path(origin) else text
+        return rebased(text, base) if key == ("services", "build", "additional_contexts") else text
+
+    return changed(document, moved)
+
+
+_PATHS = {("services", "build"), ("services", "build", "context"), ("services", "env_file"),
+          ("services", "env_file", "path"), ("secrets", "file"), ("configs", "file")}  # fmt: skip
+_BINDS = {("services", "volumes", "source"): "type", ("volumes", "driver_opts", "device"): "o"}
+"""Paths if the key beside them says ``bind``."""
+
+
+def _is_bind(holder: Node | None, key: str) -> bool:
+    word = holder.get(key) if isinstance(holder, source.Mapping) else None
+    return isinstance(word, Scalar) and "bind" in word.text
 
 
 def rebased(path: str, base: str) -> str:
@@ -36,7 +85,7 @@ def unescaped(value: Any) -> Any:
     return mapped_texts(value, lambda text: text.replace("$$", "$"))
 
 
-def mapped_texts(value: Any, change: Change) -> Any:
+def mapped_texts(value: Any, change: Callable[[str], str]) -> Any:
     """Values of JSON with ``change`` applied to each text."""
     if isinstance(value, dict):
         return {key: mapped_texts(each, change) for key, each in value.items()}
@@ -53,93 +102,3 @@ def is_path(text: str) -> bool:
 def is_local(context: str) -> bool:
     """Whether what is built is a folder, and not known to be elsewhere."""
     return "://" not in context and not context.startswith(_REMOTE)
-
-
-def mapped_service(service: source.Mapping, change: Change) -> source.Mapping:
-    """A service with ``change`` applied to each of its paths."""
-    return _mapped(service, _SERVICE, change)
-
-
-def mapped_rest(rest: Mapping[str, Node], change: Change) -> dict[str, Node]:
-    """Top-level volumes, secrets and configs likewise."""
-    return {key: _each(node, _TOP[key], change) if key in _TOP else node for key, node in rest.items()}
-
-
-Form = Callable[[Node, Change], Node]
-
-
-def _mapped(node: Node, table: Mapping[str, Form], change: Change) -> source.Mapping:
-    assert isinstance(node, source.Mapping)
-    entries = {k: Entry(e.key, table[k](e.value, change)) if k in table else e for k, e in node.entries.items()}
-    return replace(node, entries=entries)
-
-
-def _fields(**table: Form) -> Form:
-    return lambda node, change: _mapped(node, table, change) if isinstance(node, source.Mapping) else node
-
-
-def _path(node: Node, change: Change) -> Node:
-    if not isinstance(node, Scalar) or not isinstance(node.value, str):
-        return node
-    text = change(node.value)
-    return replace(node, value=text, text=text)
-
-
-def _each(node: Node, form: Form, change: Change) -> Node:
-    if isinstance(node, source.Sequence):
-        return replace(node, items=tuple(form(item, change) for item in node.items))
-    if isinstance(node, source.Mapping):
-        return replace(node, entries={k: Entry(e.key, form(e.value, change)) for k, e in node.entries.items()})
-    return node
-
-
-def _build(node: Node, change: Change) -> Node:
-    if not isinstance(node, source.Mapping):
-        return _path(node, change)
-    if "context" not in node.entries:
-        here = Entry(node.span, Scalar(node.span, ".", "."))
-        node = replace(node, entries={"context": here, **node.entries})
-    return _mapped(node, {"context": _path, "additional_contexts": _contexts}, change)
-
-
-def _contexts(node: Node, change: Change) -> Node:
-    def after_sign(text: str) -> str:
-        name, sign, path = text.partition("=")
-        return name + sign + change(path)
-
-    return _each(node, _path, change if isinstance(node, source.Mapping) else after_sign)
-
-
-def _env_file(node: Node, change: Change) -> Node:
-    if isinstance(node, source.Sequence):
-        return _each(node, _env_file, change)
-    return _fields(path=_path)(node, change) if isinstance(node, source.Mapping) else _path(node, change)
-
-
-def _volume(node: Node, change: Change) -> Node:
-    if isinstance(node, source.Mapping):
-        kind = node.get("type")
-        is_bind = isinstance(kind, Scalar) and kind.value == "bind"
-        return _fields(source=_path)(node, change) if is_bind else node
-
-    def of_short(text: str) -> str:
-        origin, sign, rest = text.partition(":")
-        return f"{change(origin)}{sign}{rest}" if sign and is_path(origin) else text
-
-    return _path(node, of_short)
-
-
-def _named_volume(node: Node, change: Change) -> Node:
-    options = node.get("driver_opts") if isinstance(node, source.Mapping) else None
-    flags = options.get("o") if isinstance(options, source.Mapping) else None
-    if not isinstance(flags, Scalar) or "bind" not in flags.text:
-        return node
-    return _fields(driver_opts=_fields(device=_path))(node, change)
-
-
-_SERVICE: dict[str, Form] = {
-    "build": _build,
-    "env_file": _env_file,
-    "volumes": lambda node, change: _each(node, _volume, change),
-}
-_TOP: dict[str, Form] = {"secrets": _fields(file=_path), "configs": _fields(file=_path), "volumes": _named_volume}

@@ -1,7 +1,7 @@
 """The application's part of a test, constructed from its compose files: services, volumes, secrets and configs.
 
 Only what a test carries gets into it, so that nothing has to be looked for in it afterwards. Problems are collected
-meanwhile, each at its place in the file: whoever checks an application constructs it.
+meanwhile, each at its place in the file: to check an application is to construct it.
 """
 
 import os
@@ -13,19 +13,15 @@ from typing import Any
 from dodo_dsl.application import compose_paths, secret_variables
 from dodo_dsl.application.container import TOP_LEFT_OUT, Container
 from dodo_dsl.application.interpolation import interpolate
-from dodo_dsl.application.model import ApplicationSource, ComposeService, is_true
+from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
 from dodo_dsl.application.part import Part
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Mapping, Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _NAMED = ("volumes", "secrets", "configs")
 _OF_SERVICES = {"image", "build", "command", "x-dodo", "x-dodo-process"}
-_REFUSED = {
-    "models": "the engine's model runner is shared by all tests",
-    "jobs": "a test starts services and no schedules",
-}
 
 
 @dataclass(frozen=True)
@@ -170,32 +166,24 @@ class Construction:
         """The problems of everything but the services, which are made already."""
         self.rest()
         self._top()
-        self._networks()
         for span, message, hint in nested(self):
             self.problems.append(Diagnostic(span, "application-isolation", message, hint))
         return self.problems
 
-    def _networks(self) -> None:
-        known = "attachable driver driver_opts enable_ipv4 enable_ipv6 external internal ipam labels name"
-        for name, node, span in self._named("networks"):
-            fields = self.about(name, span).fields(node, f"the network '{name}'", known)
-            external = fields.get("external")
-            if isinstance(external, Mapping) or (isinstance(external, Scalar) and is_true(external.value)):
-                message = f"the network '{name}' is external, and a test has its own network only"
-                self.problems.append(Diagnostic(span, "application-key", message, severity="warning"))
-
     def _top(self) -> None:
-        known = ("services", "include", *_NAMED, *TOP_LEFT_OUT, *_REFUSED)
+        known = ("services", "include", *_NAMED, *TOP_LEFT_OUT)
         of = self.about("the compose file", Span(str(self.application.path)))
-        for key, entry in self.application.top.items():
-            if key in _REFUSED:
-                of.refuse(entry.key, f"'{key}' cannot be isolated: {_REFUSED[key]}", "remove it")
-            elif key not in known and not key.startswith("x-"):
+        top = Mapping(Span(str(self.application.path)), dict(self.application.top))
+        for key, entry in top.entries.items():
+            if key not in known:
                 about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
-                is_service = bool(about & _OF_SERVICES)
-                hint = "indent it by 2: it looks like a service" if is_service else did_you_mean(key, known)
-                fix = None if is_service else only_fix(key, known)
-                of.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in the compose file", hint, fix=fix))
+                hint = "indent it by 2: it looks like a service" if about & _OF_SERVICES else ""
+                of.unknown_key(key, top, "the compose file", known, hint)
+
+
+def construction_of(application: ApplicationSource) -> Construction:
+    """An application of any test, to be checked."""
+    return Construction(application, Setting(1, "network", application.folder, limits=application.limits))
 
 
 def checked_builds(application: ApplicationSource) -> dict[str, Any]:
@@ -203,7 +191,7 @@ def checked_builds(application: ApplicationSource) -> dict[str, Any]:
 
     Variables whose values are not known are empty: each builder has others in the environment.
     """
-    made = Construction(application, Setting(1, "network", application.folder, limits=application.limits))
+    made = construction_of(application)
     services = {name: made.service(service) for name, service in application.services.items()}
     builds = {name: _whole(made, each["build"]) for name, each in services.items() if "build" in each}
     secrets = {name: _whole(made, about) for name, about in made.rest().get("secrets", {}).items()}

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
-from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.interpolation import changed_node, filled
+from dodo_dsl.application.compose_paths import escaped, filled_node
 from dodo_dsl.application.model import (
     FILES,
     NAMESPACES,
@@ -25,15 +24,15 @@ from dodo_dsl.application.model import (
     text,
 )
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import ASK_KEY, Part, pairs, spot
+from dodo_dsl.application.part import Part, pairs, spot
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean, listed, only_fix
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, listed
 from dodo_dsl.source import Node, Scalar
 
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
 
-TOP_LEFT_OUT = ("name", "networks", "version")
+TOP_LEFT_OUT = ("jobs", "models", "name", "networks", "version")
 Key = Callable[["Container", Node], Any]
 
 
@@ -64,11 +63,8 @@ class Container(Part):
                     self.refuse(spot(entry), f"'{key}' of '{self.name}' {_REFUSED[key]}", _WITHOUT)
             elif key in _LEFT_OUT:
                 self.left += [(key, entry.key)] if not _is_off(entry.value) else []
-            elif not key.startswith("x-") and key != "profiles":
-                known = (*_CARRIED, *_REFUSED, *_LEFT_OUT)
-                hint = did_you_mean(key, known) or ASK_KEY.format(key)
-                fix = only_fix(key, known, self.service.node.entries)
-                self.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in '{self.name}'", hint, fix=fix))
+            elif key != "profiles":
+                self.unknown_key(key, self.service.node, f"'{self.name}'", (*_CARRIED, *_REFUSED, *_LEFT_OUT))
         for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
             step(self)
         if self.left:
@@ -82,7 +78,7 @@ class Container(Part):
     def filled(self, node: Node) -> Node:
         """A value with the variables of the test filled in."""
         late = self.project.application.is_late
-        return changed_node(node, lambda word: filled(word, self.known, late))
+        return filled_node(node, self.known, late)
 
     def raw(self, key: str) -> Node | None:
         return self.service.raw.get(key)
@@ -295,8 +291,6 @@ _CARRIED: dict[str, Key] = {
     "cap_add": hardware.capabilities,
     "command": lambda c, _: _command(c, "command"),
     "configs": lambda c, n: _secrets(c, n, "configs"),
-    "cpu_quota": limits.cpu_quota,
-    "cpu_period": lambda c, _: None,
     "depends_on": _depends_on,
     "deploy": limits.deploy,
     "device_cgroup_rules": hardware.device_rules,
@@ -316,8 +310,8 @@ _CARRIED: dict[str, Key] = {
     "sysctls": _sysctls,
     "tmpfs": limits.tmpfs,
     "ulimits": limits.ulimits,
-    "volumes": lambda c, n: mounts(c, n) or None,
     "volumes_from": _volumes_from,
+    "volumes": lambda c, n: mounts(c, n) or None,
     **{key: lambda c, n, key=key: _namespace(c, key, n) for key in NAMESPACES},  # type: ignore[misc]
 }
 """What the container has for a key, by the key; None for nothing."""
@@ -338,6 +332,8 @@ _LEFT_OUT = frozenset(
         "container_name",
         "cpu_count",
         "cpu_percent",
+        "cpu_period",
+        "cpu_quota",
         "cpu_rt_period",
         "cpu_rt_runtime",
         "cpu_shares",

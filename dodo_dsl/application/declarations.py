@@ -4,11 +4,11 @@ Problems stand at their place in ``dodo.yml``.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-from dodo_dsl import source
-from dodo_dsl.application.model import KEYS, ApplicationSource, plain, references
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix, shown_path
+from dodo_dsl.application.model import KEYS, with_entry
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.source import Entry, Mapping, Node
 from dodo_dsl.spec.deployment import Declarations
 
@@ -36,7 +36,7 @@ def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
     gone = left_out(document, declarations)
     if declarations.own:
         about = next(iter(declarations.own.values()))
-        document = _with(document, _DECLARED, {**_entries(document.get(_DECLARED)), **declarations.own}, about.key)
+        document = with_entry(document, _DECLARED, _both(document.get(_DECLARED), declarations.own, about.key))
     if not gone and not declarations.services:
         return document
     kept = {
@@ -46,15 +46,7 @@ def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
         for name, entry in _services(document).items()
         if name not in gone
     }
-    return _with(document, _SERVICES, kept, document.span)
-
-
-def _with(node: Mapping, key: str, entries: dict[str, Entry], span: Span) -> Mapping:
-    """The node with a mapping, which is at ``span`` where the node has none."""
-    old = node.entries.get(key)
-    place = old.key if old else span
-    value = Mapping(old.value.span if old else span, entries, old.value.tag if old else "")
-    return Mapping(node.span, {**node.entries, key: Entry(place, value)}, node.tag)
+    return with_entry(document, _SERVICES, Mapping(document.entries[_SERVICES].value.span, kept))
 
 
 def _entries(node: Node | None) -> dict[str, Entry]:
@@ -71,10 +63,15 @@ def _declared(service: Node, about: Entry) -> Node:
         return service
     keys = {key: entry for key, entry in about.value.entries.items() if key != PROCESS}
     if keys:
-        service = _with(service, _DECLARED, {**_entries(service.get(_DECLARED)), **keys}, about.key)
+        service = with_entry(service, _DECLARED, _both(service.get(_DECLARED), keys, about.key))
     if PROCESS not in about.value.entries:
         return service
-    return Mapping(service.span, {**service.entries, _OF_PROCESS: about.value.entries[PROCESS]}, service.tag)
+    return replace(service, entries={**service.entries, _OF_PROCESS: about.value.entries[PROCESS]})
+
+
+def _both(old: Node | None, new: dict[str, Entry], span: Span) -> Mapping:
+    """A mapping with other values of keys, at ``span`` if there is none."""
+    return Mapping(old.span if old else span, {**_entries(old), **new})
 
 
 def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnostic]:
@@ -100,31 +97,3 @@ def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnost
     for name, entry in declarations.services.items():
         if name in gone:
             yield Diagnostic(entry.key, _RULE, f"'{name}' is declared, but {gone[name]}", "remove one of them")
-        elif name in services:
-            yield from _said_twice(name, services[name].value, entry.value)
-
-
-def _said_twice(name: str, service: Node, about: Node) -> Iterator[Diagnostic]:
-    """Warnings of keys that the compose file has with another value."""
-    if not isinstance(service, Mapping) or not isinstance(about, Mapping):
-        return
-    mine = _entries(service.get(_DECLARED))
-    if _OF_PROCESS in service.entries:
-        mine[PROCESS] = service.entries[_OF_PROCESS]
-    for key, entry in about.entries.items():
-        if key in mine and source.plain(mine[key].value) != source.plain(entry.value):
-            message = f"'{key}' of '{name}' is also in {_place(mine[key].key)}, and this one counts"
-            yield Diagnostic(entry.key, _RULE, message, "remove one of them", "warning")
-
-
-def depending(application: ApplicationSource, gone: dict[str, str]) -> Iterator[Diagnostic]:
-    """Warnings of services that need one that is left out; missing volumes of one are an error elsewhere."""
-    for name, service in application.services.items() if gone else ():
-        for key, other in references(plain(service.node), dict(application.containers)):
-            if other in gone and key != "volumes_from":
-                message = f"'{name}' starts without '{other}', which its '{key}' names: {gone[other]}"
-                yield Diagnostic(service.node.entries[key].key, _RULE, message, severity="warning")
-
-
-def _place(span: Span) -> str:
-    return f"{shown_path(span.file)}:{span.line}"

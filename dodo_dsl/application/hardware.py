@@ -1,6 +1,7 @@
 """What a container may have of a machine: devices and privileges where a rig allows them, graphics processors."""
 
 import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
@@ -27,11 +28,8 @@ _CHARACTERS = re.compile(r"c [0-9*]+:[0-9*]+ [rwm]+")
 
 def devices(c: "Container", node: Node) -> Any:
     made = []
-    for item in c.items(node):
-        about = item.get("source") if isinstance(item, source.Mapping) else item
-        word = c.literal(about) if about is not None else None
-        if about is None or not word:
-            continue
+    for item, word in _words(c, node):
+        about = item.entries["source"].value if isinstance(item, source.Mapping) else item
         path, paths = word.partition(":")[0], c.project.paths
         if link := paths.link(path):
             message = f"device '{word}' is a symbolic link to '{link}', outside the repository"
@@ -51,16 +49,15 @@ def devices(c: "Container", node: Node) -> Any:
 
 def device_rules(c: "Container", node: Node) -> Any:
     made = []
-    for item in c.items(node):
-        word = c.literal(item) or None
-        if word is not None and is_rule_for_port(word, c.project.ports):
+    for item, word in _words(c, node):
+        if is_rule_for_port(word, c.project.ports):
             c.hardware(item.span, f"rule '{word}' of '{c.name}' {NO_PORT}", _OTHER)
-        elif word is not None and not _CHARACTERS.fullmatch(word):
+        elif not _CHARACTERS.fullmatch(word):
             message = f"the rule '{word}' gives access to the host's disks"
             c.refuse(item.span, message, "name character devices, for example c 81:* rw")
-        elif word is not None and c.project.setting.hil:
+        elif c.project.setting.hil:
             made.append(word)
-        elif word is not None:
+        else:
             c.hardware(item.span, f"device '{word}' of '{c.name}' {WITHOUT_HARDWARE}")
     return made or None
 
@@ -77,10 +74,7 @@ def privileged(c: "Container", node: Node) -> Any:
 
 def capabilities(c: "Container", node: Node) -> Any:
     made = []
-    for item in c.items(node):
-        word = c.literal(item)
-        if not word:
-            continue
+    for item, word in _words(c, node):
         if word.upper().removeprefix("CAP_") in _CAPABILITIES or c.project.setting.keeps_privileges:
             made.append(word)
         else:
@@ -91,16 +85,21 @@ def capabilities(c: "Container", node: Node) -> Any:
 def security(c: "Container", node: Node) -> Any:
     """Options that leave no more access than there is without them; a rig may allow others."""
     made = []
-    for item in c.items(node):
-        word = c.literal(item)
-        if not word:
-            continue
+    for item, word in _words(c, node):
         if re.split("[:=]", word)[0] == "no-new-privileges" or c.project.setting.keeps_privileges:
             made.append(escaped(word))
         else:
             message = f"'{word}' of '{c.name}' is left out, the engine's own confinement stays"
             c.add(Diagnostic(item.span, "application-isolation", message, severity="warning"))
     return made or None
+
+
+def _words(c: "Container", node: Node) -> Iterator[tuple[Node, str]]:
+    """The texts of a list that are known, each with its place."""
+    for item in c.items(node):
+        about = item.get("source") if isinstance(item, source.Mapping) else item
+        if about is not None and (word := c.literal(about)):
+            yield item, word
 
 
 def runtime(c: "Container", node: Node) -> Any:

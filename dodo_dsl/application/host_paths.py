@@ -112,16 +112,10 @@ class HostPaths:
         if "\0" in text:
             return NUL, "remove it"
         if any(name in _WHOLE or _below(name, _OF_KERNEL) or _SOCKET.search(name) for name in self.names(text)):
-            return f"{self._called(text)} belongs to the host, so tests would share it", _WITHOUT
+            return f"'{text}' belongs to the host, so tests would share it", _WITHOUT
         if self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
             return "", ""
-        if self.link(text):
-            return f"'{text}' {self._where(text)}", INSIDE
-        if any(_below(str(root), self.names(text)) for root in self.roots):
-            return f"'{text}' holds the whole repository and more", "mount the folders that the service needs"
-        if not text.startswith(("/", "~")):
-            return f"'{text}' {self._where(text)}", ASK
-        return f"'{text}' belongs to the host, so tests would share it", ASK
+        return f"'{text}' {self._where(text)}, so tests would share it", ASK
 
     @property
     def _places(self) -> tuple[Path, ...]:
@@ -130,10 +124,6 @@ class HostPaths:
     def _is_to_read(self, text: str) -> bool:
         places = (*TO_READ, *map(real, TO_READ))
         return all(_below(name, places) for name in self.names(text))
-
-    def _called(self, text: str) -> str:
-        link = self.link(text)
-        return f"'{text}', a symbolic link to '{link}'," if link else f"'{text}'"
 
     def _where(self, text: str) -> str:
         if link := self.link(text):

@@ -3,9 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application import limits
 from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.interpolation import literal
 from dodo_dsl.application.model import environment, image_variable, plain, text
 from dodo_dsl.application.part import pairs
 from dodo_dsl.source import Node
@@ -21,20 +19,7 @@ _BASES = ("python", "library/python", "debian", "library/debian")
 
 def image(c: "Container", node: Node) -> Any:
     """The image of the file, unless a pipeline sets another one."""
-    image = text(plain(node))
-    written = literal(image)
-    if written is not None and (name := _repository(written)) != name.lower():
-        hint = f"write {written.replace(name, name.lower(), 1)}"
-        c.bad(node.span, f"the image '{written}' has capitals, which no engine takes in its name", hint)
-    return f"${{{image_variable(c.name)}:-{image}}}"
-
-
-def _repository(image: str) -> str:
-    """The part of an image's name that is in small letters: without registry, tag and digest."""
-    host, sign, rest = image.partition("@")[0].partition("/")
-    has_host = bool(sign) and ("." in host or ":" in host or host == "localhost")
-    name = rest if has_host else f"{host}{sign}{rest}"
-    return name.partition(":")[0]
+    return f"${{{image_variable(c.name)}:-{text(plain(node))}}}"
 
 
 def short_name(image: str) -> str:
@@ -57,12 +42,12 @@ def build(c: "Container", node: Node) -> Any:
         c.own["image"] = f"${{{image_variable(c.name)}:-}}"
     fields = c.fields(
         node, f"the build of '{c.name}'",
-        "context dockerfile dockerfile_inline args target additional_contexts network platforms secrets no_cache pull"
-        " extra_hosts provenance sbom no_cache_filter shm_size ulimits",
-        "cache_from cache_to isolation labels privileged ssh tags entitlements",
+        "context dockerfile dockerfile_inline args target additional_contexts network platforms secrets extra_hosts",
+        "cache_from cache_to entitlements isolation labels no_cache no_cache_filter privileged provenance pull sbom"
+        " shm_size ssh tags ulimits",
     ) if isinstance(node, source.Mapping) else {"context": node}  # fmt: skip
-    kept = ("dockerfile_inline", "target", "platforms", "secrets", "no_cache", "pull", "extra_hosts", "provenance")
-    made = {key: plain(fields[key]) for key in (*kept, "sbom", "no_cache_filter") if key in fields}
+    kept = ("dockerfile_inline", "target", "platforms", "secrets", "extra_hosts")
+    made = {key: plain(fields[key]) for key in kept if key in fields}
     context = c.literal(fields["context"]) if "context" in fields else "."
     if context is not None:
         made = {"context": _context(c, fields.get("context"), context), **made}
@@ -83,10 +68,6 @@ def build(c: "Container", node: Node) -> Any:
         c.refuse(fields["network"].span, message, "remove it")
     elif network:
         made["network"] = network
-    if "shm_size" in fields:
-        made["shm_size"] = c.number(fields["shm_size"], c.limits.memory, "build.shm_size", "memory", limits.size)
-    if "ulimits" in fields:
-        made["ulimits"] = limits.ulimits(c, fields["ulimits"], is_whole=False)
     return made
 
 

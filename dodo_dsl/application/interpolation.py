@@ -2,15 +2,9 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from dodo_dsl.source import Node
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_WITHOUT_OPERATOR = re.compile(r"\$\{(?P<name>[A-Za-z_][A-Za-z0-9_]*):=?(?P<word>[^-?+}:=][^{}]*)\}")
 _SHOWN = 60
 _BLANKS = r"[ \t\v\f\r\x85\xa0]*"
 _SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
@@ -138,23 +132,6 @@ def interpolate(text: str, known: Mapping[str, str] | None = None) -> str:
     return _replaced(text if known is None else filled(text, known), read)
 
 
-def changed_node(written: "Node", change: Callable[[str], str]) -> "Node":
-    """A node with ``change`` applied to each text that has a variable; every part keeps its place."""
-    from dodo_dsl import source  # which programs that only read variables do not load
-
-    if isinstance(written, source.Mapping):
-        entries = {
-            key: source.Entry(entry.key, changed_node(entry.value, change)) for key, entry in written.entries.items()
-        }
-        return replace(written, entries=entries)
-    if isinstance(written, source.Sequence):
-        return replace(written, items=tuple(changed_node(item, change) for item in written.items))
-    if not isinstance(written.value, str) or "$" not in written.value:
-        return written
-    filled = change(written.value)
-    return replace(written, value=filled, text=filled)
-
-
 def slip_in(text: str) -> tuple[str, str] | None:
     """What is wrong with the first such variable, and a hint; defaults are looked at, too."""
     place = text.find("$")
@@ -173,12 +150,7 @@ def _slip(written: str) -> tuple[str, str]:
     shown = written[:_SHOWN]
     if written.count("{") != written.count("}"):
         return "'${' is not closed", f"write '{written.split(maxsplit=1)[0][:_SHOWN]}}}'"
-    if written == "${}":
-        return "'${}' names no variable", "for example ${GAIN:-1}, or $${} for the text itself"
-    known = _WITHOUT_OPERATOR.fullmatch(written)
-    if known:
-        return f"'{shown}' is not a variable of compose", f"write '${{{known['name']}:-{known['word']}}}'"
-    what = "the name of a variable has letters, digits and underscores"
+    what = "write ${NAME:-default}, with letters, digits and underscores in the name"
     return f"'{shown}' is not a variable of compose", f"{what}; text that begins with ${{ is written $${{"
 
 

@@ -51,7 +51,7 @@ def whole(value: object) -> float:
 
 
 def cut(value: object, most: float, measure: Callable[[object], float] = number) -> tuple[float, bool]:
-    """A limit of at most ``most``, and whether it was cut; 0 and below are no limit."""
+    """A limit of at most ``most``, and whether it was cut; 0 and below do not limit."""
     found = measure(value)
     if 0 < found <= most and math.isfinite(found):
         return found, False
@@ -68,13 +68,13 @@ def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
     return ",".join([*(word for word in words if word not in sizes), f"size={limits.memory}"]), bool(sizes), unknown
 
 
-def ulimits(c: "Container", node: Node | None = None, *, is_whole: bool = True) -> dict[str, Any]:
+def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
     """Highest limits of a process, those of the test and no core dumps where it sets none.
 
     ``nproc`` counts the user's processes on the whole machine, so that ``pids_limit`` takes its place.
     """
     own = {"core": 0, "fsize": c.limits.file_size, "nofile": c.limits.files}
-    made: dict[str, Any] = dict(own) if is_whole else {}
+    made: dict[str, Any] = dict(own)
     for name, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
         most = {**own, "memlock": c.limits.memory, "msgqueue": _MESSAGE_QUEUES}.get(name, math.inf)
         if name == "nproc":
@@ -115,28 +115,13 @@ def deploy(c: "Container", node: Node) -> Any:
 
 
 def cpus(c: "Container", node: Node) -> Any:
-    if c.limits.cpus is None:
-        return c.number(node, float("inf"), "cpus", "cpus")
-    return c.number(node, c.limits.cpus, "cpus", "cpus")
-
-
-def cpu_quota(c: "Container", node: Node) -> Any:
-    """Processors by the time that they have of a period, in us."""
-    period = c.service.node.get("cpu_period")
-    every = number(c.literal(period) if period is not None else None)
-    share = number(c.literal(node)) / (every if 0 < every < float("inf") else 100_000)
-    most = float("inf") if c.limits.cpus is None else c.limits.cpus
-    if 0 < share < float("inf"):
-        c.own.setdefault("cpus", min(share, most))
-        if share > most:
-            c.cut(node.span, "cpu_quota", most, "cpus")
+    return c.number(node, float("inf") if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus")
 
 
 def tmpfs(c: "Container", node: Node) -> Any:
     made = []
     for item in c.items(node):
-        word = c.literal(item)
-        if not word:
+        if not (word := c.literal(item)):
             continue
         target, _, options = word.partition(":")
         allowed, is_cut, unknown = tmpfs_options(options, c.limits)

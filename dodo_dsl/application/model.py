@@ -150,17 +150,16 @@ class ComposeService:
 class ApplicationSource:
     """The merged compose files, which are all that rules and the planner see of the application.
 
-    ``services`` are those that start, by name; ``rest`` has every other top-level key but those ``left_out``. Paths
-    are relative to ``folder``. ``dropped`` has the reasons why services do not start, by name, ``containers`` the
-    services by their ``container_name``, and ``secrets`` the files that set variables which no compiled test holds.
-    ``known`` are all variables whose values are known, ``access`` is what the deployment allows, ``limits`` are the
-    highest that the services may set. ``named`` are the files as ``dodo.yml`` names them, ``without`` the services that
-    it leaves out. ``cids`` are declared to be built in, all the same one. ``top`` has all top-level keys.
+    ``services`` are those that start, by name. Paths are relative to ``folder``. ``dropped`` has the reasons why
+    services do not start, by name, ``containers`` the services by their ``container_name``, and ``secrets`` the
+    files that set variables which no compiled test holds. ``known`` are all variables whose values are known,
+    ``access`` is what the deployment allows, ``limits`` are the highest that the services may set. ``named`` are the
+    files as ``dodo.yml`` names them, ``without`` the services that it leaves out. ``cids`` are declared to be built
+    in, all the same one. ``top`` has all top-level keys.
     """
 
     path: Path
     services: Mapping[str, ComposeService]
-    rest: Mapping[str, Node]
     dropped: Mapping[str, str] = field(default_factory=dict)
     containers: Mapping[str, str] = field(default_factory=dict)
     secrets: Mapping[str, Path] = field(default_factory=dict)
@@ -171,6 +170,11 @@ class ApplicationSource:
     named: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     cids: tuple[Scalar, ...] = ()
+
+    @property
+    def rest(self) -> Mapping[str, Node]:
+        """The top-level keys that a test carries beside services."""
+        return {key: entry.value for key, entry in self.top.items() if key in ("volumes", "secrets", "configs")}
 
     @functools.cached_property
     def demanding(self) -> tuple[tuple[str, str, Scalar], ...]:
@@ -372,3 +376,9 @@ def file_statements(files: Iterable[EnvFile], folder: Path) -> tuple[Statements,
     """What files next to the compose file set, in order."""
     own = (file for file in files if not file.path.startswith(("/", "~")))
     return tuple(statements_of(folder / file.path, raw=file.raw) for file in own)
+
+
+def with_entry(node: source.Mapping, key: str, value: Node) -> source.Mapping:
+    """The node with another value of a key, which stands where the value does if it is new."""
+    place = node.entries[key].key if key in node.entries else value.span
+    return source.Mapping(node.span, {**node.entries, key: source.Entry(place, value)}, node.tag)

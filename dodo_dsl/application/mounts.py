@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.application.compose_paths import escaped
+from dodo_dsl.application.compose_paths import escaped, is_path
 from dodo_dsl.application.host_paths import MEMORY, TMP, is_port, is_token
 from dodo_dsl.application.limits import size, tmpfs_options
 from dodo_dsl.application.model import is_true, plain
@@ -27,10 +27,9 @@ OWN_VOLUMES = ("tmp", "report", "dodo-time")
 COPY = "files-"
 """How the volumes of copies begin, each with a number."""
 _OF_COPY = re.compile(rf"{COPY}\d+")
-_DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _KINDS = ("bind", "volume", "tmpfs", "image")
-_PRIVATE = ("private", "rprivate")
+_BIND_OPTIONS = {"propagation": ("private", "rprivate"), "recursive": ("enabled", "disabled", "readonly")}
 _IN_AND_OUT = ("shared", "rshared", "slave", "rslave")
 _OPTIONS = "use a tmpfs (type: tmpfs), or a folder of the repository (o: bind)"
 _FIELDS = {
@@ -65,7 +64,7 @@ class Mount:
         source, target = escaped(self.source), escaped(self.target)
         words = [*(["ro"] if self.read_only else []), *(["nocopy"] if self.nocopy else [])]
         words += [self.selinux] if self.selinux else []
-        is_short = ":" not in f"{source}{target}" and not self.is_required and not self.more
+        is_short = ":" not in f"{source}{target}" and len(source) != 1 and not self.is_required and not self.more
         if is_short and self.kind in ("bind", "volume"):
             return ":".join(filter(None, (source, target, ",".join(words))))
         about = dict(self.more) | ({"nocopy": True} if self.nocopy else {})
@@ -79,11 +78,6 @@ class Mount:
 def own_name(name: str) -> str:
     """The name of an application's volume in the test's project, where DoDo has its own volumes."""
     return f"application-{name}" if name in OWN_VOLUMES or _OF_COPY.fullmatch(name) else name
-
-
-def is_path(text: str) -> bool:
-    """Whether a volume's source is a path; other words name a volume."""
-    return text.startswith((".", "/", "~"))
 
 
 def mounts(of: "Container", node: Node) -> list[str | dict[str, Any]]:
@@ -104,10 +98,6 @@ def _short(of: "Container", item: Node) -> Mount | None:
     text = of.literal(item)
     if text is None:
         return None
-    if _DRIVE.match(text):
-        message = f"compose takes '{text[:2]}' of '{text}' for a drive of Windows, and mounts no volume"
-        of.bad(item.span, message, "give the volume a longer name")
-        return None
     source, target, options, *_ = [*text.split(":", 2), "", ""] if ":" in text else ["", text, ""]
     if ":" in text and not source:
         of.bad(
@@ -116,17 +106,13 @@ def _short(of: "Container", item: Node) -> Mount | None:
         return None
     words = options.split(",")
     if found := [word for word in words if word in _IN_AND_OUT]:
-        _comes_back(of, item.span, found[0])
+        of.refuse(item.span, f"'{found[0]}' of a mount reaches beyond the container", "remove it")
         return None
     return Mount(
         "bind" if is_path(source) else "volume", _clean(source), _clean(target), item.span,
         [word for word in words if word in ("ro", "rw")][-1:] == ["ro"],
         selinux=next((word for word in words if word in ("z", "Z")), ""), nocopy="nocopy" in words, is_short=True,
     )  # fmt: skip
-
-
-def _comes_back(of: "Container", span: Span, word: str) -> None:
-    of.refuse(span, f"propagation '{word}' lets mounts in and out of the container", "remove it")
 
 
 def _clean(path: str) -> str:
@@ -144,16 +130,11 @@ def _long(of: "Container", item: Mapping) -> Mount | None:
         of.refuse(own["type"].span, f"mounts of type '{kind}' cannot be isolated", "use a folder or a volume")
         return None
     told = {f"{key}.{name}": of.literal(node) or "" for key, nodes in about.items() for name, node in nodes.items()}
-    propagation, recursive = told.get("bind.propagation", ""), told.get("bind.recursive", "")
-    if propagation and propagation not in _PRIVATE:
-        _comes_back(of, about["bind"]["propagation"].span, propagation)
-        return None
-    if recursive not in ("", "enabled", "disabled", "readonly"):
-        message = (
-            f"'recursive: {recursive}' lets the service write to what is mounted below a folder that it only reads"
-        )
-        of.refuse(about["bind"]["recursive"].span, message, "remove it, or write readonly")
-        return None
+    for key, allowed in _BIND_OPTIONS.items():
+        if told.get(f"bind.{key}", "") not in ("", *allowed):
+            message = f"'{key}: {told[f'bind.{key}']}' of a mount reaches beyond the container"
+            of.refuse(about["bind"][key].span, message, "remove it")
+            return None
     kind = "bind" if kind == "volume" and is_path(source) else kind
     more: dict[str, Any] = {}
     if kind == "tmpfs":

@@ -1,7 +1,7 @@
 """A part of a compose file while it is read: its fields and texts, and the problems at their places."""
 
 import posixpath
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from dodo_dsl import source
@@ -49,9 +49,16 @@ class Part:
     def cut(self, span: Span, what: str, most: float, key: str = "") -> None:
         """A limit beyond ``most``, which takes its place; ``key`` of ``sandbox`` sets it, if one does."""
         hint = f"it is cut; '{key}' of 'sandbox' in dodo.yml sets the limit" if key else "it is cut"
-        whose = f"'{self.name}'" if "'" not in self.name else self.name
-        message = f"'{what}' of {whose} is beyond the test's limit of {_limit(most, key)}"
+        message = f"'{what}' of {self.name} is beyond the test's limit of {most:,g}"
         self.add(Diagnostic(span, "application-limit", message, hint, "warning"))
+
+    def unknown_key(self, key: str, of: source.Mapping, where: str, known: Collection[str], hint: str = "") -> None:
+        """A key of a mapping that compose has not; one with x- is somebody's own."""
+        if not key.startswith("x-"):
+            fix = None if hint else only_fix(key, known, of.entries)
+            hint = hint or did_you_mean(key, known) or ASK_KEY.format(key)
+            message = f"unknown key '{key}' in {where}"
+            self.add(Diagnostic(of.entries[key].key, "unknown-key", message, hint, fix=fix))
 
     def literal(self, node: Node) -> str | None:
         """A text that is known when the test is compiled; None for any other, with a problem."""
@@ -91,18 +98,9 @@ class Part:
                     self.refuse(spot(entry), f"'{key}' of {what} cannot be isolated: {refused[key]}", "remove it")
             elif key in gone:
                 self.left.append((key, entry.key))
-            elif not key.startswith("x-"):
-                every = (*words, *gone, *(refused or ()))
-                hint = did_you_mean(key, every) or ASK_KEY.format(key)
-                fix = only_fix(key, every, node.entries if isinstance(node, source.Mapping) else ())
-                self.add(Diagnostic(entry.key, "unknown-key", f"unknown key '{key}' in {what}", hint, fix=fix))
+            elif isinstance(node, source.Mapping):
+                self.unknown_key(key, node, what, (*words, *gone, *(refused or ())))
         return found
-
-
-def _limit(most: float, key: str) -> str:
-    if key in ("memory", "file-size"):
-        return f"{most / 10**9:g} GB ({most:,.0f} bytes)"
-    return f"{most:,g}" if most < 10**6 else f"{most:,.0f}"
 
 
 def spot(entry: source.Entry) -> Span:

@@ -4,7 +4,6 @@ Patterns are RE2's, so that the time that a line takes grows only with its lengt
 patterns are.
 """
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -19,7 +18,6 @@ _SYNTAX = "patterns are those of RE2, https://github.com/google/re2/wiki/Syntax"
 _MAX_MEMORY = 8 << 20
 _MAX_SIZE = 1000
 """Instructions of a pattern, by which the time of a line grows, too; a usual one has less than a hundred."""
-_PLAIN_GROUP = re.compile(r"(?<!\\)(?:\\\\)*\((?!\?)")
 
 
 class PatternError(ValueError):
@@ -65,17 +63,10 @@ def line_problems(line: PrintedLine, known: Mapping[str, Definition]) -> Iterato
         hint = "name each part of the line that is a field, for example (?P<groundSteering>[-+.0-9eE]+)"
         yield Diagnostic(line.match_span, LINES_RULE, "the pattern has no group, so that no field gets a value", hint)
     elif pattern.groups > len(groups):
-        yield Diagnostic(line.match_span, LINES_RULE, *_surplus(line.match, groups))
+        message = "the pattern has a group that no field alone takes"
+        yield Diagnostic(line.match_span, LINES_RULE, message, "name each once, as in (?P<field>...), or write (?:...)")
     if name in known:
         yield from _unknown_fields(line, groups, known[name])
-
-
-def _surplus(pattern: str, groups: list[str]) -> tuple[str, str]:
-    """Why there are more groups than names, and what to do."""
-    twice = next((group for group in groups if pattern.count(f"<{group}>") > 1), None)
-    if twice and not _PLAIN_GROUP.search(pattern):
-        return f"the pattern has two groups '{twice}'", "a field has one value: name each group once"
-    return "the pattern has a group without a field", "name it, as in (?P<field>...), or write (?:...)"
 
 
 def _unknown_fields(line: PrintedLine, groups: list[str], definition: Definition) -> Iterator[Diagnostic]:

@@ -12,8 +12,8 @@ from dodo_dsl.application import declarations as declared
 from dodo_dsl.application import secret_problems
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles, dotenv_problems
+from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
-from dodo_dsl.application.interpolation import changed_node, filled
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.model import (
     Access,
@@ -27,13 +27,12 @@ from dodo_dsl.application.model import (
 from dodo_dsl.application.model import declared as declaration_of
 from dodo_dsl.application.variables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Node, Reader
+from dodo_dsl.source import Entry, Reader
 from dodo_dsl.spec.deployment import Declarations
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.validation import validate
 
 MAX_SERVICES = 256
-_OURS = ("services", "version", "name", "networks", "include")
 
 
 def read_application(
@@ -42,18 +41,17 @@ def read_application(
     limits: SandboxLimits = SandboxLimits(),  # noqa: B008
     reader: Reader = source.read,
     declarations: Declarations = Declarations(),  # noqa: B008
-    keeps_wrong: bool = False,
 ) -> tuple[ApplicationSource | None, list[Diagnostic]]:
     """An application from one compose file, or from several that are merged in order, and its problems.
 
     ``access`` is what the deployment allows it, ``limits`` are the highest that it may set. ``declarations`` are what
-    the deployment says of the application in its files; they do not hold for others. ``keeps_wrong`` keeps one with
-    errors, as far as it could be read.
+    the deployment says of the application in its files; they do not hold for others. One with errors is as far as it
+    could be read.
     """
     paths = [path] if isinstance(path, Path) else list(path)
     declarations = declared.holding(declarations, paths)
     roots = (*repository(paths[0].resolve().parent), *map(Path, access.roots))
-    files = ComposeFiles(reader, roots, access.passed)
+    files = ComposeFiles(paths[0].parent, reader, roots, access.passed)
     found = files.problems
     found.extend(_links(paths))
     if found:
@@ -77,34 +75,25 @@ def read_application(
     root = Path(access.roots[0]) if access.roots else None
     named = tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths)
     application = replace(application, dropped={**application.dropped, **gone}, named=named, without=tuple(gone))
-    found.extend(unread(paths, root))
-    found.extend(declared.depending(application, gone))
+    found.extend(() if "COMPOSE_FILE" in files.known else unread(paths, root))
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
     found.extend(problem for problem in _secrets(application, document, files) if problem.span not in refused)
-    return (application if application.services and (keeps_wrong or not has_errors(found)) else None), found
+    return (application if application.services else None), found
 
 
 def _secrets(application: ApplicationSource, document: source.Mapping, files: ComposeFiles) -> Iterator[Diagnostic]:
     """Warnings of what looks like a secret, in the compose files and beside them."""
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
     yield from secret_problems.withheld(nodes, files.written, {*files.known, *files.secrets, *files.passed}, os.environ)
-    yield from secret_problems.written([document])
     for file, raw in _own_files(application):
-        yield from (*dotenv_problems(file, raw=raw), *secret_problems.in_file(file, raw))
-    yield from secret_problems.left_out(files.secrets)
+        yield from dotenv_problems(file, raw=raw)
 
 
 def as_written(path: Path) -> ApplicationSource | None:
-    """The application of a compose file with whatever else is wrong with it; None if it is not a compose file."""
-    roots = repository(path.resolve().parent)
-    files = ComposeFiles(source.read, roots)
-    document = load(files, [path])
-    services = document.get("services") if document else None
-    if document is None or not isinstance(services, source.Mapping) or has_errors(validate(document, "application")):
-        return None
-    return _application(path.resolve(), document, services, files, Access(), SandboxLimits())
+    """The application of a compose file with whatever is wrong with it; None if it cannot be read."""
+    return read_application(path)[0]
 
 
 def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
@@ -124,7 +113,6 @@ def _application(
     limits: SandboxLimits,
 ) -> ApplicationSource:
     dropped = {name: why for name, entry in services.entries.items() if (why := _why_dropped(plain(entry.value)))}
-    rest = {k: e.value for k, e in document.entries.items() if k not in _OURS and not k.startswith("x-")}
     kept = {
         name: service
         for name, entry in services.entries.items()
@@ -133,7 +121,6 @@ def _application(
     return ApplicationSource(
         path=path,
         services=kept,
-        rest=rest,
         dropped=dropped,
         containers={str(c): n for n, s in kept.items() if (c := plain(s.node).get("container_name"))},
         secrets=files.secrets,
@@ -157,17 +144,12 @@ def _service(name: str, entry: Entry, folder: Path, files: ComposeFiles) -> Comp
         return None
     raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
     entries = {
-        key: Entry(each.key, _as_written(each.value, files)) if key in raw else each
+        key: Entry(each.key, filled_node(each.value, files.known, files.is_late)) if key in raw else each
         for key, each in node.entries.items()
     }
     node = replace(node, entries=entries)
     own = tuple(env_files(node))
     return ComposeService(name, node, entry.key, declaration_of(node), own, file_statements(own, folder), raw)
-
-
-def _as_written(node: Node, files: ComposeFiles) -> Node:
-    """A value without what a test sets."""
-    return changed_node(node, lambda text: filled(text, files.known, files.is_late))
 
 
 def _why_dropped(service: dict[str, Any]) -> str:

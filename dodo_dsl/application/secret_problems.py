@@ -3,11 +3,9 @@
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import interpolation, secret_variables
-from dodo_dsl.application.compose_files import statements_of
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 
@@ -38,27 +36,16 @@ def withheld(
 
 
 def written(nodes: Collection[Node]) -> Iterator[Diagnostic]:
-    """Values in the files themselves that look like secrets; each once, though anchors and merges repeat it."""
+    """Values in tests that look like secrets; each once, though anchors and merges repeat it."""
     seen: set[Span] = set()
     for node in nodes:
         for part in source.walk(node):
             kind = secret_variables.secret_kind(part.text) if isinstance(part, Scalar) else ""
             if kind and part.span not in seen:
                 seen.add(part.span)
-                yield _open(replace(part.span, length=0), kind)
-
-
-def in_file(file: Path, raw: bool) -> Iterator[Diagnostic]:
-    """The same of a file of ``env_file``."""
-    for name, value in statements_of(file, raw=raw):
-        if kind := secret_variables.secret_kind(value or ""):
-            yield _open(_place(file, name), kind)
-
-
-def _open(span: Span, kind: str) -> Diagnostic:
-    message = f"this looks like {kind}, which everybody with access to the repository can read"
-    hint = "keep it out of the repository, name its variable here, and write that in 'environment' of dodo.yml"
-    return Diagnostic(span, "application-secret", message, hint, "warning")
+                message = f"this looks like {kind}, which everybody with access to the repository can read"
+                hint = "keep it out of the repository, and pass a variable with 'environment' of dodo.yml"
+                yield Diagnostic(replace(part.span, length=0), "application-secret", message, hint, "warning")
 
 
 def _named(node: Node, key: str, texts: Mapping[Span, str]) -> Iterator[tuple[str, Span]]:
@@ -79,23 +66,3 @@ def _named(node: Node, key: str, texts: Mapping[Span, str]) -> Iterator[tuple[st
         yield from ((name, node.span) for name in sorted(interpolation.names(texts.get(node.span, ""))))
         if key == "environment" and isinstance(node.value, str):
             yield node.text, node.span
-
-
-def left_out(secrets: Mapping[str, Path]) -> Iterator[Diagnostic]:
-    """Secrets of the application's ``.env`` files, which are not copied into compiled tests."""
-    for file in dict.fromkeys(secrets.values()):
-        names = [name for name, of in secrets.items() if of == file]
-        listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
-        message = f"secrets stay out of compiled tests: {listed}"
-        hint = "'dodo run' takes them from this file, where it is there, or from variables that dodo.yml passes"
-        yield Diagnostic(_place(file, names[0]), "application-secret", message, hint, "warning")
-
-
-def _place(file: Path, name: str) -> Span:
-    """Where a variable is set; the line itself is not to be shown."""
-    lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-    found = re.compile(rf"\s*(?:export\s+)?(?P<name>{re.escape(name)})\s*[=:]")
-    for number, line in enumerate(lines, 1):
-        if match := found.match(line):
-            return Span(str(file), number, match.start("name") + 1, 0)
-    return Span(str(file), 1, 1, 0)

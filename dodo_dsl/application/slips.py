@@ -3,13 +3,12 @@
 import os
 import re
 import shlex
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application.model import ComposeService
-from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, shown_path
+from dodo_dsl.diagnostics import Diagnostic, shown_path
 from dodo_dsl.source import Scalar
 
 _FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
@@ -20,7 +19,6 @@ _SHORT = 3
 """Letters of a flag that others differ from by one, such as ``--pid`` and ``--id``."""
 
 INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
-_SCRIPTS = {".py": "python", ".sh": "sh", ".js": "node", ".pl": "perl", ".rb": "ruby"}
 
 
 def meant(word: str, flag: str) -> str:
@@ -85,41 +83,18 @@ def missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnosti
         parts = ", ".join(program.text.split())
         yield _cannot_start(program, f"there is no program '{program.text}', which is one word", f"write [{parts}]")
     elif "/" in program.text:
-        yield from _wrong_path(program, folder, is_built="build" in service.node.entries)
-    elif not shutil.which(program.text):
-        yield from _not_in_path(program, folder)
-
-
-def _wrong_path(program: Scalar, folder: Path, is_built: bool) -> Iterator[Diagnostic]:
-    """A service that ``is_built`` as an image has a program that a pipeline's check never sees."""
-    own = folder / program.text
-    if own.is_file() and not os.access(own, os.X_OK):
-        hint = f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
-        yield _cannot_start(program, f"'{program.text}' is not executable", hint)
-    elif not own.exists():
-        beside = own.parent.iterdir() if own.parent.is_dir() else ()
-        near = closest(own.name, [path.name for path in beside if os.access(path, os.X_OK)])
-        meant = f"did you mean '{program.text.removesuffix(own.name)}{near[0]}'?" if near else ""
-        if near or not is_built:
-            yield _cannot_start(program, f"there is no program '{program.text}'", meant or "build it first")
-
-
-def _not_in_path(program: Scalar, folder: Path) -> Iterator[Diagnostic]:
-    """A program in the PATH of another machine is none of the files here, and not spelt like an interpreter."""
-    suffix = Path(program.text).suffix
-    if (folder / program.text).is_file():
-        how = [f"[{_SCRIPTS[suffix]}, {program.text}]"] if suffix in _SCRIPTS else []
-        hint = " or ".join([*how, f"./{program.text}"])
-        yield _cannot_start(program, f"there is no program '{program.text}' in the PATH", f"write {hint}")
-    elif near := closest(program.text, INTERPRETERS):
-        yield _cannot_start(program, f"there is no program '{program.text}'", f"did you mean '{near[0]}'?")
+        own = folder / program.text
+        if own.is_file() and not os.access(own, os.X_OK):
+            hint = f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
+            yield _cannot_start(program, f"'{program.text}' is not executable", hint)
+        elif not own.exists() and "build" not in service.node.entries:  # which a pipeline's check never sees
+            yield _cannot_start(program, f"there is no program '{program.text}'", "build it first")
 
 
 def _missing_script(interpreter: str, words: list[Scalar], folder: Path) -> Iterator[Diagnostic]:
     name = words[0].text if words else ""
     if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
-        beside = [path.name for path in folder.iterdir() if path.suffix == Path(name).suffix]
-        hint = did_you_mean(Path(name).name, beside) or "without it the application starts in containers only"
+        hint = "without it the application starts in containers only"
         yield _cannot_start(words[0], f"there is no file '{name}' for {interpreter} to run", hint)
 
 

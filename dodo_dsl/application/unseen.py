@@ -4,7 +4,7 @@ import os
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.construction import construction_of
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment import Deployment
@@ -29,7 +29,7 @@ def unseen_problems(
 ) -> Iterator[Diagnostic]:
     """Mounts, configs, secrets, files of variables and builds' contexts in a folder that no application sees."""
     hidden = unseen_folders(application, deployment, registries)
-    construction = Construction(application, Setting(1, "network", application.folder, limits=application.limits))
+    construction = construction_of(application)
     for service in application.services.values():
         construction.service(service)
     construction.rest()
@@ -38,11 +38,5 @@ def unseen_problems(
             continue
         names = map(Path, application.paths.names(source))
         if holder := next((h for name in names for h in hidden if name.is_relative_to(h)), None):
-            what = f"'{holder.name}', {_reason(holder)}"
-            message = f"'{source}' lies in {what}, which no application sees"
+            message = f"'{source}' lies in '{holder.name}', which no application sees"
             yield Diagnostic(span, "application-isolation", message, "keep what it needs in another folder")
-
-
-def _reason(holder: Path) -> str:
-    reasons = {".git": "where Git keeps its own", "generated": "the compiled tests", "dodo-report": "the report"}
-    return reasons.get(holder.name, "a folder of tests or of DoDo's services")

@@ -4,16 +4,18 @@ A test sets ``application: {env: {SPEED: 0.5}}``. The application has parameters
 ``x-dodo: {tune: {KP: {from: 0.2, to: 3, default: 1}}}``.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
 
 from dodo_dsl import source
-from dodo_dsl.application.interpolation import changed_node, filled, literal, names
+from dodo_dsl.application.compose_paths import filled_node
+from dodo_dsl.application.interpolation import filled, literal, names
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
-from dodo_dsl.diagnostics import Diagnostic, closest
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.vary import Range
 
@@ -54,7 +56,7 @@ def with_variables(application: ApplicationSource, values: Mapping[str, str]) ->
 def _with_values(service: ComposeService, known: Mapping[str, str], is_late: Callable[[str], bool]) -> ComposeService:
     entries = dict(service.node.entries)
     for key, node in service.raw.items():
-        value = changed_node(node, lambda text: filled(text, known, is_late))
+        value = filled_node(node, known, is_late)
         entries[key] = Entry(entries[key].key, value)
     return replace(service, node=replace(service.node, entries=entries))
 
@@ -122,14 +124,9 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
 def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Parameters that are DoDo's own, without a range, or with different ones at several services."""
     seen: dict[str, tuple[str, Range]] = {}
-    used = _variables(application)
     for service in application.services.values():
         for name, entry in _written(service).items():
             problems = list(_problems(name, entry))
-            near = closest(name.lower(), {each.lower() for each in used}) if name not in used else []
-            if meant := [each for each in sorted(used) if each.lower() in near[:1]]:
-                message = f"nothing in the application uses the variable '{name}'"
-                yield Diagnostic(entry.key, _RULE, message, f"did you mean '{meant[0]}'?", "warning")
             yield from problems
             if problems:
                 continue
@@ -138,17 +135,6 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
             if _numbers(first) != _numbers(one):
                 message = f"'{name}' has another range at '{other}', expected the same one: a parameter has one value"
                 yield Diagnostic(entry.key, _RULE, message)
-
-
-def _variables(application: ApplicationSource) -> set[str]:
-    """The variables that the services set or fill in; a program may read others."""
-    found: set[str] = set()
-    for service in application.services.values():
-        found.update(environment(plain(service.node).get("environment")))
-        texts = (part.text for node in service.raw.values() for part in source.walk(node) if isinstance(part, Scalar))
-        found.update(*map(names, texts))
-        found.update(service.file_variables)
-    return found
 
 
 def _written(service: ComposeService) -> dict[str, Entry]:
@@ -177,21 +163,13 @@ def _problems(name: str, entry: Entry) -> Iterator[Diagnostic]:
     if why := owner(name):
         yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
         return
-    one = _range(name, entry)
-    if broken := [end for end in (*one.ends, one.nominal) if not _is_decimal(one, end)]:
-        yield Diagnostic(broken[0].span, _RULE, f"'{broken[0].text}' is not a finite decimal number")
-        return
-    low, high, default = _numbers(one)
+    low, high, default = (float(str(scalar.value)) for scalar in _scalars(entry))
+    start, end, middle = _scalars(entry)
+    for scalar in (start, end, middle):
+        if not math.isfinite(float(str(scalar.value))):
+            yield Diagnostic(scalar.span, _RULE, f"'{scalar.text}' is not a finite decimal number")
+            return
     if low >= high:
-        message = f"'from' is {one.ends[0].text}, expected less than 'to', {one.ends[1].text}"
-        yield Diagnostic(one.ends[0].span, _RULE, message)
+        yield Diagnostic(start.span, _RULE, f"'from' is {start.text}, expected less than 'to', {end.text}")
     elif not low <= default <= high:
-        message = f"'default' is {one.nominal.text}, expected {one.ends[0].text} to {one.ends[1].text}"
-        yield Diagnostic(one.nominal.span, _RULE, message)
-
-
-def _is_decimal(one: Range, end: Scalar) -> bool:
-    try:
-        return one.number(end.text).is_finite()
-    except (ArithmeticError, ValueError):
-        return False
+        yield Diagnostic(middle.span, _RULE, f"'default' is {middle.text}, expected {start.text} to {end.text}")

@@ -1,29 +1,24 @@
 """``plan_application``: the application as a test runs it, in containers and as processes."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application import opendlv_flags
+from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.construction import Construction, Setting
-from dodo_dsl.application.interpolation import changed_node, filled
-from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
+from dodo_dsl.application.model import SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
 from dodo_dsl.application.variables import variables_of
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
 from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
-
-_LONG = 200
 
 
 def plan_application(application: ApplicationSource, setting: Setting) -> Application:
     """The application as a test runs it."""
     construction = Construction(application, setting)
     services = {name: _container(construction, service) for name, service in application.services.items()}
-    changes = [f"{name}: left out, {why}" for name, why in application.dropped.items()]
-    for name, made in services.items():
-        changes += _changes(application.services[name], made)
     access = replace(
         application.access,
         roots=tuple(_relative(root, setting.folder) for root in application.other_roots),
@@ -34,7 +29,7 @@ def plan_application(application: ApplicationSource, setting: Setting) -> Applic
         _relative(application.folder, setting.folder),
         tuple(_process(service, application, setting) for service in application.services.values()),
         {"services": services, **construction.rest()},
-        tuple(_with_common(changes, list(services))),
+        tuple(f"{name}: left out, {why}" for name, why in application.dropped.items()),
         setting.limits,
         secrets={name: _relative(file, setting.folder) for name, file in application.secrets.items()},
         access=access,
@@ -64,31 +59,6 @@ def _container(construction: Construction, service: ComposeService) -> dict[str,
     return made
 
 
-def _changes(service: ComposeService, made: Mapping[str, Any]) -> Iterator[str]:
-    """Which keys the container has otherwise than the compose file, for the first lines of its own one."""
-    written = {key: value for key, value in plain(service.node).items() if key not in KEYS}
-    for words, keys in (
-        ("changed", [key for key in written if key in made and made[key] != written[key]]),
-        ("added", [key for key in made if key not in written]),
-        ("left out", [key for key in written if key not in made and written[key] is not None]),
-    ):
-        line = f"{service.name}: {words}: {', '.join(sorted(keys))}"
-        line = "".join(c if c.isprintable() else "?" for c in line)
-        yield from [line if len(line) <= _LONG else f"{line[: _LONG - 3]}..."] if keys else []
-
-
-def _with_common(changes: Sequence[str], names: Sequence[str]) -> list[str]:
-    """The changes, where those that all of several services have are one each, after the others."""
-    texts = {
-        name: [line.removeprefix(f"{name}: ") for line in changes if line.startswith(f"{name}: ")] for name in names
-    }
-    common = (
-        [text for text in texts[names[0]] if all(text in other for other in texts.values())] if len(names) > 1 else []
-    )
-    repeated = {f"{name}: {text}" for name in names for text in common}
-    return [*(line for line in changes if line not in repeated), *(f"all services: {text}" for text in common)]
-
-
 def _process(service: ComposeService, application: ApplicationSource, setting: Setting) -> ApplicationService:
     """The service as it starts without containers; its CID is filled in when it starts."""
     raw, own, cid = plain(service.node), service.declared, setting.cid
@@ -97,11 +67,7 @@ def _process(service: ComposeService, application: ApplicationSource, setting: S
     def is_late(name: str) -> bool:
         return name in opendlv_flags.CID_VARIABLES or application.is_late(name)
 
-    written = (
-        plain(changed_node(service.raw["command"], lambda word: filled(word, known, is_late)))
-        if "command" in service.raw
-        else None
-    )
+    written = plain(filled_node(service.raw["command"], known, is_late)) if "command" in service.raw else None
     command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
     found = variables_of(service, known, is_late, dict(setting.given))
     variables = {k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in found.items()}

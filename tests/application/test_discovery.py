@@ -61,10 +61,7 @@ def test_a_file_that_includes_the_base_is_the_way_to_do_without(tmp_path: Path) 
     assert (list(test.services), test.told) == (["a"], ())
 
 
-@pytest.mark.parametrize("separator", [":", ","])
-def test_compose_file_in_env_replaces_what_it_would_find(tmp_path: Path, separator: str) -> None:
-    root = write(tmp_path, "docker-compose.yml", "docker-compose.override.yml", "sim.yml")
-    words = [f"COMPOSE_FILE=docker-compose.yml{separator}sim.yml", f"COMPOSE_PATH_SEPARATOR={separator}"]
-    (root / ".env").write_text("\n".join(words) + "\n")
-    assert named(root, "docker-compose.yml") == ["sim.yml"]
-    assert named(root, "docker-compose.yml", "sim.yml") == []
+def test_what_env_names_is_compose_s_own(tmp_path: Path) -> None:
+    root = write(tmp_path, "docker-compose.yml", "docker-compose.override.yml")
+    (root / ".env").write_text("COMPOSE_FILE=docker-compose.yml\n")
+    assert named(root, "docker-compose.yml") == []

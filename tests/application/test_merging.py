@@ -39,6 +39,7 @@ TABLE: dict[str, list[Any]] = yaml.load((Path(__file__).parent / "merging.yml").
 OTHER = {
     "base": {"image": "y", "build": ".", "extends": {"service": "eyes"}},
     "eyes": {"image": "e", "environment": {"A": 1}},
+    "built": {"build": {"dockerfile": "D", "additional_contexts": ["d=data"]}},
     "mounts": {"image": "x", "volumes": ["./data:/d:ro"], "env_file": ["o.env"]},
 }
 FILES = {
