@@ -80,11 +80,3 @@ def test_a_service_has_the_keys_of_x_dodo() -> None:
     declared = schema_of("deployment")["properties"]["application"]["properties"]["services"]
     keys = schema_of("application")["$defs"]["service"]["properties"]["x-dodo"]["properties"]
     assert set(declared["additionalProperties"]["properties"]) == {*keys, "process"}
-
-
-def test_a_service_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "docker-compose.yml").write_text(COMPOSE)
-    (tmp_path / "dodo.yml").write_text("application: {files: docker-compose.yml, without: [viewer, driver]}\ndodo: 1\n")
-    (problem,) = load([]).problems.common
-    assert problem.message.startswith("'without' leaves out every service of the application")
