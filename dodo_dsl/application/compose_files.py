@@ -20,7 +20,7 @@ _FILLED = ("services", "volumes", "networks", "secrets", "configs", "include")
 _PATHS = ("build", "env_file", "extends", "volumes")
 """Those with paths of the host."""
 _FOLDERS = {"PWD": ".", "HOME": "~"}
-"""What variables stand for at the begin of a path."""
+"""What variables stand for where a path starts with them."""
 _FOLDER = re.compile(r"\$(?:\{(?P<braced>PWD|HOME)\}|(?P<bare>PWD|HOME)(?![A-Za-z0-9_]))(?=/|:|$)")
 _LATE = ("PATH",)
 _IMAGES = "DODO_IMAGE_"
@@ -59,7 +59,7 @@ class ComposeFiles:
         self._nodes = 0
 
     def filled(self, text: str, *, is_path: bool = True) -> str:
-        """A text with its variables filled in; at the begin of a path, the compose file's folder and the home."""
+        """A text with its variables filled in; where a path starts with them, the compose file's folder and the home."""
         match = _FOLDER.match(text) if is_path else None
         text = _FOLDERS[match["braced"] or match["bare"]] + text[match.end() :] if match else text
         return filled(text, {**self.included, **self.known}, self.is_late)

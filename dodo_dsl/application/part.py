@@ -67,7 +67,11 @@ class Part:
         found = literal(text(plain(node)))
         if found is None and "?" not in node.text:
             message = f"'{node.text}' has a variable whose value is not known when the test is compiled"
-            self.bad(node.span, message, "write the value here, or a variable of .env that is no secret")
+            self.bad(
+                node.span,
+                message,
+                "write the value here, or set it in .env under a name that does not look like a secret",
+            )
         return found
 
     def path(self, found: str | None, span: Span, *, base: str = "") -> str | None:
