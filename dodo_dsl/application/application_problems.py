@@ -75,11 +75,12 @@ def _missing_folder(service: ComposeService, application: ApplicationSource) -> 
     """A folder to build from that is not there: a warning, as an image or a variable for it may stand in."""
     build = service.node.get("build")
     context = build.get("context") if isinstance(build, source.Mapping) else build
-    if not isinstance(context, source.Scalar) or not isinstance(context.value, str) or not is_local(context.value):
+    folder = literal(context.value) if isinstance(context, source.Scalar) and isinstance(context.value, str) else None
+    if folder is None or context is None or not is_local(folder):
         return
-    if application.paths.is_own(context.value) and not (application.folder / context.value).is_dir():
+    if application.paths.is_own(folder) and not (application.folder / folder).is_dir():
         hint = "create it, or remove 'build'; paths are relative to this file"
-        yield Diagnostic(context.span, "application-file", f"there is no folder '{context.text}'", hint, "warning")
+        yield Diagnostic(context.span, "application-file", f"there is no folder '{folder}'", hint, "warning")
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:

@@ -1,7 +1,8 @@
 """The files of an application, each read once, with their problems."""
 
 import os
-from collections.abc import Collection, Iterator
+import re
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl import source
@@ -16,8 +17,11 @@ TEST_FILLED = ("command", "entrypoint", "environment", "healthcheck")
 """The keys of a service whose variables a test may set, so that they are filled in for each test."""
 _FILLED = ("services", "volumes", "networks", "secrets", "configs", "include")
 """The top-level keys below which compose fills in variables."""
+_PATHS = ("build", "env_file", "extends", "volumes")
+"""Those with paths of the host."""
 _FOLDERS = {"PWD": ".", "HOME": "~"}
-"""Variables that stand for folders, in keys that hold paths."""
+"""What variables stand for at the begin of a path."""
+_FOLDER = re.compile(r"\$(?:\{(?P<braced>PWD|HOME)\}|(?P<bare>PWD|HOME)(?![A-Za-z0-9_]))(?=/|:|$)")
 _LATE = ("PATH",)
 _IMAGES = "DODO_IMAGE_"
 """How variables begin by which a pipeline sets images."""
@@ -46,11 +50,23 @@ class ComposeFiles:
         self.passed = passed
         self.problems: list[Diagnostic] = []
         self.known: dict[str, str] = {}
+        self.included: dict[str, str] = {}
+        """The variables of the file that is being included, which those that are known come before."""
         self.secrets: dict[str, Path] = {}
         self.written: dict[Span, str] = {}
-        self._of: dict[str, Path] = {}
-        self._documents: dict[tuple[Path, Path], source.Mapping | None] = {}
+        self._read: dict[Path, source.Mapping | None] = {}
+        self._documents: dict[tuple[Path, Path, frozenset[tuple[str, str]]], source.Mapping | None] = {}
         self._nodes = 0
+
+    def filled(self, text: str, *, is_path: bool = True) -> str:
+        """A text with its variables filled in; at the begin of a path, the compose file's folder and the home."""
+        match = _FOLDER.match(text) if is_path else None
+        text = _FOLDERS[match["braced"] or match["bare"]] + text[match.end() :] if match else text
+        return filled(text, {**self.included, **self.known}, self.is_late)
+
+    def _of_include(self, text: str) -> str:
+        """A text that each test fills in, with the variables that only an included file has."""
+        return filled(text, self.included, lambda name: name in self.known or name not in self.included)
 
     def is_late(self, name: str) -> bool:
         """Whether a variable has its value only when a test runs."""
@@ -78,9 +94,9 @@ class ComposeFiles:
     def problem(self, span: Span, message: str, hint: str = "") -> None:
         self.problems.append(Diagnostic(span, "application-file", message, hint))
 
-    def document(self, file: Path, folder: Path) -> source.Mapping | None:
-        """A file whose paths are relative to ``folder``, with them relative to the application's own folder."""
-        if (file, folder) not in self._documents:
+    def read(self, file: Path) -> source.Mapping | None:
+        """A file as it is written."""
+        if file not in self._read:
             node, found = self._reader(file)
             if node is None and not found:
                 found = [Diagnostic(Span(str(file)), "application-file", "the file is empty, expected a compose file")]
@@ -89,10 +105,17 @@ class ComposeFiles:
                 found = [*found, Diagnostic(node.span, "wrong-type", message)]
             self.problems += [problem for problem in found if problem not in self.problems]
             fits = isinstance(node, source.Mapping) and self.grow(node, Span(str(file)))
-            self._documents[file, folder] = self._read(node, folder) if node is not None and fits else None
-        return self._documents[file, folder]
+            self._read[file] = node if isinstance(node, source.Mapping) and fits else None
+        return self._read[file]
 
-    def _read(self, node: Node, folder: Path) -> source.Mapping | None:
+    def document(self, file: Path, folder: Path) -> source.Mapping | None:
+        """A file whose paths are relative to ``folder``, with them relative to the application's own folder."""
+        node, key = self.read(file), (file, folder, frozenset(self.included.items()))
+        if key not in self._documents:
+            self._documents[key] = None if node is None else self._changed(node, folder)
+        return self._documents[key]
+
+    def _changed(self, node: Node, folder: Path) -> source.Mapping | None:
         document = compose_paths.changed(node, self._filled)
         if folder != self.folder and isinstance(document, source.Mapping):
             document = compose_paths.relocated(document, self.relative(folder))
@@ -112,8 +135,9 @@ class ComposeFiles:
             self.problems += [problem] if problem not in self.problems else []
         self.written[word.span] = text
         key = place[2] if place[0] == "services" and len(place) > 2 else ""
-        is_own = key in TEST_FILLED or key.startswith("x-")
-        return text if is_own else filled(text, {**_FOLDERS, **self.known}, self.is_late)
+        if key in TEST_FILLED or key.startswith("x-"):
+            return self._of_include(text)
+        return self.filled(text, is_path=place[0] != "services" or key in _PATHS)
 
     def other(self, word: Scalar, folder: Path) -> Path | None:
         """The file that another one in ``folder`` names; None, with a problem, when it is not one of the repository."""
@@ -141,31 +165,34 @@ class ComposeFiles:
             self.problems.append(Diagnostic(word.span, "application-isolation", problem, "keep it in the repository"))
         return not problem
 
-    def gather(self, file: Path | None, span: Span) -> None:
-        """Adds the variables of an ``.env`` file, if there is one."""
-        if file is None:
-            return
+    def gather(self, file: Path, taken: Collection[str] = ()) -> dict[str, str]:
+        """The variables of an ``.env`` file, if there is one, without secrets, as those that are ``taken`` for one."""
         self.problems.extend(dotenv_problems(file))
         own: dict[str, str] = {}
-        for name, value in dotenv(text_of(file))[0]:
-            if value is None or self.is_late(name):
+        for name, value in statements_of(file):
+            if value is None or name in self.passed:
                 continue
-            text = literal(filled(value, {**self.known, **own}, self.is_late))
-            if text is not None and not holds_secret(name, text):
+            text = literal(self.filled_with(value, own))
+            if text is not None and name not in taken and not holds_secret(name, text):
                 own[name] = text
             elif not is_steering(name):
                 self.secrets[name] = file
-        for name, text in own.items():
-            if self.known.get(name, text) != text:
-                message = f"variable '{name}' has another value in '{file.name}' than in an earlier file"
-                self.problem(span, message, "a test has one .env file, so give the variable one value")
-            else:
-                self.known[name], self._of[name] = text, file
+        return own
 
-    def keep_secret(self, name: str) -> None:
-        """Makes a variable of the files one that no compiled test holds."""
-        if name in self._of:
-            self.secrets[name] = self._of[name]
+    def filled_with(self, value: str, own: Mapping[str, str]) -> str:
+        """A value of an ``.env`` file after the variables of its own earlier lines."""
+        match = _FOLDER.match(value)
+        value = _FOLDERS[match["braced"] or match["bare"]] + value[match.end() :] if match else value
+        return filled(value, {**own, **self.included, **self.known}, self.is_late)
+
+
+Statements = tuple[tuple[str, str | None], ...]
+"""The names and values of a file of variables, in order; None takes the value from outside."""
+
+
+def statements_of(file: Path, *, raw: bool = False) -> Statements:
+    """What a regular file sets; symlinks are not followed."""
+    return tuple(dotenv(text_of(file), raw=raw)[0])
 
 
 def dotenv_problems(file: Path, *, raw: bool = False) -> Iterator[Diagnostic]:

@@ -125,7 +125,7 @@ _REPLACED = {("command",), ("entrypoint",), ("healthcheck", "test")}
 _BY_TARGET = {("volumes",), ("devices",), ("secrets",), ("configs",)}
 _LISTS = (
     "cap_add", "cap_drop", "device_cgroup_rules", "dns", "dns_opt", "dns_search", "env_file", "expose",
-    "group_add", "links", "profiles", "security_opt", "tmpfs",
+    "group_add", "links", "profiles", "security_opt", "tmpfs", "volumes_from",
 )  # fmt: skip
 _FORMS: dict[Path, Callable[[Node], Node]] = {
     **{(key,): _as_pairs for key in ("environment", "sysctls")},

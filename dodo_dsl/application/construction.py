@@ -61,7 +61,7 @@ class Construction:
     def __init__(self, application: ApplicationSource, setting: Setting) -> None:
         self.application, self.setting = application, setting
         self.paths, self.ports = application.paths, application.access.ports
-        self.base = compose_paths.escaped(Path(os.path.relpath(application.folder, setting.folder)).as_posix())
+        self.base = Path(os.path.relpath(application.folder, setting.folder)).as_posix()
         self.problems: list[Diagnostic] = []
         self.shown: list[tuple[str, Span, str]] = []
         self.copies: dict[str, str] = {}
@@ -85,10 +85,10 @@ class Construction:
         return Part(self, name, span)
 
     def rebased(self, path: str) -> str:
-        """A path of the application as seen from the compiled test's folder, as compose reads it."""
+        """A path of the application as seen from the compiled test's folder."""
         if path.startswith(("/", "~")):
-            return compose_paths.escaped(path)
-        joined = os.path.normpath(f"{self.base}/{compose_paths.escaped(path)}")
+            return path
+        joined = os.path.normpath(f"{self.base}/{path}")
         return joined if joined.startswith(".") else f"./{joined}"
 
     def show(self, source: str, span: Span, writer: str = "") -> None:
@@ -113,7 +113,7 @@ class Construction:
         if name or place not in self._copied:
             own = name or f"{COPY}{sum(each.startswith(COPY) for each in self.copies)}"
             self._copied.setdefault(place, own)
-            self.copies[own] = self.rebased(source)
+            self.copies[own] = compose_paths.escaped(self.rebased(source))
             return own
         return self._copied[place]
 
@@ -140,17 +140,24 @@ class Construction:
             refused=dict.fromkeys(("driver", "driver_opts", "template_driver"), "a program would provide it")
             | {"external": f"the engine's {key} are not the application's"},
         )  # fmt: skip
-        if file := of.path(fields.get("file")):
-            return {"file": file}
+        if "file" in fields:
+            file = of.path(of.literal(fields["file"]), fields["file"].span)
+            return {"file": file} if file else {}
         if "content" in fields and isinstance(text := fields["content"], Scalar):
             return {"content": text.text}
         variable = of.literal(fields["environment"]) if "environment" in fields else None
         if variable and self.application.is_late(variable):
             return {"environment": variable}
+        if variable and variable in self.application.known and key == "configs":
+            return {"content": compose_paths.escaped(self.application.known[variable])}
         if variable and secret_variables.is_of_pipeline(variable):
             message = f"{what} is '{variable}', which belongs to the pipeline and not to the application"
             hint = f"to allow it, write environment: [{variable}] in dodo.yml"
             of.refuse(fields["environment"].span, message, hint)
+        elif variable:
+            message = f"{what} is empty in a test, as the variable '{variable}' has no value"
+            hint = f"pass it with environment: [{variable}] in dodo.yml, or set it in .env"
+            of.add(Diagnostic(fields["environment"].span, "application-secret", message, hint, "warning"))
         if not (isinstance(node, Mapping) and node.entries):
             of.bad(span, f"{what} has neither 'file' nor 'environment'", f"for example {name}: {{file: ./{name}.txt}}")
         return {"file": "/dev/null"}

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
-from dodo_dsl.application.compose_paths import filled_node
+from dodo_dsl.application.compose_paths import escaped, filled_node
 from dodo_dsl.application.model import (
     FILES,
     NAMESPACES,
     OFFSCREEN,
     SANDBOX,
     ComposeService,
+    borrowed,
     env_files,
+    environment,
     plain,
     reference,
     text,
@@ -24,7 +26,7 @@ from dodo_dsl.application.model import (
 from dodo_dsl.application.mounts import mounts
 from dodo_dsl.application.part import Part, pairs, spot
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, listed
+from dodo_dsl.diagnostics import Diagnostic, did_you_mean, listed
 from dodo_dsl.source import Node, Scalar
 
 if TYPE_CHECKING:
@@ -130,8 +132,7 @@ def _healthcheck(c: Container, _: Node) -> Any:
 def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
     for file in env_files(c.service.node):
-        word = Scalar(file.span, file.path, file.path)
-        if path := c.path(word):
+        if path := c.path(file.path, file.span):
             about = {"path": path, **({} if file.required else {"required": False})}
             about |= {"format": "raw"} if file.raw else {}
             made.append(about if len(about) > 1 else path)
@@ -145,7 +146,9 @@ def _own_environment(c: Container) -> None:
     made = {k: None if v is None else opendlv_flags.with_cid_text(v, setting.cid) for k, v in found.items()}
     names = [n for n in opendlv_flags.CID_VARIABLES if n in made or n in c.service.file_variables]
     made |= dict.fromkeys(names, str(setting.cid))
-    if "DISPLAY" in made and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):
+    raw = c.raw("environment")
+    names_it = raw is not None and "DISPLAY" in environment(plain(raw))
+    if names_it and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):
         made |= OFFSCREEN
     if made:
         c.own["environment"] = made
@@ -167,6 +170,19 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
     elif key == "network_mode" and word == "none":
         return word
     return None
+
+
+def _volumes_from(c: Container, node: Node) -> Any:
+    containers, services = c.project.application.containers, c.project.application.services
+    made = []
+    for item in c.items(node):
+        kind, name, options = borrowed(c.literal(item))
+        if kind == "container" and name not in containers:
+            c.refuse(item.span, f"the container '{name}' is not part of the application", "make it a service of it")
+            continue
+        name = containers[name] if kind == "container" else name
+        made += [escaped(f"{name}{options}")] if name in services else []
+    return made or None
 
 
 def _networks(c: Container, node: Node) -> Any:
@@ -200,9 +216,15 @@ def _sysctls(c: Container, node: Node) -> Any:
     return {key: plain(value) for key, value in found.items() if is_own or not key.startswith("net.")} or None
 
 
-def _secrets(c: Container, node: Node) -> Any:
+def _secrets(c: Container, node: Node, key: str) -> Any:
+    top = c.project.application.rest.get(key)
+    known = top.entries if isinstance(top, source.Mapping) else {}
     for item in c.items(node):
-        c.fields(item, f"a secret or config of '{c.name}'", "source target uid gid mode")
+        fields = c.fields(item, f"a {key[:-1]} of '{c.name}'", "source target uid gid mode")
+        word = fields.get("source") if isinstance(item, source.Mapping) else item
+        if isinstance(word, Scalar) and word.text not in known:
+            message = f"'{c.name}' takes the {key[:-1]} '{word.text}', which the top-level '{key}' do not declare"
+            c.bad(word.span, message, did_you_mean(word.text, known))
     return plain(node)
 
 
@@ -268,7 +290,7 @@ _CARRIED: dict[str, Key] = {
     "build": image.build,
     "cap_add": hardware.capabilities,
     "command": lambda c, _: _command(c, "command"),
-    "configs": _secrets,
+    "configs": lambda c, n: _secrets(c, n, "configs"),
     "depends_on": _depends_on,
     "deploy": limits.deploy,
     "device_cgroup_rules": hardware.device_rules,
@@ -283,11 +305,12 @@ _CARRIED: dict[str, Key] = {
     "networks": _networks,
     "privileged": hardware.privileged,
     "runtime": hardware.runtime,
-    "secrets": _secrets,
+    "secrets": lambda c, n: _secrets(c, n, "secrets"),
     "security_opt": hardware.security,
     "sysctls": _sysctls,
     "tmpfs": limits.tmpfs,
     "ulimits": limits.ulimits,
+    "volumes_from": _volumes_from,
     "volumes": lambda c, n: mounts(c, n) or None,
     **{key: lambda c, n, key=key: _namespace(c, key, n) for key in NAMESPACES},  # type: ignore[misc]
 }
@@ -336,7 +359,6 @@ _LEFT_OUT = frozenset(
         "storage_opt",
         "userns_mode",
         "uts",
-        "volumes_from",
     ]
 )
 """Keys of the compose specification that a test has no use for."""

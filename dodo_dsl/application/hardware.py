@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.host_paths import holds_port, is_rule_for_port
 from dodo_dsl.application.model import is_true, plain
 from dodo_dsl.application.part import NO_PORT, WITHOUT_HARDWARE
@@ -86,7 +87,7 @@ def security(c: "Container", node: Node) -> Any:
     made = []
     for item, word in _words(c, node):
         if re.split("[:=]", word)[0] == "no-new-privileges" or c.project.setting.keeps_privileges:
-            made.append(word)
+            made.append(escaped(word))
         else:
             message = f"'{word}' of '{c.name}' is left out, the engine's own confinement stays"
             c.add(Diagnostic(item.span, "application-isolation", message, severity="warning"))

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.model import environment, image_variable, plain, text
 from dodo_dsl.application.part import pairs
 from dodo_dsl.source import Node
@@ -52,8 +53,8 @@ def build(c: "Container", node: Node) -> Any:
         made = {"context": _context(c, fields.get("context"), context), **made}
         if "dockerfile" in fields and (file := c.literal(fields["dockerfile"])):
             if not context.startswith(_REMOTE):
-                c.path(fields["dockerfile"], base=context, written=file)
-            made["dockerfile"] = plain(fields["dockerfile"])
+                c.path(file, fields["dockerfile"].span, base=context)
+            made["dockerfile"] = escaped(file)
     if "args" in fields:
         made["args"] = _arguments(c, plain(fields["args"]))
     if "additional_contexts" in fields:
@@ -75,13 +76,13 @@ def _context(c: "Container", node: Node | None, context: str) -> str:
     paths = c.project.paths
     is_here = any((place / context).exists() for place in (paths.folder, *paths.roots)) if "\0" not in context else True
     if context.startswith(_REMOTE) and ".." not in context.split("/") and not is_here:
-        return context
+        return escaped(context)
     span = node.span if node is not None else c.span
     problem = f"'{context}' is of a kind that may be a file of the host" if "://" in context else ""
     if problem := problem or paths.file_problem(context):
         c.refuse(span, problem, "keep it in the repository, or allow it with 'paths' in dodo.yml")
     c.project.show(context, span)
-    return c.project.rebased(context)
+    return escaped(c.project.rebased(context))
 
 
 def _arguments(c: "Container", written: Any) -> dict[str, str | None]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.hardware import gpus
 from dodo_dsl.source import Node
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -88,8 +89,10 @@ def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
 
 def _ulimit(c: "Container", name: str, node: Node, most: float) -> float | str | None:
     written = c.literal(node)
-    if number(written) <= most:
-        return int(number(written)) if math.isfinite(number(written)) else written
+    if not math.isfinite(whole(written)) and written not in ("-1", None):
+        c.bad(node.span, f"'{written}' is not a limit, expected a whole number or -1")
+    if whole(written) <= most:
+        return int(whole(written)) if math.isfinite(whole(written)) else -1
     c.cut(node.span, f"ulimits.{name}", most, _OF_SANDBOX.get(name.partition(".")[0], ""))
     return int(most)
 
@@ -128,7 +131,7 @@ def tmpfs(c: "Container", node: Node) -> Any:
             continue
         if is_cut:
             c.cut(item.span, "tmpfs", c.limits.memory, "memory")
-        made.append(f"{target}:{allowed}")
+        made.append(escaped(f"{target}:{allowed}"))
     return made or None
 
 

@@ -24,8 +24,19 @@ _NAMED = ("services", "volumes", "secrets", "configs", "networks")
 
 def load(files: ComposeFiles, names: Sequence[Path]) -> source.Mapping | None:
     """The files merged in order, with paths relative to the first one's folder; None when one cannot be read."""
-    files.gather(files.folder / ".env", Span(str(names[0])))
+    taken = [word for name in names for word in _variables_of_secrets(files, name)]
+    files.known |= files.gather(files.folder / ".env", taken)
     return _all(files, names, files.folder, ())
+
+
+def _variables_of_secrets(files: ComposeFiles, file: Path) -> Iterator[str]:
+    """The variables of which a file makes secrets, before it is read."""
+    document = files.read(file)
+    node = document.get("secrets") if isinstance(document, source.Mapping) else None
+    for entry in node.entries.values() if isinstance(node, source.Mapping) else ():
+        word = entry.value.get("environment") if isinstance(entry.value, source.Mapping) else None
+        if isinstance(word, Scalar):
+            yield word.text
 
 
 def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
@@ -87,9 +98,13 @@ def _included(files: ComposeFiles, item: Node, folder: Path, chain: tuple[Path, 
     if not names or circle or len(found) < len(names) or (isinstance(place, Scalar) and not files.holds(place, folder)):
         return None
     project = Path(os.path.normpath(folder / place.text)) if isinstance(place, Scalar) else found[0].parent
-    for file in [files.other(word, folder) for word in scalars(words.get("env_file"))] or [project / ".env"]:
-        files.gather(file, names[0].span)
-    return _all(files, found, project, chain)
+    own = [files.other(word, folder) for word in scalars(words.get("env_file"))] or [project / ".env"]
+    before = files.included
+    taken = [word for name in found for word in _variables_of_secrets(files, name)]
+    files.included = {**before, **{k: v for file in own if file for k, v in files.gather(file, taken).items()}}
+    part = _all(files, found, project, chain)
+    files.included = before
+    return part
 
 
 def _joined(files: ComposeFiles, document: source.Mapping, part: source.Mapping) -> source.Mapping:

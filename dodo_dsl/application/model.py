@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_files import is_late, text_of
+from dodo_dsl.application.compose_files import Statements, is_late, statements_of
 from dodo_dsl.application.host_paths import HostPaths, repository
-from dodo_dsl.application.interpolation import dotenv
+from dodo_dsl.application.interpolation import literal
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, split
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
@@ -101,8 +101,8 @@ class EnvFile:
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo, or if that says nothing of messages. ``file_variables`` are those that its
-    ``env_files`` set. Variables are filled in but for those in ``raw``, the values of TEST_FILLED as they are written.
+    ``declared`` is None without x-dodo, or if that says nothing of messages. ``statements`` are those of its
+    ``env_files``. Variables are filled in but for those in ``raw``, the values of TEST_FILLED as they are written.
     """
 
     name: str
@@ -110,13 +110,18 @@ class ComposeService:
     span: Span
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
-    file_variables: Mapping[str, str | None] = field(default_factory=dict)
+    statements: tuple[Statements, ...] = ()
     raw: Mapping[str, Node] = field(default_factory=dict)
 
     @functools.cached_property
     def words(self) -> tuple[tuple[str, Scalar], ...]:
         """The words of its commands, each with the value in which it is written."""
         return tuple(word for key in COMMANDS for word in words_of(self.node.get(key)))
+
+    @functools.cached_property
+    def file_variables(self) -> Mapping[str, str | None]:
+        """The variables that its files set; None takes the value from outside."""
+        return {name: value for statements in self.statements for name, value in statements}
 
     @property
     def cid_variables(self) -> tuple[str, ...]:
@@ -231,12 +236,23 @@ def reference(value: object) -> tuple[str, str]:
     return (kind, name) if sign and kind in ("service", "container") else ("", "")
 
 
+def borrowed(entry: object) -> tuple[str, str, str]:
+    """An entry of ``volumes_from`` as kind, name and options."""
+    kind, name = reference(entry)
+    name, sign, options = (name if kind else str(entry)).partition(":")
+    return kind or "service", name, sign + options
+
+
 def references(service: dict[str, Any], containers: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """The services that a service needs, each with its key; containers of the application count as its services."""
     for key in NAMESPACES:
         kind, name = reference(service.get(key))
         if kind == "service" or name in containers:
             yield key, containers.get(name, name) if kind == "container" else name
+    for entry in service.get("volumes_from") or ():
+        kind, name, _ = borrowed(entry)
+        if kind == "service" or name in containers:
+            yield "volumes_from", containers.get(name, name) if kind == "container" else name
     for link in service.get("links") or ():
         yield "links", str(link).partition(":")[0]
     waits = service.get("depends_on") or {}
@@ -348,17 +364,18 @@ def env_files(service: source.Mapping) -> Iterator[EnvFile]:
         path, required, form = about("path"), about("required"), about("format")
         if isinstance(path, Scalar) and isinstance(path.value, str):
             optional = isinstance(required, Scalar) and not is_true(required.value)
-            yield EnvFile(path.text, path.span, not optional, isinstance(form, Scalar) and form.value == "raw")
+            yield EnvFile(
+                literal(path.text) or path.text,
+                path.span,
+                not optional,
+                isinstance(form, Scalar) and form.value == "raw",
+            )
 
 
-def file_variables(files: Iterable[EnvFile], folder: Path) -> dict[str, str | None]:
-    """The variables that files next to the compose file set, None if from outside."""
-    found: dict[str, str | None] = {}
-    for file in files:
-        own = "" if file.path.startswith(("/", "~")) else text_of(folder / file.path)
-        for name, value in dotenv(own, raw=file.raw)[0]:
-            found[name] = found.get(name) if value is None else value
-    return found
+def file_statements(files: Iterable[EnvFile], folder: Path) -> tuple[Statements, ...]:
+    """What files next to the compose file set, in order."""
+    own = (file for file in files if not file.path.startswith(("/", "~")))
+    return tuple(statements_of(folder / file.path, raw=file.raw) for file in own)
 
 
 def with_entry(node: source.Mapping, key: str, value: Node) -> source.Mapping:

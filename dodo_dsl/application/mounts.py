@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.application.compose_paths import is_path
+from dodo_dsl.application.compose_paths import escaped, is_path
 from dodo_dsl.application.host_paths import MEMORY, TMP, is_port, is_token
 from dodo_dsl.application.limits import size, tmpfs_options
-from dodo_dsl.application.model import is_true
+from dodo_dsl.application.model import is_true, plain
 from dodo_dsl.application.part import NO_PORT, WITHOUT_HARDWARE, Part
 from dodo_dsl.diagnostics import Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Mapping, Node, Scalar
@@ -60,21 +60,17 @@ class Mount:
     is_short: bool = False
 
     def written(self) -> str | dict[str, Any]:
-        """As compose reads it; ``source`` is as the compiled file has it."""
+        """As compose reads it."""
+        source, target = escaped(self.source), escaped(self.target)
         words = [*(["ro"] if self.read_only else []), *(["nocopy"] if self.nocopy else [])]
         words += [self.selinux] if self.selinux else []
-        is_short = (
-            ":" not in f"{self.source}{self.target}"
-            and len(self.source) != 1
-            and not self.is_required
-            and not self.more
-        )
+        is_short = ":" not in f"{source}{target}" and len(source) != 1 and not self.is_required and not self.more
         if is_short and self.kind in ("bind", "volume"):
-            return ":".join(filter(None, (self.source, self.target, ",".join(words))))
+            return ":".join(filter(None, (source, target, ",".join(words))))
         about = dict(self.more) | ({"nocopy": True} if self.nocopy else {})
         if self.kind == "bind":
             about = {"create_host_path": not self.is_required} | ({"selinux": self.selinux} if self.selinux else {})
-        made: dict[str, Any] = {"type": self.kind, "source": self.source, "target": self.target}
+        made: dict[str, Any] = {"type": self.kind, "source": source, "target": target}
         made |= {"read_only": True} if self.read_only else {}
         return {key: value for key, value in {**made, self.kind: about}.items() if value not in ("", {})}
 
@@ -89,6 +85,9 @@ def mounts(of: "Container", node: Node) -> list[str | dict[str, Any]]:
     made: dict[tuple[str, str], str | dict[str, Any]] = {}
     for item in of.items(node):
         mount = _long(of, item) if isinstance(item, Mapping) else _short(of, item)
+        if mount and not mount.target:
+            of.bad(mount.span, f"a mount of '{of.name}' has no target", "name its folder in the container")
+            continue
         mount = _carried(of, mount) if mount else None
         if mount:
             made[mount.source, mount.target] = mount.written()
@@ -100,6 +99,11 @@ def _short(of: "Container", item: Node) -> Mount | None:
     if text is None:
         return None
     source, target, options, *_ = [*text.split(":", 2), "", ""] if ":" in text else ["", text, ""]
+    if ":" in text and not source:
+        of.bad(
+            item.span, f"the mount '{text}' of '{of.name}' has no source", "name a folder or a volume before the colon"
+        )
+        return None
     words = options.split(",")
     if found := [word for word in words if word in _IN_AND_OUT]:
         of.refuse(item.span, f"'{found[0]}' of a mount reaches beyond the container", "remove it")
@@ -135,13 +139,13 @@ def _long(of: "Container", item: Mapping) -> Mount | None:
     more: dict[str, Any] = {}
     if kind == "tmpfs":
         most = of.limits.memory
-        more = {"size": most} | ({"mode": int(told["tmpfs.mode"], 0)} if told.get("tmpfs.mode") else {})
+        more = {"size": most} | ({"mode": plain(about["tmpfs"]["mode"])} if told.get("tmpfs.mode") else {})
         if 0 < size(told.get("tmpfs.size", "")) <= most:
             more["size"] = int(size(told["tmpfs.size"]))
         elif "tmpfs.size" in told:
             of.cut(about["tmpfs"]["size"].span, "volumes.tmpfs.size", most, "memory")
     elif told.get(f"{kind}.subpath"):
-        more = {"subpath": told[f"{kind}.subpath"]}
+        more = {"subpath": escaped(told[f"{kind}.subpath"])}
     return Mount(
         kind, _clean(source), _clean(values.get("target") or ""), span, is_true(values.get("read_only") or ""),
         kind == "bind" and told.get("bind.create_host_path", "true").lower() == "false",
@@ -272,6 +276,9 @@ def _options(of: Part, name: str, node: Node) -> tuple[dict[str, Any], str]:
 def _folder(of: Part, name: str, device: str, words: list[str], span: Span) -> tuple[dict[str, Any], str]:
     paths = of.project.paths
     unknown = set(words) - {"bind", "rbind", "rw", "ro", "nosuid", "nodev", "noexec"}
+    if not device:
+        of.bad(span, f"the volume '{name}' has no 'device'", "name a folder of the repository")
+        return {}, ""
     if unknown or paths.is_hardware(device) or paths.is_of_machine(device):
         what = f"the option '{min(unknown)}'" if unknown else f"'{device}' of the host"
         of.refuse(span, f"the volume '{name}' has {what}", _OPTIONS)
@@ -280,11 +287,14 @@ def _folder(of: Part, name: str, device: str, words: list[str], span: Span) -> t
         of.refuse(span, *found)
         return {}, ""
     is_read = [word for word in words if word in ("ro", "rw")][-1:] == ["ro"]
-    if not is_read and of.project.copy_of(device, own_name(name)):
+    if of.project.copy_of(device, own_name(name)):
         return {}, device
+    if not device.startswith(("/", "~")):
+        of.bad(span, f"the volume '{name}' is a file, which compose cannot find", "mount the file itself")
+        return {}, ""
     access = [] if paths.is_writable(device) and not is_read else ["ro"]
     options = [word for word in words if word not in ("ro", "rw")] + access
-    return {"driver_opts": {"type": "none", "device": of.project.rebased(device), "o": ",".join(options)}}, device
+    return {"driver_opts": {"type": "none", "device": escaped(device), "o": ",".join(options)}}, device
 
 
 def nested(project: "Construction") -> Iterator[tuple[Span, str, str]]:

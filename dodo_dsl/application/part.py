@@ -1,11 +1,13 @@
 """A part of a compose file while it is read: its fields and texts, and the problems at their places."""
 
+import posixpath
 from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from dodo_dsl import source
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.interpolation import literal
-from dodo_dsl.application.model import text
+from dodo_dsl.application.model import plain, text
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -62,22 +64,21 @@ class Part:
         """A text that is known when the test is compiled; None for any other, with a problem."""
         if not isinstance(node, Scalar) or node.value is None:
             return None
-        found = literal(text(node.value))
-        if found is None and ":?" not in node.text and "?" not in node.text:
+        found = literal(text(plain(node)))
+        if found is None and "?" not in node.text:
             message = f"'{node.text}' has a variable whose value is not known when the test is compiled"
-            self.bad(node.span, message, "write the value here, or into the .env beside this file")
+            self.bad(node.span, message, "write the value here, or a variable of .env that is no secret")
         return found
 
-    def path(self, node: Node | None, *, base: str = "", written: str = "") -> str | None:
-        """A file or folder of the repository as seen from the compiled test; None for any other, with a problem."""
-        found = self.literal(node) if node is not None else None
-        if node is None or found is None:
+    def path(self, found: str | None, span: Span, *, base: str = "") -> str | None:
+        """A file or folder of the repository as a compiled file has it; None for any other, with a problem."""
+        if found is None:
             return None
-        if problem := self.project.paths.file_problem(f"{base}/{found}" if base else found, written):
-            self.refuse(node.span, problem, "keep it in the repository, or allow it with 'paths' in dodo.yml")
+        if problem := self.project.paths.file_problem(posixpath.join(base, found), found):
+            self.refuse(span, problem, "keep it in the repository, or allow it with 'paths' in dodo.yml")
             return None
-        self.project.show(found, node.span)
-        return self.project.rebased(found)
+        self.project.show(found, span)
+        return escaped(self.project.rebased(found))
 
     def items(self, node: Node) -> Iterator[Node]:
         """The items of a list, or the single value."""

@@ -21,13 +21,13 @@ from dodo_dsl.application.model import (
     ComposeService,
     declared_cid,
     env_files,
-    file_variables,
+    file_statements,
     plain,
 )
 from dodo_dsl.application.model import declared as declaration_of
 from dodo_dsl.application.variables import tunable_problems
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Node, Reader, Scalar
+from dodo_dsl.source import Entry, Reader
 from dodo_dsl.spec.deployment import Declarations
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.validation import validate
@@ -113,8 +113,6 @@ def _application(
     limits: SandboxLimits,
 ) -> ApplicationSource:
     dropped = {name: why for name, entry in services.entries.items() if (why := _why_dropped(plain(entry.value)))}
-    for variable in _variables_of_secrets(document.get("secrets")):
-        files.keep_secret(variable)
     kept = {
         name: service
         for name, entry in services.entries.items()
@@ -134,13 +132,6 @@ def _application(
     )
 
 
-def _variables_of_secrets(node: Node | None) -> Iterator[str]:
-    for entry in node.entries.values() if isinstance(node, source.Mapping) else ():
-        word = entry.value.get("environment") if isinstance(entry.value, source.Mapping) else None
-        if isinstance(word, Scalar):
-            yield word.text
-
-
 def _own_files(application: ApplicationSource) -> list[tuple[Path, bool]]:
     """The files of ``env_file`` that the application may read, each once, and whether they are raw."""
     words = sorted({(file.path, file.raw) for service in application.services.values() for file in service.env_files})
@@ -158,7 +149,7 @@ def _service(name: str, entry: Entry, folder: Path, files: ComposeFiles) -> Comp
     }
     node = replace(node, entries=entries)
     own = tuple(env_files(node))
-    return ComposeService(name, node, entry.key, declaration_of(node), own, file_variables(own, folder), raw)
+    return ComposeService(name, node, entry.key, declaration_of(node), own, file_statements(own, folder), raw)
 
 
 def _why_dropped(service: dict[str, Any]) -> str:
@@ -166,4 +157,5 @@ def _why_dropped(service: dict[str, Any]) -> str:
     if profiles:
         return f"it needs profile {' or '.join(profiles)}"
     deploy = service.get("deploy") or {}
-    return "it is scaled to 0" if 0 in (service.get("scale"), deploy.get("replicas")) else ""
+    counts = {str(service.get("scale")).strip(), str(deploy.get("replicas")).strip()}
+    return "it is scaled to 0" if "0" in counts else ""

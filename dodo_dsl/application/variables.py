@@ -14,7 +14,7 @@ from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.interpolation import filled, literal, names
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
-from dodo_dsl.application.secret_variables import is_steering
+from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Entry, Scalar
 from dodo_dsl.spec.vary import Range
@@ -77,18 +77,32 @@ def variables_of(
             own[name] = None
         elif name in values:
             own[name] = values[name].replace("$", "$$")
-    of_files: dict[str, str] = {}
-    known = {**_literals(service.file_variables), **_literals(own), **values}
-    for name, value in service.file_variables.items():
-        if value is None and not is_late(name):
-            of_files[name] = values.get(name, "").replace("$", "$$")
-        elif value is not None and literal(value) is None:
-            of_files[name] = filled(value, known, is_late)
+    of_files = _of_files(service, values, is_late)
     return {**of_files, **own, **{name: values[name].replace("$", "$$") for name in given}}
 
 
-def _literals(variables: Mapping[str, str | None]) -> dict[str, str]:
-    return {name: found for name, value in variables.items() if value is not None and (found := literal(value))}
+def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Callable[[str], bool]) -> dict[str, str]:
+    """What files of variables take from elsewhere, which compose would look for in its own environment.
+
+    As compose reads them: ``values`` come first, then earlier files, then earlier lines of the same one.
+    """
+    made: dict[str, str] = {}
+    before: dict[str, str] = {}
+    for statements in service.statements:
+        found: dict[str, str] = {}
+        for name, value in statements:
+            if value is None:
+                made.update({} if is_late(name) else {name: values.get(name, "").replace("$", "$$")})
+                continue
+            used = names(value)
+            text = filled(value, {**found, **before, **values}, is_late)
+            is_own = used <= {*before, *found} - made.keys() - values.keys()
+            is_secret = any(holds_secret(each, found.get(each, before.get(each, ""))) for each in used - values.keys())
+            if not is_own and not is_secret:
+                made[name] = text
+            found[name] = literal(text) or ""
+        before |= found
+    return made
 
 
 _KEYS = ("from", "to", "default")

@@ -1,24 +1,23 @@
 """``dodo images pull --for RIG``: the images that the tests of a rig need, before its first test needs them."""
 
 import argparse
-import json
+import os
 import shutil
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import compiler
+from dodo_dsl.application import secret_variables
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import did_you_mean, has_errors
-from dodo_dsl.emit.output_folder import write
 from dodo_dsl.images import docker_command, remote
 from dodo_dsl.images.remote import UNPACKED, RemoteImage
-from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker import pulls
+from dodo_dsl.run.docker.compose import with_images
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.terminal import printable
 
@@ -94,26 +93,17 @@ def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str], dic
     hints: dict[str, str] = {}
     wanted: set[str] = set()
     built: set[str] = set()
-    with tempfile.TemporaryDirectory(prefix="dodo-images-") as name:
-        folder = Path(name)
-        made = compiler.plan(checked, folder)
-        if has_errors(made.problems):
-            raise UsageError("the tests cannot be compiled; dodo compile --check says why")
-        write(made.compiled, made.pipeline, folder)
-        for plan in made.compiled.suite.plans:
-            found, own = _of_application(plan, folder / plan.slug)
-            wanted |= found | ({service.image for service in plan.services} if with_own else set())
-            built |= own
-            hints |= pulls.image_hints(plan)
+    made = compiler.plan(checked, Path("generated").absolute())
+    if has_errors(made.problems):
+        raise UsageError("the tests cannot be compiled; dodo compile --check says why")
+    for plan in made.compiled.suite.plans:
+        variables = secret_variables.allowed(os.environ, plan.application.access.passed)
+        services = with_images(plan.application, variables)
+        built |= {name for name, service in services.items() if "build" in service}
+        wanted |= {service["image"] for service in services.values() if "build" not in service}
+        wanted |= {service.image for service in plan.services} if with_own else set()
+        hints |= pulls.image_hints(plan)
     return sorted(wanted), sorted(built), hints
-
-
-def _of_application(plan: Plan, folder: Path) -> tuple[set[str], set[str]]:
-    """Images of the application's services as compose fills in their variables, and services with a ``build``."""
-    services = json.loads(docker_command.ask("compose", "config", "--format", "json", folder=folder))["services"]
-    own = {service.name: services.get(service.name, {}) for service in plan.application.services}
-    built = {name for name, service in own.items() if "build" in service}
-    return {str(own[name]["image"]) for name in own.keys() - built if "image" in own[name]}, built
 
 
 def _room(rig: Rig, images: Sequence[RemoteImage]) -> str:

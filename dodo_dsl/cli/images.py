@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from dodo_dsl import atomic, compiler, package_data
-from dodo_dsl.application import compose_paths, unseen
+from dodo_dsl.application import unseen
 from dodo_dsl.application.construction import checked_builds
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import ApplicationSource
@@ -206,12 +206,9 @@ def _own_contexts(builds: dict[str, Any], hidden: Sequence[Path], folder: Path) 
     try:
         folder.mkdir(parents=True, exist_ok=True)
         own = Path(tempfile.mkdtemp(dir=folder))
-        written = compose_paths.unescaped(builds)
-        written["services"] = own_contexts(written["services"], hidden, own.resolve())
+        return {**builds, "services": own_contexts(builds["services"], hidden, own.resolve(), Path.cwd())}
     except (HiddenContext, OSError, shutil.Error) as error:
         raise UsageError(f"--contexts: {error}") from error
-    escaped: dict[str, Any] = compose_paths.escaped_values(written)
-    return escaped
 
 
 def _hidden(source: ApplicationSource, deployment: Deployment, files: Sequence[Path]) -> list[Path]:

@@ -6,7 +6,6 @@ It prepares once for a run, and makes one backend for each test. A container hol
 
 import asyncio
 import contextlib
-import json
 import os
 import secrets
 import shutil
@@ -15,17 +14,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application import compose_paths
+import yaml
+
+from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.model import FILES, SANDBOX
-from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, agent_flags
-from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.added_services import TIME
+from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import application_time
 from dodo_dsl.run.backends import Job, Say
 from dodo_dsl.run.docker.backend import DockerBackend
-from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.container_use import ELSEWHERE, is_of
+from dodo_dsl.run.docker.container_use import ELSEWHERE, first_process
 from dodo_dsl.run.docker.containers import Containers
+from dodo_dsl.run.docker.mounts import over
 from dodo_dsl.run.docker.shared_files import IMAGE
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
@@ -38,34 +39,18 @@ from dodo_dsl.run.protocol import Backend, BackendError, Event, Unmatched
 from dodo_dsl.run.rigs.session import attended
 from dodo_dsl.spec.model import VIRTUAL
 
-_PROGRAM = "sleep"
 _SEEN = ("/bin", "/lib", "/lib64", "/usr")
 """Folders of this machine that hold the program and its libraries."""
 
 
-def holder(slug: str, command: Sequence[str] = (), volumes: Sequence[str] = ()) -> dict[str, Any]:
-    """The container in compose's words; it can do nothing but sleep, or what the ``command`` does."""
-    return {
-        "image": IMAGE,
-        "entrypoint": [*command] or [shutil.which(_PROGRAM, path=os.defpath) or f"/bin/{_PROGRAM}", "infinity"],
-        "user": "65534:65534",
-        "init": not command,  # as the first process, no other of its namespace can end it
-        "ipc": "shareable",
-        "shm_size": "256m",
-        "read_only": True,
-        "cap_drop": ["ALL"],
-        "security_opt": ["no-new-privileges:true"],
-        "labels": {"dodo.test": slug, "dodo.layer": "sandbox"},
-        "volumes": ["tmp:/tmp", *volumes, *_folders()],
-    }
+def on_machine(compiled: dict[str, Any], *words: str) -> dict[str, Any]:
+    """A container as it is ``compiled``, which does what the ``words`` say with this machine's programs."""
+    kept = {key: value for key, value in compiled.items() if key not in ("command", "depends_on")}
+    return {**kept, "image": IMAGE, "entrypoint": [*words], "volumes": [*compiled["volumes"], *_folders()]}
 
 
-def copier(compiled: dict[str, Any]) -> dict[str, Any]:
-    """The container that copies the repository's files, as it is ``compiled``, with this machine's programs."""
-    kept = {key: value for key, value in compiled.items() if key not in ("image", "entrypoint", "depends_on")}
-    shell, *words = compiled["entrypoint"]
-    folders = [*compiled["volumes"], *_folders()]
-    return {**kept, "image": IMAGE, "entrypoint": [shutil.which(shell) or shell, *words], "volumes": folders}
+def _program(name: str) -> str:
+    return shutil.which(name, path=os.defpath) or f"/bin/{name}"
 
 
 def _folders() -> list[dict[str, Any]]:
@@ -74,61 +59,51 @@ def _folders() -> list[dict[str, Any]]:
     return [{"type": "bind", "source": folder, "target": folder, "read_only": True} for folder in seen]
 
 
-_APPLICATION_FILE = "application.compose.yml"
 _TMP = "tmp"
 
 
 class ApplicationCompose(Compose):
     """The compiled test without DoDo's services; under network isolation with a container that holds its network."""
 
-    _replacing = ""
+    layers = ()
 
-    def _take(self, config: dict[str, Any]) -> None:
-        names = {service.name for service in self.plan.application.services}
-        self.services = {name: service for name, service in config["services"].items() if name in names}
-        self._volumes = config.get("volumes") or {}
+    def _own_images(self) -> set[str]:
+        return set()
+
+    def document(self, key: bytes) -> dict[str, Any]:
+        """With the containers that DoDo adds, which have programs of this machine; nothing waits for DoDo's services.
+
+        Mounts lie over the folders in ``/tmp`` where DoDo's processes have theirs: so no container removes them.
+        """
+        made = super().document(key)
+        compiled = yaml.load((self.folder / f"{LAYERS[0]}.compose.yml").read_bytes(), yaml.CSafeLoader)
+        services = {name: made["services"][name] for name in self.services}
         own: dict[str, Any] = {}
+        if FILES in made["services"]:
+            copies = compiled["services"][FILES]
+            shell, *words = copies["entrypoint"]
+            copies = {**copies, "volumes": over(copies["volumes"], made["services"][FILES].get("volumes", ()))}
+            own[FILES] = on_machine(copies, _program(shell), *words)
+        volumes = dict(made.get("volumes") or {})
         if self.plan.isolation == "network":
-            own["services"] = {SANDBOX: self._holder()}
-            network = config["networks"]["default"]
-            planned = network["ipam"]["config"][0]["subnet"]
-            subnet = {"config": [{"subnet": f"${{DODO_SUBNET:-{planned}}}"}]}
-            options = compose_paths.escaped_values(network.get("driver_opts") or {})
-            own["networks"] = {"default": {"driver_opts": options, "ipam": subnet}}
-            options = compose_paths.escaped_values(self._volumes[_TMP].get("driver_opts") or {})
-            own["volumes"] = {_TMP: {"driver_opts": options}}
+            own[SANDBOX] = self._holder(compiled["services"][SANDBOX])
+            volumes[_TMP] = compiled["volumes"][_TMP]
             if self.plan.clock == VIRTUAL:
-                place = str(application_time.built().library.parent)
-                own["volumes"][TIME] = {"driver_opts": {"type": "none", "o": "bind", "device": place}}
-            self.services[SANDBOX] = own["services"][SANDBOX]
-        if FILES in config["services"]:
-            self.services[FILES] = copier(config["services"][FILES])
-            own.setdefault("services", {})[FILES] = compose_paths.escaped_values(self.services[FILES])
-        self._replacing = replacing(self.services, names, own)
+                place = escaped(str(application_time.built().library.parent))
+                volumes[TIME] = {"driver_opts": {"type": "none", "o": "bind", "device": place}}
+        shown = Entered.with_own(0, *needed_paths(self.plan, self.folder, self.report)).shown if SANDBOX in own else ()
+        mounts = covers(shown)
+        for service in services.values():
+            after = service.get("depends_on") or {}
+            service["depends_on"] = {name: how for name, how in after.items() if name in services or name in own}
+            service["volumes"] = over(mounts, service.get("volumes", ()))
+        networks = {"networks": compiled["networks"]} if "networks" in compiled else {}
+        return {**made, **networks, "services": {**services, **own}, "volumes": volumes}
 
-    def _holder(self) -> dict[str, Any]:
+    def _holder(self, compiled: dict[str, Any]) -> dict[str, Any]:
         """It lets the application's time go on where that is the test's, with what this machine has built."""
-        if self.plan.clock != VIRTUAL:
-            return holder(self.plan.slug)
-        flags = agent_flags(len(self.plan.application.services), self.plan.seed)
-        return holder(self.plan.slug, (f"{TIME_MOUNT}/{application_time.AGENT}", *flags), (f"{TIME}:{TIME_MOUNT}",))
-
-    def _masks(self) -> dict[str, Any]:
-        """With mounts over the folders in ``/tmp`` where DoDo's processes have theirs: so no container removes them."""
-        masked = super()._masks()
-        if self.plan.isolation == "network":
-            shown = Entered.with_own(0, *needed_paths(self.plan, self.folder, self.report)).shown
-            mounts = covers(shown)
-            for name in {service.name for service in self.plan.application.services} & self.services.keys():
-                own = {volume["target"] for volume in self.services[name].get("volumes") or ()}
-                given = masked.setdefault(name, {"volumes": []})["volumes"]
-                given += [mount for mount in mounts if mount["target"] not in own]
-        return masked
-
-    def _files(self, folder: Path) -> list[str]:
-        path = folder / "mixed.compose.yml"
-        path.write_text(self._replacing, encoding="utf-8")
-        return [_APPLICATION_FILE, str(path)]
+        words = compiled["command"] if self.plan.clock == VIRTUAL else [_program("sleep"), "infinity"]
+        return {**on_machine(compiled, *words), "user": "65534:65534"}
 
 
 def covers(shown: Iterable[Path]) -> list[dict[str, Any]]:
@@ -142,7 +117,9 @@ def covers(shown: Iterable[Path]) -> list[dict[str, Any]]:
     tmp, memory = namespaces.SHARED
     folders = [path for path in shown if path.is_dir() and not path.is_symlink()]  # as only these are mounted
     places = [{tmp: apart, memory: memory}[path.parent] / path.name for path in folders]
-    mounts: list[dict[str, Any]] = [{"type": "tmpfs", "target": str(place), "read_only": True} for place in places]
+    mounts: list[dict[str, Any]] = [
+        {"type": "tmpfs", "target": escaped(str(place)), "read_only": True} for place in places
+    ]
     if apart in {place.parent for place in places}:
         options = {"read_only": True, "volume": {"nocopy": True}}
         mounts.insert(0, {"type": "volume", "source": _TMP, "target": str(apart), **options})
@@ -159,18 +136,6 @@ def uncovered(attributes: Mapping[str, Any]) -> str:
     memory = namespaces.SHARED[1]
     own = [str(folder) for folder in (memory.parent, memory) if str(folder) in folders]
     return own[0] if own and any(Path(folder).parent == memory for folder in folders) else ""
-
-
-def replacing(services: dict[str, Any], application: set[str], own: dict[str, Any]) -> str:
-    """A compose file over the application's in which nothing waits for services of DoDo; ``own`` is added."""
-    lines = ["services:"]
-    for name in sorted(application & services.keys()):
-        after = services[name].get("depends_on") or {}
-        left = {other: how for other, how in after.items() if other in application or other in (SANDBOX, FILES)}
-        lines.append(f"  {json.dumps(name)}: {{depends_on: !override {json.dumps(left)}}}")
-    lines += [f"  {json.dumps(name)}: {json.dumps(service)}" for name, service in own.get("services", {}).items()]
-    lines += [f"{key}: {json.dumps(value)}" for key, value in own.items() if key != "services"]
-    return "\n".join([*lines, ""])
 
 
 class ApplicationContainers(DockerBackend):
@@ -198,19 +163,13 @@ class ApplicationContainers(DockerBackend):
 
     @staticmethod
     def _find_process(container: Any) -> int:
-        from docker.errors import DockerException
-
-        try:
-            container.reload()
-        except (DockerException, OSError) as error:
-            raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
-        state = container.attrs["State"]
-        process = int(state.get("Pid") or 0)
+        process = first_process(container)
+        if process is None:
+            raise BackendError(f"{ELSEWHERE}, whose network DoDo's processes cannot enter; use --backend docker")
         if not process:
+            state = container.attrs["State"]
             why = state.get("Error") or f"exit code {state.get('ExitCode')}"
             raise BackendError(f"the container that holds the test's network ended at once: {why}")
-        if not is_of(process, container.id):
-            raise BackendError(f"{ELSEWHERE}, whose network DoDo's processes cannot enter; use --backend docker")
         return process
 
 

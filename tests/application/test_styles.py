@@ -23,7 +23,18 @@ WHOLE = ("include", "truck")
 PATHS = ("/opt/models", *(f"~/{name}" for name in ("kiwi-recordings", "models", "recordings")))
 """What 'paths' in dodo.yml names: styles mount these folders of the host."""
 SUMMARY = FOLDER / "styles.yml"
-KEYS = ("image", "build", "entrypoint", "command", "environment", "env_file", "volumes", "devices", "network_mode")
+KEYS = (
+    "image",
+    "build",
+    "entrypoint",
+    "command",
+    "environment",
+    "env_file",
+    "volumes",
+    "volumes_from",
+    "devices",
+    "network_mode",
+)
 
 
 def made(style: str, folder: Path, way: str) -> Compiled:

@@ -22,6 +22,7 @@ from tests.run.desk import ROOT
 from tests.run.helpers import READY, STARTED, WAIT, Bench, Recorded
 
 IMAGE = f"dodo/base:{__version__}"
+SANDBOX_IMAGE = f"dodo/sandbox:{__version__}"
 SUBNETS = [f"10.213.{third}.{fourth}/28" for third in range(240, 256) for fourth in range(0, 256, 16)]
 
 
@@ -47,43 +48,47 @@ class Crate:
         plan = self.bench.plan(judge, STARTED + application, environment, f"{self.mark}-{slug}", timeout_s)
         camera, evaluator = plan.services
         access = replace(plan.application.access, paths=(str(self.bench.folder),))
+        after = {"sandbox": {"condition": "service_started"}, "judge": {"condition": "service_healthy"}}
+        flags = {"command": ["--cid=111", "--name=video0.argb"], "ipc": "service:sandbox", "depends_on": after}
+        services = {"app": {**self._service(plan, "app"), **flags, **app}}
         plan = replace(
             plan,
-            services=(replace(camera, flags=(Flag("rec", "test.rec", "report"),)), evaluator),
-            application=replace(plan.application, access=access),
+            services=(
+                replace(camera, image=IMAGE, flags=(Flag("rec", "test.rec", "report"),)),
+                replace(evaluator, image=IMAGE),
+            ),
+            sandbox_image=SANDBOX_IMAGE,
+            application=replace(plan.application, access=access, compose={"services": services}),
         )
         folder = self.bench.folder / "compiled" / plan.slug
         folder.mkdir(parents=True)
-        (folder / "test.json").write_text(to_json(plan))
-        (folder / ".env").write_text(f"COMPOSE_PROJECT_NAME={plan.slug}\nCOMPOSE_FILE={LAYERS[0]}.compose.yml\n")
-        for layer in LAYERS:
-            content = self._compose(plan, app) if layer == LAYERS[0] else {"services": {}}
+        for layer in LAYERS[:-1]:
+            content = self._compose(plan) if layer == LAYERS[0] else {"services": {}}
             (folder / f"{layer}.compose.yml").write_text(json.dumps(content))
-        return Job(plan, folder, (report or self.bench.folder / "report") / plan.slug)
+        return changed(Job(plan, folder, (report or self.bench.folder / "report") / plan.slug), plan)
 
-    def _compose(self, plan: Plan, app: dict[str, Any]) -> dict[str, Any]:
-        def service(name: str) -> dict[str, Any]:
-            script = f"/scripts/{plan.slug}-{name}.py"
-            return {
-                "image": IMAGE,
-                "entrypoint": ["python3", "-u", script],
-                "volumes": [f"{self.bench.folder}:/scripts:ro", "tmp:/tmp"],
-                "init": True,
-                "stop_grace_period": "1s",
-            }
-
-        sandbox = {"image": f"dodo/sandbox:{__version__}", "command": ["sleep", "infinity"], "init": True}
-        flags = {"command": ["--cid=111", "--name=video0.argb"]}
-        records = {"volumes": [*service("camera")["volumes"], "report:/dodo/report"]}
-        subnet = {"subnet": "${DODO_SUBNET:-10.213.240.0/28}"}
+    def _service(self, plan: Plan, name: str) -> dict[str, Any]:
         return {
-            "services": {
-                "camera": {**service("camera"), **records},
-                "judge": service("judge"),
-                "sandbox": sandbox,
-                "app": {**service("app"), **flags, **app},
-            },
-            "networks": {"default": {"ipam": {"config": [subnet]}}},
+            "image": IMAGE,
+            "entrypoint": ["python3", "-u", f"{self.bench.folder}/{plan.slug}-{name}.py"],
+            "volumes": [f"{self.bench.folder}:{self.bench.folder}:ro", "tmp:/tmp"],
+            "init": True,
+            "stop_grace_period": "1s",
+        }
+
+    def _compose(self, plan: Plan) -> dict[str, Any]:
+        camera, judge = (self._service(plan, name) for name in ("camera", "judge"))
+        camera["volumes"].append("report:/dodo/report")
+        sandbox = {
+            "image": SANDBOX_IMAGE,
+            "command": ["sleep", "infinity"],
+            "init": True,
+            "ipc": "shareable",
+            "volumes": ["tmp:/tmp"],
+        }
+        return {
+            "services": {"camera": camera, "judge": judge, "sandbox": sandbox},
+            "networks": {"default": {"ipam": {"config": [{"subnet": "${DODO_SUBNET:-10.213.240.0/28}"}]}}},
             "volumes": {"tmp": {}, "report": {}},
         }
 
@@ -121,6 +126,12 @@ class Crate:
         records = [path.name for path in (self.bench.folder / "leases").glob("*.json")]
         records = [name for name in records if not any(f"-{project}." in name for project in kept)]
         return [name for name in names if name not in lost] + records
+
+
+def changed(job: Job, plan: Plan) -> Job:
+    """The job with another plan, which its folder has."""
+    (job.folder / "test.json").write_text(to_json(plan))
+    return replace(job, plan=plan)
 
 
 def new_crate(folder: Path) -> Crate:

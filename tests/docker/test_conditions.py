@@ -1,25 +1,21 @@
 """Containers of an application start in the order of their ``depends_on``, on a real engine."""
 
 import asyncio
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dodo_dsl.plan.model import ApplicationService
-from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.run import start_order
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.docker.containers import Containers
 from dodo_dsl.run.mixed import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
-from tests.docker.compose import SUBNETS, Crate
-from tests.docker.test_mixed import separate
+from tests.docker.compose import SUBNETS, Crate, changed
 from tests.run.helpers import BEGUN, PASS, READY, STARTED, WAIT
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
@@ -84,30 +80,20 @@ TABLE: dict[str, tuple[dict[str, Any], str, str]] = {
 }
 
 
-def waiting(crate: Crate, slug: str, scripts: Path, others: Mapping[str, tuple[str, str, dict[str, Any]]]) -> Job:
+def waiting(crate: Crate, slug: str, others: Mapping[str, tuple[str, str, dict[str, Any]]]) -> Job:
     """A test whose application waits for other services, each with a condition, a script and keys."""
     judge = READY + BEGUN + "time.sleep(2)\n" + PASS  # of a busy engine, too, the begin comes by then
-    job = separate(crate.job(slug, judge, APP, timeout_s=30.0), scripts)
-    path = job.folder / "application.compose.yml"
-    content = json.loads(path.read_text())
-    app = content["services"]["app"]
+    job = crate.job(slug, judge, APP, timeout_s=30.0)
+    application, others = job.plan.application, dict(others)
+    app = application.compose["services"]["app"]
     shared = {key: app[key] for key in ("image", "volumes", "stop_grace_period", "depends_on", "ipc")}
-    others = dict(others)
-    app |= others.pop("app", ("", "", {}))[2]
+    containers = {"app": app | others.pop("app", ("", "", {}))[2]}
     for name, (_, script, keys) in others.items():
-        words = ["sh", "-c", script.replace("$", "$$"), name]
-        content["services"][name] = {**shared, "entrypoint": words, **keys}
-    path.write_text(json.dumps(content))
-    (service,) = job.plan.application.services
+        containers[name] = {**shared, "entrypoint": ["sh", "-c", script.replace("$", "$$"), name], **keys}
     after = {name: condition for name, (condition, _, _) in others.items()}
-    services = (replace(service, after=after), *(ApplicationService(name) for name in others))
-    plan = replace(job.plan, application=replace(job.plan.application, services=services))
-    path = job.folder / "environment.compose.yml"
-    content = json.loads(path.read_text())
-    content["services"]["sandbox"]["ipc"] = "shareable"
-    path.write_text(json.dumps(content))
-    (job.folder / "test.json").write_text(to_json(plan))
-    return replace(job, plan=plan)
+    services = (replace(application.services[0], after=after), *(ApplicationService(name) for name in others))
+    made = replace(application, services=services, compose={"services": containers})
+    return changed(job, replace(job.plan, application=made))
 
 
 BACKENDS = {"docker": Containers(SUBNETS), "mixed": Mixed(Containers(SUBNETS), ())}
@@ -130,8 +116,7 @@ def test_conditions(backend: str, names: tuple[str, ...], crate: Crate, monkeypa
     if "never-ends" in names:
         monkeypatch.setattr(start_order, "LONGEST_S", 9.0)
     chosen = {name: TABLE[name] for name in names}
-    scripts = Path("/scripts") if backend == "docker" else crate.bench.folder
-    jobs = [waiting(crate, slug, scripts, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]
+    jobs = [waiting(crate, slug, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]
     backends: Backends = BACKENDS[backend]
     runner = Runner(crate.progress, backends, schedule(4, lambda job: 1.0), Policy())
     found = {o.slug.removeprefix(f"{crate.mark}-"): (o.outcome, o.reason) for o in asyncio.run(runner.run(jobs))}

@@ -11,13 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan.plan_json import to_json
-from dodo_dsl.run.backends import Job
 from dodo_dsl.run.docker.containers import Containers
 from dodo_dsl.run.mixed import Mixed
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
-from tests.docker.compose import SUBNETS, Crate
+from tests.docker.compose import SUBNETS, Crate, changed
 from tests.docker.test_started_anywhere import WITHOUT_COLON
 from tests.faults import Book
 from tests.run.desk import ROOT
@@ -33,24 +31,10 @@ pytestmark = [
 ]
 
 
-def separate(job: Job, scripts: Path) -> Job:
-    """The same with the application in a file of its own, as compiled; its scripts are where those of processes are."""
-    path = job.folder / "environment.compose.yml"
-    content = json.loads(path.read_text())
-    after = {"sandbox": {"condition": "service_started"}, "judge": {"condition": "service_healthy"}}
-    app = {**content["services"].pop("app"), "ipc": "service:sandbox", "depends_on": after}
-    path.write_text(json.dumps(content))
-    text = json.dumps({"services": {"app": app}}).replace("/scripts", str(scripts))
-    (job.folder / "application.compose.yml").write_text(text)
-    (job.folder / ".env").write_text("COMPOSE_FILE=environment.compose.yml:application.compose.yml\n")
-    return job
-
-
 @pytest.mark.parametrize("faults", faults_on("mixed"))
 def test_faults_beside_processes_of_dodo(faults: dict[str, Fault], crate: Crate, book: Book) -> None:
     """Those that the other backends show, too, are for ``make proof``."""
     jobs = [crate.job(slug, f.judge, f.application, f.environment, **f.app) for slug, f in faults.items()]
-    jobs = [separate(job, crate.bench.folder) for job in jobs]
     runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(len(jobs), lambda job: 1.0), Policy())
     outcomes = {o.slug.removeprefix(f"{crate.mark}-"): o for o in asyncio.run(runner.run(jobs))}
     as_told(faults, outcomes, "mixed", book)
@@ -75,19 +59,17 @@ OWN = "take('/tmp')\nopen('/tmp/app.log', 'w').close()\nprint('own file', flush=
 def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate) -> None:
     """They are mounted in the ``/tmp`` that the application shares with them, and reaches from a service without it."""
     judge = READY + AFTER_START + f"time.sleep(2)\nos.stat({str(crate.bench.folder)!r})\n" + PASS
-    job = separate(crate.job("takes", judge, TAKES + OWN + WAIT, user="0:0"), crate.bench.folder)
-    (app,) = job.plan.application.services
+    job = crate.job("takes", judge, TAKES + OWN + WAIT, user="0:0")
+    application = job.plan.application
+    (app,) = application.services
     app = replace(app, environment={"LOG": "/tmp/app.log"})
     services = (app, replace(app, name="other", after={"app": "service_started"}))
-    job = replace(job, plan=replace(job.plan, application=replace(job.plan.application, services=services)))
-    (job.folder / "test.json").write_text(to_json(job.plan))
-    path = job.folder / "application.compose.yml"
-    content = json.loads(path.read_text())
-    after = {**content["services"]["app"]["depends_on"], "app": {"condition": "service_started"}}
+    container = application.compose["services"]["app"]
     entrypoint = ["python3", "-u", "-c", TAKES + "take('/proc/1/root/tmp')\ntime.sleep(600)"]
-    other = {**content["services"]["app"], "pid": "service:app", "entrypoint": entrypoint, "depends_on": after}
-    content["services"]["other"] = {**other, "volumes": []}
-    path.write_text(json.dumps(content))
+    other = {**container, "pid": "service:app", "entrypoint": entrypoint, "volumes": []}
+    compose = {"services": {"app": container, "other": other}}
+    plan = replace(job.plan, application=replace(application, services=services, compose=compose))
+    job = changed(job, plan)
     runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(1, lambda job: 1.0), Policy())
     (outcome,) = asyncio.run(runner.run([job]))
     assert outcome.outcome == "passed", outcome.reason

@@ -1,17 +1,9 @@
-"""What an application in containers uses, by its control groups, on both backends that have containers."""
-
-import asyncio
-import os
+"""What an application in containers uses, by its control groups, where the engine has them."""
 
 import pytest
 
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.run.docker.containers import Containers
-from dodo_dsl.run.mixed import Mixed
-from dodo_dsl.run.runner import Policy, Runner
-from dodo_dsl.run.schedule import schedule
-from tests.docker.compose import SUBNETS, Crate
-from tests.docker.test_mixed import separate
+from tests.docker.compose import Crate
 from tests.run.helpers import AFTER_START, PASS, READY, WAIT
 from tests.run.process.test_resources import FORKS, LEAKS
 
@@ -27,15 +19,6 @@ def test_each_manner_has_its_figures(crate: Crate) -> None:
     (forks,) = outcomes["forks"].resources
     assert forks.processor_s > 0.3, "of a child that was waited for"
     assert 50e6 < forks.peak_memory_bytes < 100e6, "what four processes share counts once"
-
-
-@pytest.mark.proof
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container")
-def test_and_beside_processes(crate: Crate) -> None:
-    job = separate(crate.job("mixed-leaks", JUDGE, LEAKS, mem_limit="400m"), crate.bench.folder)
-    runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(1, lambda job: 1.0), Policy())
-    (outcome,) = asyncio.run(runner.run([job]))
-    have_limits({"mixed-leaks": outcome})
 
 
 def have_limits(outcomes: dict[str, Outcome]) -> None:

@@ -30,7 +30,7 @@ KEYS = {
     *("image", "init", "ipc", "links", "logging", "mem_limit", "mem_swappiness", "memswap_limit", "network_mode"),
     *("networks", "pid", "pids_limit", "platform", "read_only", "runtime", "secrets", "security_opt", "shm_size"),
     *("stdin_open", "stop_grace_period", "stop_signal", "storage_opt", "sysctls", "tmpfs", "tty", "ulimits", "umask"),
-    *("user", "volumes", "working_dir"),
+    *("user", "volumes", "volumes_from", "working_dir"),
 }
 """Those of a service that cannot reach the host by themselves; any other is harm. Their values are judged below."""
 BUILD = {
@@ -117,6 +117,9 @@ def _namespaces(service: Document, names: set[str]) -> Iterator[str]:
         yield "ipc is not the test's"
     if set(service.get("networks") or ()) - {"default"}:
         yield f"networks: {service['networks']}"
+    for entry in service.get("volumes_from") or ():
+        if entry.startswith("container:"):
+            yield f"volumes_from: {entry}"
     if service.get("runtime") not in (None, "", "runc", "runsc", "nvidia"):
         yield f"runtime: {service['runtime']}"
 

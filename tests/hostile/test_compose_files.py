@@ -129,6 +129,21 @@ SECRETS = {
 }
 
 
+def given(test: Compiled, folder: Path) -> dict[str, Any]:
+    """The application's services as the engine gets them, variables filled in; and what is built of them."""
+    assert test.plan is not None
+    made = Compose(test.plan, test.write(), folder / "report", "dodo-t", print)
+    made.read()
+    document, file = made.document(b""), folder / "given.json"
+    own = test.plan.application.compose["services"]
+    document["services"] |= {name: {**service, **document["services"][name]} for name, service in own.items()}
+    file.write_text(json.dumps(document))
+    files = [*(f"{layer}.compose.yml" for layer in made.layers), str(file)]
+    code, out, problem = asyncio.run(made.run("config", "--format", "json", files=files))
+    assert code == 0, problem
+    return {name: json.loads(out)["services"][name] for name in own}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("passed", [(), ("INNOCENT",)])
 def test_secrets_of_the_host_stay_there(
@@ -150,9 +165,7 @@ def test_secrets_of_the_host_stay_there(
     assert test.errors == [] and test.plan is not None
     named = {told.text.split("'")[1] for told in test.told if told.rule == "application-secret"}
     assert named == {*SECRETS} - {*passed}
-    made = Compose(test.plan, test.write(), tmp_path / "report", "dodo-t", print)
-    asyncio.run(made.read())
-    text = yaml.safe_dump(made.services)
+    text = json.dumps(given(test, tmp_path))
     assert (SECRET in text) == bool(passed)
     assert "postgresql" not in text
 
@@ -166,6 +179,4 @@ def test_without_the_attack_the_engine_gets_all(tmp_path: Path, monkeypatch: pyt
     variables = {"A": "${API_KEY}", "B": "${CI_JOB_TOKEN:-none}"}
     test, _ = attacked({"service": {"environment": variables}, "env": f"API_KEY={SECRET}"}, tmp_path)
     assert test.plan is not None
-    made = Compose(test.plan, test.write(), tmp_path / "report", "dodo-t", print)
-    asyncio.run(made.read())
-    assert made.services["driver"]["environment"] == {"A": SECRET, "B": "none"}
+    assert given(test, tmp_path)["driver"]["environment"] == {"A": SECRET, "B": "none"}

@@ -16,7 +16,7 @@ import yaml
 from dodo_dsl import __version__
 from dodo_dsl.images import build_context
 from dodo_dsl.spec.manifest import Manifest, load_manifests
-from tests.images.conftest import build, docker, own_volume, with_programs
+from tests.images.conftest import docker, own_volume
 from tests.images.dockerfile import ROOT, stages
 from tests.images.layers import layers
 from tests.images.service_folders import folders_of
@@ -142,18 +142,6 @@ def test_the_gantry_s_image_has_an_emulated_rig_that_runs(built: dict[str, str])
         pytest.skip("the emulated rig is not built: make firmware")
     look = "cd /opt/dodo/firmware && test -r gantry.elf -a -r gantry-circle.elf && ./rig-emulator --help"
     assert run(built["gantry"], "sh", "-c", look).startswith("usage: rig-emulator ")
-
-
-@pytest.mark.proof
-def test_a_build_takes_another_prefix_and_tag(built: dict[str, str], base_image: str) -> None:
-    reference = "dodo-test/base:images"
-    try:
-        assert build(with_programs(base_image), "base", "--prefix", "dodo-test", "--tag", "images") == {
-            "base": reference
-        }
-        assert config(reference) == config(built["base"])
-    finally:
-        docker("image", "rm", "--force", reference)
 
 
 def test_shared_stages_do_not_pass_for_services(built: dict[str, str]) -> None:

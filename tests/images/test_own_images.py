@@ -97,34 +97,26 @@ def test_with_all_the_others_it_comes_after_what_it_stands_on(repository: Reposi
     assert len(repository.asked("buildx", "build")) == 1
 
 
-def test_without_a_dockerfile(repository: Repository) -> None:
-    repository.service("smoothness", dockerfile="")
+def test_what_is_missing(repository: Repository) -> None:
+    folder = repository.service("smoothness", dockerfile="")
     code, said = repository.run("build", "smoothness", "--prefix", PREFIX)
-    assert (code, said) == (
-        Exit.USAGE,
-        "dodo images: there is no Dockerfile next to the service.yml of 'smoothness': write one there, or build "
-        f"{PREFIX}/smoothness:{__version__} from your own Dockerfile on {PREFIX}/base:{__version__}\n",
-    )
-
-
-def test_the_base_is_built_first(repository: Repository) -> None:
-    repository.service("smoothness")
+    assert code == Exit.USAGE
+    assert f"{PREFIX}/smoothness:{__version__} from your own Dockerfile on {PREFIX}/base:{__version__}" in said
+    (folder / "Dockerfile").write_text(DOCKERFILE)
     repository.engine(has="none")
     code, said = repository.run("build", "smoothness")
-    base = f"dodo/base:{__version__}"
-    assert (code, said) == (
-        Exit.USAGE,
-        f"dodo images: {base} is not on this machine; build it first: dodo images build base\n",
-    )
-
-
-def test_a_dockerfile_that_cannot_be_built(repository: Repository) -> None:
-    repository.service("smoothness")
+    assert (code, "first: dodo images build base" in said) == (Exit.USAGE, True)
+    repository.engine(has="*")
     docker = repository.root / "bin/docker"
     docker.write_text(docker.read_text().replace("image-inspect)", "buildx-build) echo oh; exit 1;; image-inspect)"))
     code, said = repository.run("build", "smoothness")
-    assert code == Exit.ERROR
-    assert f"my_services/smoothness/Dockerfile cannot be built on dodo/base:{__version__}; the output" in said
+    assert (code, "my_services/smoothness/Dockerfile cannot be built on dodo/base" in said) == (Exit.ERROR, True)
+
+
+def test_a_manifest_with_a_mistake_is_said(repository: Repository) -> None:
+    (repository.service("smoothness") / "service.yml").write_text("name: smoothness\n")
+    code, said = repository.run("build", "smoothness")
+    assert (code, "problems in my_services/smoothness/service.yml" in said) == (Exit.USAGE, True)
 
 
 def test_it_is_pushed_with_the_others(repository: Repository) -> None:
@@ -141,10 +133,3 @@ def test_one_of_elsewhere_or_of_dodo_is_not_built(repository: Repository) -> Non
     assert repository.run("build", "radar")[0] == Exit.USAGE
     assert repository.run("build", "collision")[0] == 0
     assert repository.asked("buildx", "build") == []
-
-
-def test_a_manifest_with_a_mistake_is_said(repository: Repository) -> None:
-    folder = repository.service("smoothness")
-    (folder / "service.yml").write_text("name: smoothness\n")
-    told = "problems in my_services/smoothness/service.yml; dodo compile --check shows them"
-    assert repository.run("build", "smoothness") == (Exit.USAGE, f"dodo images: {told}\n")

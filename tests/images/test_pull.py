@@ -49,7 +49,6 @@ ANSWERS: dict[str, Any] = {
     "info": "/",
     "image ls": "sha256:1",
     "image inspect --format {{json .RootFS.Layers}}": ["base"],
-    "compose config": {"services": {"driver": {"image": "one:1"}, "made": {"build": "."}}},
     "buildx imagetools inspect one:1 --raw": {
         "manifests": [
             {"digest": "sha256:a", "platform": {"os": "linux", "architecture": "amd64"}},

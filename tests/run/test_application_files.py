@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import pytest
+
 from dodo_dsl.application.model import Access
 from dodo_dsl.plan.model import Application
-from dodo_dsl.run.application_files import application_paths, secrets_of
+from dodo_dsl.run.application_files import application_paths, variables_of
 
 FOLDER = Path("generated/t")
 
@@ -27,8 +29,13 @@ def test_paths(tmp_path: Path) -> None:
     assert paths.is_own("/etc/ros/x")
 
 
-def test_secrets_are_read_where_they_are(tmp_path: Path) -> None:
+def test_secrets_are_read_where_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No variable of them steers the engine's client, and DoDo's environment has none but what is passed."""
+    monkeypatch.setenv("HOME", "/here")
+    monkeypatch.setenv("API_TOKEN", "of the host")
     (tmp_path / FOLDER).mkdir(parents=True)
     (tmp_path / "team").mkdir()
-    (tmp_path / "team" / ".env").write_text("API_KEY=a-${HOST}\nSPEED=3\nLD_PRELOAD=evil.so\n")
-    assert secrets_of(application(), tmp_path / FOLDER, {"HOST": "here"}) == {"API_KEY": "a-here"}
+    (tmp_path / "team" / ".env").write_text("API_KEY=a-${HOME}\nSPEED=3\nLD_PRELOAD=evil.so\n")
+    found = variables_of(application(), tmp_path / FOLDER)
+    assert found.keys() & {"API_KEY", "SPEED", "LD_PRELOAD", "API_TOKEN", "OLD_KEY"} == {"API_KEY"}
+    assert found["API_KEY"] == "a-/here"

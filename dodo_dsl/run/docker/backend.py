@@ -111,7 +111,8 @@ class DockerBackend:
                 "clock: virtual needs a network of the test's own where the application runs in containers: "
                 "remove 'isolation: host', or run with --backend process"
             )
-        await self._compose.read()
+        await asyncio.to_thread(self._compose.read)
+        await self._pulls.once("docker compose", self._compose.require_plugin)
         await self._require_files()
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets, self._key)
@@ -120,7 +121,7 @@ class DockerBackend:
     async def _require_files(self) -> None:
         """Raises BackendError where the engine does not see what the test mounts; once for all tests of a run."""
         await self._pulls.once(shared_files.IMAGE, self._provide_empty_image)
-        paths = shared_files.mounted(self._compose.services, self._folder)
+        paths = self._compose.mounted()
         others = [str(path) for path in paths if not path.is_relative_to(self._folder)]
         await self._pulls.once(f"files {self._folder.parent} {others}", lambda: self._look_for(paths))
 

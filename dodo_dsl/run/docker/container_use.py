@@ -51,28 +51,23 @@ class ContainerProcesses:
 
     def _pids(self, containers: Mapping[str, Any]) -> dict[int, str] | None:
         """The first process of each container that runs; None if one of them is not found here."""
-        from docker.errors import DockerException
-
-        found = {}
-        for name, container in containers.items():
-            try:
-                container.reload()
-            except (DockerException, OSError):
-                return None
-            pid = int(container.attrs["State"].get("Pid") or 0)
-            if pid and not is_of(pid, container.id, self._proc):
-                return None
-            found[pid] = name
-        found.pop(0, None)
-        return found
+        found = {name: first_process(container, self._proc) for name, container in containers.items()}
+        return None if None in found.values() else {pid: name for name, pid in found.items() if pid}
 
 
-def is_of(pid: int, container: str, proc: Path = PROC) -> bool:
-    """Whether a process here is that of the container, and not one of another machine with the same number."""
+def first_process(container: Any, proc: Path = PROC) -> int | None:
+    """The process here with which a container began, 0 if it does not run; None if the engine has it elsewhere.
+
+    A process of another machine may have the number of one here.
+    """
+    from docker.errors import DockerException
+
     try:
-        return container in (proc / str(pid) / "cgroup").read_text()
-    except OSError:
-        return False
+        container.reload()
+        pid = int(container.attrs["State"].get("Pid") or 0)
+        return pid if not pid or container.id in (proc / str(pid) / "cgroup").read_text() else None
+    except (DockerException, OSError):
+        return None
 
 
 class ContainerUse:
@@ -109,20 +104,14 @@ class ContainerUse:
         return {name: used._replace(limit=self._limits[name]) for name, used in {**ended, **found}.items()} or None
 
     def _find(self) -> None:
-        from docker.errors import DockerException
-
         for name, container in self._containers.items():
-            with contextlib.suppress(DockerException, OSError):
-                container.reload()
+            pid = first_process(container, self._proc)
             self._limits[name] = int(container.attrs.get("HostConfig", {}).get("Memory") or 0)
-            pid = int(container.attrs["State"].get("Pid") or 0)
-            if not pid:
-                continue
-            if not is_of(pid, container.id, self._proc):
+            if pid is None:
                 self._elsewhere.append(name)
-            elif (group := service_use.of_process(pid, self._proc)) and group.used():
+            elif pid and (group := service_use.of_process(pid, self._proc)) and group.used():
                 self._groups[name] = group
-            else:
+            elif pid:
                 self._roots[pid] = name
 
     def _asked(self, name: str) -> Used | None:

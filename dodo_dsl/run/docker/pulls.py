@@ -23,14 +23,6 @@ _SMALLER = {"amd64": "386", "arm64": "arm"}
 """Whose programs most machines run, too."""
 
 
-class PullError(BackendError):
-    """An image cannot be pulled."""
-
-    def __init__(self, image: str, reason: str) -> None:
-        super().__init__(f"image {image} cannot be pulled: {reason}")
-        self.image = image
-
-
 class Pulls:
     """Pulls images for all tests of a run: each once, several at a time."""
 
@@ -45,7 +37,7 @@ class Pulls:
     ) -> list[str]:
         """Makes the images local; returns notes on those that could not be updated, or are for another kind of machine.
 
-        ``hints`` say of ``own`` images how to get them otherwise. Raises BackendError.
+        ``hints`` say of images how to do without a pull. Raises BackendError.
         """
         self._hints.update(hints)
         ours, theirs = sorted(set(own)), sorted(set(application))
@@ -81,22 +73,17 @@ class Pulls:
             del self._tasks[key]
 
     def _own(self, image: str, say: Say) -> str:
-        if not self._architecture(image):
-            try:
-                self._pull(image, say)
-            except BackendError as error:
-                if image in self._hints:
-                    raise BackendError(f"{error}; {self._hints[image]}") from error
-                raise
-        return ""
+        return "" if self._architecture(image) else self._application(image, say)
 
     def _application(self, image: str, say: Say) -> str:
         try:
             self._pull(image, say)
         except BackendError as error:
-            if not self._architecture(image):
-                raise
-            return f"{error}; the local image is used"
+            if self._architecture(image):
+                return f"{error}; the local image is used"
+            if image in self._hints:
+                raise BackendError(f"{error}; {self._hints[image]}") from error
+            raise
         return ""
 
     def _foreign(self, images: Iterable[str]) -> list[str]:
@@ -139,30 +126,21 @@ class Pulls:
 
         progress = _Progress(image, say)
         try:
-            for line in self._client.api.pull(*split_reference(image), stream=True, decode=True):
+            for line in self._client.api.pull(image, stream=True, decode=True):
                 if self._interrupted.is_set():
                     return
                 progress.take(line)
         except (DockerException, OSError) as error:
-            raise PullError(image, _reason(image, engine_error(error))) from error
+            raise _problem(image, engine_error(error)) from error
 
 
-def split_reference(image: str) -> tuple[str, str]:
-    """An image's repository, and its tag (``latest`` by default) or digest."""
-    repository, sign, digest = image.partition("@")
-    if sign:
-        return repository, digest
-    repository, sign, tag = image.rpartition(":")
-    return (repository, tag) if sign and "/" not in tag else (image, "latest")
-
-
-def _reason(image: str, text: str) -> str:
+def _problem(image: str, text: str) -> BackendError:
     """The engine's text, with how to log in; Docker's own registry says that itself, also of what it does not have."""
     host = image.partition("/")[0]
     is_named = "/" in image and ("." in host or ":" in host or host == "localhost")
     if is_named and any(word in text for word in ("unauthorized", "denied", "no basic auth")):
-        return f"{text}; if the registry requires a login: docker login {host}"
-    return text
+        text = f"{text}; if the registry requires a login: docker login {host}"
+    return BackendError(f"image {image} cannot be pulled: {text}")
 
 
 class _Progress:
@@ -177,7 +155,7 @@ class _Progress:
 
     def take(self, line: dict[str, Any]) -> None:
         if "error" in line:
-            raise PullError(self._image, _reason(self._image, str(line["error"])))
+            raise _problem(self._image, str(line["error"]))
         if str(line.get("status")).startswith("Retrying") and not self._retried:
             self._retried = True
             self._say(f"pulling {self._image}: the connection broke, the engine retries")

@@ -4,12 +4,10 @@ import io
 import os
 import tarfile
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application.model import SANDBOX
-from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.protocol import BackendError
@@ -32,18 +30,6 @@ def provide_image(client: Any) -> None:
             client.api.import_image_from_data(empty.getvalue(), repository=repository, tag=tag)
     except (DockerException, OSError) as error:
         raise BackendError(f"the Docker engine cannot make an empty image: {engine_error(error)}") from error
-
-
-def mounted(services: Mapping[str, Any], folder: Path) -> list[Path]:
-    """The files of this machine that services mount; those of the test compiled into ``folder`` stand as one."""
-    given = [Path(source) for name, one in services.items() if name != SANDBOX for source in _sources(one)]
-    sources = [path for path in given if path.exists()]
-    own = {path for path in sources if path.is_relative_to(folder)}
-    return [*([folder / PLAN_FILE] if own else []), *sorted({*sources} - own)]
-
-
-def _sources(service: Mapping[str, Any]) -> Iterator[str]:
-    return (v["source"] for v in service.get("volumes") or () if v.get("type") == "bind" and v.get("source"))
 
 
 def unseen(client: Any, paths: Sequence[Path], project: str = "") -> Path | None:

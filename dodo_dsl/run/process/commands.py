@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.application import secret_variables
 from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate
 from dodo_dsl.application.model import OFFSCREEN
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
@@ -14,7 +13,7 @@ from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import TIME, TIME_FOLDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, ApplicationService, Flag, Plan, PlannedService
-from dodo_dsl.run.application_files import application_paths, secrets_of
+from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.application_time import ApplicationTime, folder_of
 from dodo_dsl.run.process.environment import (
     application_environment,
@@ -101,11 +100,9 @@ class Commands:
 
     def _application(self, service: ApplicationService) -> Command:
         folder = (self.folder / self.plan.application.folder).resolve()
-        passed = self.plan.application.access.passed
-        inherited = application_environment(passed)
-        outside = {**secret_variables.allowed(os.environ, passed), **inherited}
+        inherited = application_environment(self.plan.application.access.passed)
         cids = {name: str(self.slot.cid) for name in CID_VARIABLES}
-        variables = {**secrets_of(self.plan.application, self.folder, outside), **outside, **cids}
+        variables = {**variables_of(self.plan.application, self.folder), **cids}
         given = {
             name: variables[name] if value is None else interpolate(value, variables)
             for name, value in service.environment.items()

@@ -1,19 +1,12 @@
 """What builds get of a repository: not its tests, their output and ``.git``."""
 
-import asyncio
-import json
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from dodo_dsl.plan.model import ApplicationService
 from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
-from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.pulls import Pulls
-from tests.run.scripted import plan
 
 _FILES = (
     "Dockerfile", "app.py", "data/a.txt", ".git/config", "sub/.git/config", "tests/a.dodo.yml", "tests/map.json",
@@ -35,7 +28,7 @@ def repository(tmp_path: Path) -> Path:
 def _built(root: Path, build: Any, folder: Path) -> dict[str, Any]:
     hidden = [root / ".git", root / "tests", root / "dodo-report", root / "b.dodo.yml"]
     folder.mkdir(exist_ok=True)
-    found: dict[str, Any] = own_contexts({"a": {"image": "a", "build": build, "command": "x"}}, hidden, folder)
+    found = own_contexts({"a": {"image": "a", "build": build, "command": "x"}}, hidden, folder, root)
     return dict(found["a"])
 
 
@@ -53,25 +46,13 @@ def test_a_context_holds_nothing_that_no_application_sees(repository: Path, tmp_
     assert Path(found["build"]["context"]).name == repository.name
 
 
-def test_so_do_named_contexts(repository: Path, tmp_path: Path) -> None:
-    others = {
-        "same": str(repository),
-        "data": str(repository / "data"),
-        "base": "docker-image://python",
-        "s": "service:b",
-    }
-    build = _built(repository, {"context": str(repository), "additional_contexts": others}, tmp_path / "copies")[
-        "build"
-    ]
-    own = build["additional_contexts"]
-    assert own == {**others, "same": build["context"]}
-    assert ".git/config" not in _shown(own["same"])
-
-
-@pytest.mark.parametrize("context", ["data", "https://example.org/a.git"])
-def test_others_stay_where_they_are(context: str, repository: Path, tmp_path: Path) -> None:
-    where = context if "://" in context else str(repository / context)
-    assert _built(repository, {"context": where}, tmp_path / "copies")["build"]["context"] == where
+def test_so_do_named_contexts_and_others_stay_where_they_are(repository: Path, tmp_path: Path) -> None:
+    own = str(repository)
+    others = {"same": own, "data": f"{own}/data", "base": "docker-image://python", "s": "service:b"}
+    build = _built(repository, {"context": own, "additional_contexts": others}, tmp_path / "copies")["build"]
+    assert build["additional_contexts"] == {**others, "same": build["context"]}
+    for context in (f"{own}/data", "https://example.org/a.git"):
+        assert _built(repository, {"context": context}, tmp_path / "copies")["build"]["context"] == context
 
 
 def test_a_dockerfile_may_be_kept_among_the_tests(repository: Path, tmp_path: Path) -> None:
@@ -86,31 +67,3 @@ def test_hidden_folders_are_no_context(context: str, repository: Path, tmp_path:
         HiddenContext, match=rf"the build of 'a' takes '.*{context}', where tests, their output or \.git"
     ):
         _built(repository, {"context": str(repository / context)}, tmp_path / "copies")
-
-
-async def _nothing(*_: object) -> list[str]:
-    return []
-
-
-def test_a_run_builds_from_the_copy_alone(repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    program = tmp_path / "docker"
-    lines = ['cat "$COMPOSE_FILE" > ../../seen', 'cd "$(dirname "$COMPOSE_FILE")"', f"find . > {tmp_path}/files"]
-    program.write_text("\n".join(["#!/bin/sh", *lines]).replace("../..", str(tmp_path)))
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-    report = repository / "dodo-report" / "sil-first"
-    made = plan()
-    services, hidden = (ApplicationService("a", None),), ("tests", "b.dodo.yml")
-    made = replace(made, application=replace(made.application, folder="../..", services=services, hidden=hidden))
-    monkeypatch.setattr(Pulls, "provide", _nothing)
-    test = Compose(made, repository / "generated" / "sil-first", report, "project", print)
-    test.folder.mkdir(parents=True)
-    test.services = {"a": {"image": "team/a$b", "build": {"context": str(repository)}}}
-    asyncio.run(test.provide_images(Pulls(None)))
-    seen = json.loads((tmp_path / "seen").read_text())
-    assert Path(seen["services"]["a"]["build"]["context"]).parents[1].parent == report
-    files = (tmp_path / "files").read_text()
-    assert "/app.py" in files
-    assert not [name for name in ("config", "results.json", "generated", "map.json", "dodo.yml") if name in files]
-    assert seen["services"]["a"]["image"].startswith("dodo-build:")
-    assert [path.name for path in report.iterdir()] == ["logs"]

@@ -1,92 +1,195 @@
-"""What a test says of a docker command that cannot compose it."""
+"""What ``docker compose`` gets of a test: the application of the plan, in which tests are hidden."""
 
 import asyncio
 import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
-from dodo_dsl.plan.model import ApplicationService
+from dodo_dsl.opendlv.authentication import KEY_VARIABLE
+from dodo_dsl.plan.model import ApplicationService, Plan
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.pulls import PullError, Pulls
+from dodo_dsl.run.docker.pulls import Pulls
+from dodo_dsl.run.mixed import ApplicationCompose
 from dodo_dsl.run.protocol import BackendError
+from tests.run.docker.test_pulls import EmptyEngine
 from tests.run.scripted import plan
 
+HIDDEN = {"tests/map.json": "tests", ".git/config": ".git", "a.dodo.yml": "a.dodo.yml"}
+BUILD = {"context": "../..", "args": {"A": "$$a"}}
+
+
+def planned(services: dict[str, Any], **more: Any) -> Plan:
+    """A test of a repository, whose folder is ``generated/t`` in it."""
+    keys = ("process", "copies")
+    named = tuple(ApplicationService(name, more.get("process")) for name in services)
+    compose = {"services": services, **{key: value for key, value in more.items() if key not in keys}}
+    made = plan("t")
+    own = replace(
+        made.application, folder="../..", services=named, compose=compose, hidden=("tests", "a.dodo.yml"),
+        copies=more.get("copies", {}),
+    )  # fmt: skip
+    return replace(made, application=own)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of a compiled test, and a docker command that does nothing but keep what it builds."""
+    for name in (*HIDDEN, "app.py", "generated/t/environment.compose.yml"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(name)
+    program = tmp_path.parent / f"{tmp_path.name}-bin" / "docker"
+    program.parent.mkdir()
+    program.write_text(
+        '#!/bin/sh\ntest "$6" != build || { cp "$5" "$0.json"; cd "$(dirname "$5")"; find . > "$0.files"; }\n'
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}:{os.environ['PATH']}")
+    return tmp_path / "generated" / "t"
+
+
+def read(made: Plan, folder: Path, kind: type[Compose] = Compose) -> Compose:
+    test = kind(made, folder, folder.parents[1] / "dodo-report" / "t", "project", lambda _: None)
+    test.read()
+    return test
+
+
+def volumes(*mounts: Any, folder: Path, **more: Any) -> list[Any]:
+    document = read(planned({"app": {"volumes": [*mounts]}}, **more), folder).document(b"")
+    return list(document["services"]["app"]["volumes"])
+
+
+def bind(source: str, target: str, makes: bool = True) -> dict[str, Any]:
+    return {"type": "bind", "source": source, "target": target, "bind": {"create_host_path": makes}}
+
 
 @pytest.mark.parametrize(
-    ("stderr", "said"),
+    ("mount", "targets"),
     [
-        ("docker: unknown command: docker compose\n\nRun 'docker --help' for more information", "has no 'compose'"),
-        ("unknown flag: --format\nSee 'docker --help'.", "has no 'compose'"),
-        ("services.app.image must be a string", "rejects the compiled test: services.app.image must be a string"),
+        ("../..:/app", ["/app/.git", "/app/a.dodo.yml", "/app/generated", "/app/tests"]),
+        (bind("../..", "/app"), ["/app/.git", "/app/a.dodo.yml", "/app/generated", "/app/tests"]),
+        ("../../tests:/t:ro", ["/t"]),
+        (bind("../../tests/map.json", "/map.json"), ["/map.json"]),
+        ("bound:/b", ["/b"]),
+        ("own:/b", []),
+        ({"type": "tmpfs", "target": "/b"}, []),
+        ("../../gone:/g", ["/g"]),
+        (bind("../../gone", "/g", makes=False), []),
     ],
 )
-@pytest.mark.thorough
-def test_a_command_without_compose_is_not_the_tests_fault(
-    stderr: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = tmp_path / "docker"
-    program.write_text(f"#!/bin/sh\ncat >&2 <<'END'\n{stderr}\nEND\nexit 1\n")
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+def test_what_lies_over_mounts(mount: Any, targets: list[str], folder: Path) -> None:
+    """Empty folders, an empty file over a file, and nothing that the engine would make as root."""
+    bound = {"bound": {"driver_opts": {"type": "none", "o": "bind,ro", "device": "../../tests"}}, "own": {}}
+    first, *found = volumes(mount, folder=folder, volumes=bound)
+    found = [each for each in (first, *found) if each != mount and "bind" not in each]
+    assert sorted(mask["target"] for mask in found) == targets
+    assert all(mask["read_only"] for mask in found)
+    assert {m["target"] for m in found if m["type"] == "bind"} == {t for t in targets if t.endswith("dodo.yml")}
+
+
+def test_a_mount_has_one_place(folder: Path) -> None:
+    (mask,) = volumes("../../tests:/t:ro", folder=folder)
+    assert mask == {"type": "tmpfs", "target": "/t", "read_only": True}
+
+
+@pytest.mark.parametrize(
+    ("services", "more", "said"),
+    [
+        ({"volumes": ["../../out:/o:ro"]}, {}, "is a symbolic link to '/etc', outside the repository"),
+        ({}, {"copies": {"files-0": "../../out"}}, "is a symbolic link to '/etc', outside the repository"),
+        ({}, {"configs": {"c": {"file": "../../tests/map.json"}}}, r"configs\.c\.file: .*tests/map.json' lies where"),
+        ({"image": "${NOBODY:?says}"}, {}, "NOBODY"),
+    ],
+)
+def test_what_leads_elsewhere_since(services: Any, more: Any, said: str, folder: Path) -> None:
+    (folder.parents[1] / "out").symlink_to("/etc")
     with pytest.raises(BackendError, match=said):
-        asyncio.run(Compose(plan(), tmp_path, tmp_path, "project", print).read())
+        read(planned({"app": services}, **more), folder)
 
 
-def test_compose_is_not_blamed_where_it_answers_by_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    program = tmp_path / "docker"
-    program.write_text('#!/bin/sh\ntest "$2" = version || { echo "odd. See \'docker --help\'." >&2; exit 1; }\n')
+def test_only_services_of_dodo_have_the_key(folder: Path) -> None:
+    document = read(planned({"app": {"image": "a"}}), folder).document(b"\1")
+    having = {name for name, service in document["services"].items() if KEY_VARIABLE in service.get("environment", {})}
+    assert having == {"camera", "track"}
+
+
+def test_a_docker_command_that_cannot_compose(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = folder / "docker"
+    program.write_text("#!/bin/sh\nexit 1\n")
     program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-    with pytest.raises(BackendError, match="rejects the compiled test: odd"):
-        asyncio.run(Compose(plan(), tmp_path, tmp_path, "project", print).read())
-    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+    with pytest.raises(BackendError, match="has no 'compose' of version 2"):
+        asyncio.run(read(planned({}), folder).require_plugin())
+    monkeypatch.setenv("PATH", str(folder / "nothing"))
     with pytest.raises(BackendError, match="there is no program 'docker'"):
-        asyncio.run(Compose(plan(), tmp_path, tmp_path, "project", print).read())
+        read(planned({}), folder)
 
 
-@pytest.mark.parametrize(
-    ("process", "image", "said"),
-    [
-        (None, "team/a", "; with 'x-dodo-process: [python, main.py]' 'a' starts as a process"),
-        (("python", "a.py"), "team/a", ""),
-        (None, "dodo/clock", ""),
-    ],
-)
-def test_an_image_that_cannot_be_pulled(
-    process: tuple[str, ...] | None, image: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def failing(*_: object) -> list[str]:
-        raise PullError(image, "not found")
-
-    monkeypatch.setattr(Pulls, "provide", failing)
-    made = plan()
-    made = replace(made, application=replace(made.application, services=(ApplicationService("a", process),)))
-    test = Compose(made, tmp_path, tmp_path, "project", print)
-    test.services = {"a": {"image": "team/a"}, "dodo-clock": {"image": "dodo/clock"}}
-    with pytest.raises(BackendError) as raised:
-        asyncio.run(test.provide_images(Pulls(None)))
-    assert str(raised.value) == f"image {image} cannot be pulled: not found{said}"
+@pytest.mark.parametrize("process", [None, ("a",)])
+def test_an_image_that_cannot_be_pulled(process: tuple[str, ...] | None, folder: Path) -> None:
+    """What is not a process already could be one."""
+    test = read(planned({"a": {"image": "team/a"}}, process=process), folder)
+    test.plan = replace(test.plan, services=(), isolation="host")
+    with pytest.raises(BackendError, match="image team/a cannot be pulled: not found") as raised:
+        asyncio.run(test.provide_images(Pulls(EmptyEngine())))
+    assert ("x-dodo-process" in str(raised.value)) is (process is None)
 
 
-@pytest.mark.parametrize("key", ["configs", "secrets"])
-def test_files_of_the_report_are_no_configs(key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A compiled test may be run with a report anywhere."""
-    (tmp_path / "my-report" / "a").mkdir(parents=True)
-    folder = tmp_path / "out" / "a"
-    folder.mkdir(parents=True)
-    for report, refused in (("my-report", True), ("data", False)):
-        config = {"services": {}, key: {"c": {"file": f"{tmp_path}/{report}/results.json"}}}
-        program = tmp_path / "docker"
-        program.write_text(f"#!/bin/sh\necho '{json.dumps(config)}'\n")
-        program.chmod(0o755)
-        monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-        made = replace(plan(), application=replace(plan().application, folder="../.."))
-        test = Compose(made, folder, tmp_path / "my-report" / "a", "project", print)
-        if not refused:
-            asyncio.run(test.read())
-            continue
-        with pytest.raises(BackendError, match=r"my-report/results\.json' lies where tests, their output or \.git are"):
-            asyncio.run(test.read())
+def test_a_run_builds_from_a_copy_and_replaces_no_image(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The image has a name of its own for all that use it; one that a pipeline has built is pulled."""
+    pulled: list[set[str]] = []
+
+    async def provide(_: object, own: set[str], foreign: set[str], *__: object) -> list[str]:
+        pulled.append(foreign)
+        return []
+
+    monkeypatch.setattr(Pulls, "provide", provide)
+    monkeypatch.setenv("DODO_IMAGE_P", f"p@sha256:{'0' * 64}")
+    services = {
+        "a": {"image": "${DODO_IMAGE_A:-postgres}", "build": BUILD},
+        "b": {"image": "postgres"},
+        "c": {"image": "", "build": {"context": "https://example.org/a.git"}},
+        "d": {"image": "c"},
+        "p": {"image": "${DODO_IMAGE_P:-p}", "build": BUILD},
+    }
+    test = read(planned(services), folder)
+    asyncio.run(test.provide_images(Pulls(None)))
+    made = {name: service["image"] for name, service in test.document(b"")["services"].items() if name in services}
+    assert made["a"] == made["b"] != made["c"]
+    assert pulled == [{"c", f"p@sha256:{'0' * 64}"}]
+    program = folder.parents[2] / f"{folder.parents[1].name}-bin" / "docker"
+    built = json.loads(Path(f"{program}.json").read_text())["services"]
+    assert {name: service["image"] for name, service in built.items()} == {name: made[name] for name in ("a", "c")}
+    assert all(image.startswith("dodo-build:") for image in (made["a"], made["c"]))
+    assert built["a"]["build"]["args"] == {"A": "$$a"}
+    seen = Path(f"{program}.files").read_text()
+    assert "/app.py" in seen
+    assert not [name for name in ("config", "generated", "map.json", "dodo.yml") if name in seen]
+    assert [path.name for path in test.report.iterdir()] == ["logs"]
+
+
+def test_nothing_waits_for_services_that_are_processes(folder: Path) -> None:
+    on = {"condition": "service_started"}
+    copies = {"entrypoint": ["sh", "-c", "x"], "volumes": [bind("../../gone", "/from/files-0", makes=False)]}
+    compiled = {
+        "services": {"sandbox": {"image": "s", "volumes": ["tmp:/tmp"]}, "dodo-files": copies, "camera": {}},
+        "networks": {"default": {}},
+        "volumes": {"tmp": {"driver_opts": {"type": "tmpfs"}}, "report": {}},
+    }
+    (folder / "environment.compose.yml").write_text(yaml.safe_dump(compiled))
+    services = {"app": {"image": "a", "depends_on": {"track": on, "sandbox": on, "db": on}}, "db": {"image": "d"}}
+    made = planned(services, copies={"files-0": "../../gone"}, volumes={"files-0": {}})
+    document = read(made, folder, ApplicationCompose).document(b"\1")
+    assert document["services"].keys() == {"app", "db", "sandbox", "dodo-files"}
+    assert document["services"]["app"]["depends_on"] == {"sandbox": on, "db": on}
+    assert document["services"]["sandbox"]["entrypoint"][1:] == ["infinity"]
+    gone = {"type": "tmpfs", "target": "/from/files-0", "read_only": True}
+    assert gone in document["services"]["dodo-files"]["volumes"]
+    usr = {"source": "/usr", "target": "/usr", "type": "bind", "read_only": True}
+    assert usr in document["services"]["sandbox"]["volumes"]
+    assert document["volumes"].keys() == {"files-0", "tmp"}
+    assert KEY_VARIABLE not in json.dumps(document)

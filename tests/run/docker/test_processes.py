@@ -64,38 +64,26 @@ def test_the_first_processes_of_the_application(proc: Proc) -> None:
     assert (found.first(["app", "far"]), found.first(["mute"])) == (None, None)
 
 
-@pytest.mark.parametrize(("isolation", "pid"), [("host", 10), ("host", 11), ("network", 11)])
+@pytest.mark.parametrize(("isolation", "pids"), [("host", [10]), ("host", [11]), ("network", [11]), ("host", [11, 0])])
 @pytest.mark.thorough
 def test_a_test_on_the_network_of_another_host_does_not_begin(
-    isolation: str, pid: int, proc: Proc, tmp_path: Path
+    isolation: str, pids: list[int], proc: Proc, tmp_path: Path
 ) -> None:
-    """In the engine's own network of a test it does; there its containers are told through one of them."""
-    plan = replace(Bench(tmp_path).plan(), isolation=isolation)
+    """In the engine's own network of a test it does, and so it does where a service ends meanwhile."""
+
+    class Changing(Container):
+        def reload(self) -> None:
+            self.attrs = {"State": {"Pid": pids.pop(0) if len(pids) > 1 else pids[0]}}
 
     async def begin() -> None:
+        plan = replace(Bench(tmp_path).plan(), isolation=isolation)
         backend = DockerBackend(plan, tmp_path, tmp_path, None, Pulls(None), "p", (), print, b"")
-        backend._processes = ContainerProcesses({"app": Container("c0ffee", pid)}, proc.root)
+        backend._processes = ContainerProcesses({"app": Changing("c0ffee", 0)}, proc.root)
         await backend.require_own_host()
 
     refused = pytest.raises(BackendError, match=r"another machine.*use --isolation network")
-    with refused if (isolation, pid) == ("host", 11) else contextlib.nullcontext():
+    with refused if (isolation, pids) == ("host", [11]) else contextlib.nullcontext():
         asyncio.run(begin())
-
-
-def test_a_service_that_ends_as_the_test_begins_is_not_elsewhere(proc: Proc, tmp_path: Path) -> None:
-    class Ending(Container):
-        def reload(self) -> None:
-            self.attrs = {"State": {"Pid": pids.pop()}}
-
-    async def begin() -> None:
-        plan = replace(Bench(tmp_path).plan(), isolation="host")
-        backend = DockerBackend(plan, tmp_path, tmp_path, None, Pulls(None), "p", (), print, b"")
-        backend._processes = ContainerProcesses({"app": Ending("c0ffee", 11)}, proc.root)
-        await backend.require_own_host()
-
-    pids = [0, 11]
-    asyncio.run(begin())
-    assert not pids
 
 
 def test_one_thread_at_a_time_measures(proc: Proc) -> None:

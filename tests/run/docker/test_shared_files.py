@@ -7,8 +7,7 @@ import pytest
 from docker.errors import APIError, NotFound
 from docker.types import HostConfig
 
-from dodo_dsl.application.model import SANDBOX
-from dodo_dsl.run.docker.shared_files import mounted, problem, unseen
+from dodo_dsl.run.docker.shared_files import problem, unseen
 
 
 class Engine:
@@ -45,22 +44,6 @@ def test_the_first_path_that_is_missing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("error", [NotFound("no such image"), OSError("gone"), APIError("500", explanation="full")])
 def test_what_says_nothing_of_files_is_no_answer(error: Exception, tmp_path: Path) -> None:
     assert unseen(Engine(error=error), [tmp_path]) is None
-
-
-def test_what_a_test_mounts(tmp_path: Path) -> None:
-    """The compiled test by the file that is made last; no sources that compose makes, nor what processes would need."""
-    own, repository = tmp_path / "generated" / "t", tmp_path / "maps"
-    for folder in (own / "files", repository):
-        folder.mkdir(parents=True)
-
-    def bind(path: Path) -> dict[str, Any]:
-        return {
-            "volumes": [{"type": "bind", "source": str(path)}, {"type": "volume", "source": "tmp"}, {"type": "tmpfs"}]
-        }
-
-    services = {"camera": bind(own / "files"), "driver": bind(repository), "new": bind(tmp_path / "new"), "a": {}}
-    assert mounted({**services, SANDBOX: bind(Path("/usr"))}, own) == [own / "test.json", repository]
-    assert mounted({"driver": bind(repository)}, own) == [repository]
 
 
 def test_the_way_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
