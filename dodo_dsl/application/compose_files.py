@@ -59,7 +59,7 @@ class ComposeFiles:
         self._nodes = 0
 
     def filled(self, text: str, *, is_path: bool = True) -> str:
-        """A text with its variables filled in, of a path also those that it starts with: its file's folder, the home."""
+        """A text with its variables filled in, and of a path the folder or the home that it starts with."""
         match = _FOLDER.match(text) if is_path else None
         text = _FOLDERS[match["braced"] or match["bare"]] + text[match.end() :] if match else text
         return filled(text, {**self.included, **self.known}, self.is_late)

@@ -13,7 +13,7 @@ from typing import Any
 from dodo_dsl.application import compose_paths, secret_variables
 from dodo_dsl.application.container import TOP_LEFT_OUT, Container
 from dodo_dsl.application.interpolation import interpolate
-from dodo_dsl.application.model import ApplicationSource, ComposeService
+from dodo_dsl.application.model import ApplicationSource, ComposeService, is_true
 from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
 from dodo_dsl.application.part import Part
 from dodo_dsl.diagnostics import Diagnostic, Span
@@ -179,6 +179,11 @@ class Construction:
                 about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
                 hint = "indent it by 2: it looks like a service" if about & _OF_SERVICES else ""
                 of.unknown_key(key, top, "the compose file", known, hint)
+        for name, node, span in self._named("networks"):
+            external = node.get("external") if isinstance(node, Mapping) else None
+            if isinstance(external, Mapping) or (isinstance(external, Scalar) and is_true(external.value)):
+                message = f"the network '{name}' is external, and a test has its own network only"
+                of.add(Diagnostic(span, "application-key", message, severity="warning"))
 
 
 def construction_of(application: ApplicationSource) -> Construction:

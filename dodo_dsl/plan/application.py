@@ -1,7 +1,7 @@
 """``plan_application``: the application as a test runs it, in containers and as processes."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,10 +9,13 @@ from typing import Any
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.construction import Construction, Setting
-from dodo_dsl.application.model import SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
+from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
 from dodo_dsl.application.variables import variables_of
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
 from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
+
+_LONG = 200
+"""Characters of a line that says what differs."""
 
 
 def plan_application(application: ApplicationSource, setting: Setting) -> Application:
@@ -29,7 +32,7 @@ def plan_application(application: ApplicationSource, setting: Setting) -> Applic
         _relative(application.folder, setting.folder),
         tuple(_process(service, application, setting) for service in application.services.values()),
         {"services": services, **construction.rest()},
-        tuple(f"{name}: left out, {why}" for name, why in application.dropped.items()),
+        tuple(_changes(application, services)),
         setting.limits,
         secrets={name: _relative(file, setting.folder) for name, file in application.secrets.items()},
         access=access,
@@ -57,6 +60,18 @@ def _container(construction: Construction, service: ComposeService) -> dict[str,
         mount = {"type": "volume", "source": TIME, "target": TIME_MOUNT, "read_only": True}
         made["volumes"] = [*(made.get("volumes") or []), mount]
     return made
+
+
+def _changes(application: ApplicationSource, made: dict[str, dict[str, Any]]) -> Iterator[str]:
+    """What differs from the compose file, for the first lines of the test's own one."""
+    yield from (f"{name}: left out, {why}" for name, why in application.dropped.items())
+    for name, service in application.services.items():
+        written = {key: each for key, each in plain(service.node).items() if key not in KEYS and each is not None}
+        changed = sorted(key for key in written if key in made[name] and made[name][key] != written[key])
+        gone = sorted(key for key in written if key not in made[name])
+        parts = [f"{words} {', '.join(keys)}" for words, keys in (("changed:", changed), ("left out:", gone)) if keys]
+        line = "".join(c if c.isprintable() else "?" for c in f"{name}: {'; '.join(parts)}")
+        yield from [line if len(line) <= _LONG else f"{line[: _LONG - 3]}..."] if parts else []
 
 
 def _process(service: ComposeService, application: ApplicationSource, setting: Setting) -> ApplicationService:
