@@ -83,7 +83,8 @@ def forget_files() -> None:
         file_rules.course_of,
         file_rules.fault_of_start,
         needed_files.files,
-        file_rules.table_begin,
+        file_rules.table_span,
+        file_rules.pictures,
     )
     for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()
