@@ -180,7 +180,7 @@ def dotenv_file(
 ) -> dict[str, str]:
     """The variables of a ``.env`` file, interpolated with ``known`` first, then with earlier ones and those ``before``.
 
-    None without a file; raises EnvironmentProblem for what compose refuses.
+    Empty without a file; raises EnvironmentProblem for what compose refuses.
     """
     written, problem = dotenv(path.read_bytes().decode(errors="replace") if path.is_file() else "", raw=raw)
     if problem:

@@ -84,6 +84,7 @@ def variables_of(
 def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Callable[[str], bool]) -> dict[str, str]:
     """What files of variables take from elsewhere, which compose would look for in its own environment.
 
+    What is only named is empty without a value, as a shell's would be handed over by `docker compose up`.
     As compose reads them: ``values`` come first, then earlier files, then earlier lines of the same one.
     """
     made: dict[str, str] = {}
