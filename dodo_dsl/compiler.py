@@ -164,7 +164,8 @@ def load(
         deployment = replace(deployment, rigs=rigs)
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
-    corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
+    at_ends = {id(corner): corner for spec in specs for corner in spec.corners}  # which instances share
+    corners = [applied(corner, settings) for corner in at_ends.values()]
     result = sources.check(specs, corners, CheckInputs(manifests, deployment, source))
     as_read = {path: of_file for path, (_, of_file) in loaded.items()}
     problems = Problems(tuple(found), (*manifest_problems, *own), as_read, result.problems)
