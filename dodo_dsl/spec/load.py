@@ -54,7 +54,7 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
     are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
     is_broken = len(choices[0].values) < len(getattr(node.get(MATRIX), "entries", ()))
     reported = {problem.span for problem in unknown}
-    specs = []
+    specs: list[Spec] = []
     for choice in choices:
         if wrong >= _MOST_WRONG:
             break

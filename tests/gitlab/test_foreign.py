@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl.cli.pipeline_rules import KINDS
 from tests.gitlab.inputs import TEMPLATES, included, listed, merged
+from tests.gitlab.pipeline_rules import KINDS
 from tests.gitlab.test_local import PROGRAMS, commit, pipeline, run
 from tests.gitlab.test_rules import FOREIGN, foreign
 
