@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
+from dodo_dsl.cli import display, pipeline_options, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.cli.numbers import patience, positive
@@ -185,7 +185,7 @@ def _show(diagnostics: Sequence[Diagnostic], style: str, stdout: TextIO, stderr:
 
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
+    diagnostics, stale = list(checked.diagnostics), {}
     sound = checked.sound()
     if sound.specs:
         searches = _searches(options) if checked.ok else ()
