@@ -5,11 +5,10 @@ Tests share jobs in suites whose jobs cost more to begin than to run.
 
 import heapq
 import shlex
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dodo_dsl.plan.model import Plan
 from dodo_dsl.spec.model import LEVELS
 
 SPARE_MINUTES = 10
@@ -94,13 +93,6 @@ def _joined(share: Sequence[PipelineJob], name: str) -> PipelineJob:
 
 DEFAULT_TAGS = ("sil",)
 
-Seconds = Callable[[Sequence[Plan]], Mapping[str, float]]
-"""How long tests take, by slug, of those of which it is known."""
-
-
-def _unknown(_plans: Sequence[Plan]) -> Mapping[str, float]:
-    return {}
-
 
 @dataclass(frozen=True)
 class JobOptions:
@@ -111,8 +103,9 @@ class JobOptions:
 
     ``run_options`` are those of ``dodo run`` in each test, which a variable ``DODO_RUN_OPTIONS`` replaces. ``images``
     are those of the application that the parent has built, as lines ``DODO_IMAGE_<SERVICE>=<image>``. Where
-    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds``. Jobs have large files ``from_repository``,
-    as they check it out, or else from the artifact of the parent, which may have ``artifact_mb`` MB; 0 for any number.
+    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds`` of each slug, or else by their timeouts.
+    Jobs have large files ``from_repository``, as they check it out, or else from the artifact of the parent, which may
+    have ``artifact_mb`` MB; 0 for any number.
     """
 
     tags: tuple[str, ...] = DEFAULT_TAGS
@@ -120,7 +113,7 @@ class JobOptions:
     run_options: str = ""
     images: tuple[str, ...] = ()
     most_jobs: int = 0
-    seconds: Seconds = _unknown
+    seconds: Mapping[str, float] = field(default_factory=dict)
     services: tuple[str | Mapping[str, Any], ...] = ()
     before_script: str = ""
     artifacts_access: str = ""
