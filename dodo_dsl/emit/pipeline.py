@@ -8,16 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
-from dodo_dsl.emit.pipeline_jobs import (
-    NO_OPTIONS,
-    NOTHING_COMMON,
-    SPARE_MINUTES,
-    CommonSettings,
-    JobOptions,
-    PipelineJob,
-    factored,
-    packed,
-)
+from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions, PipelineJob, packed
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.runs import by_test, named, pooled
 from dodo_dsl.plan.test_files import FileCopy
@@ -65,10 +56,7 @@ class SearchJobs:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The stages in order, whether a gate precedes hil, the variables, the jobs, and what those without a test have.
-
-    What is ``common`` to the jobs of tests is not in them.
-    """
+    """The stages in order, whether a gate precedes hil, the variables, and the jobs with what they have in common."""
 
     stages: tuple[str, ...]
     gate: bool
@@ -76,7 +64,6 @@ class Pipeline:
     jobs: tuple[PipelineJob, ...]
     searches: tuple[SearchJobs, ...] = ()
     options: JobOptions = NO_OPTIONS
-    common: CommonSettings = NOTHING_COMMON
 
 
 def pipeline(
@@ -96,8 +83,7 @@ def pipeline(
     if options.most_jobs:
         timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
         jobs = packed(jobs, options.most_jobs, {**timeouts, **options.seconds})
-    common, jobs = factored(jobs, options)
-    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options, common)
+    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options)
 
 
 def _variables(suite: Suite, options: JobOptions) -> dict[str, str]:
@@ -124,18 +110,14 @@ def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) ->
     return PipelineJob(
         name=named(plan).slug,
         stage=plan.level,
-        tags=(plan.tag, *shared) if on_rig else options.tags,
+        tags=(plan.tag, *shared) if on_rig else (),
         gated=gate and plan.level == "hil",
         rig=rig if on_rig and not plan.pool else "",
         pool=tuple(one.rig for one in plans) if on_rig and plan.pool else (),
         minutes=max(math.ceil((p.timeout_s + sum(s.setup_s for s in p.services)) / 60) for p in plans) + SPARE_MINUTES,
-        interruptible=not on_rig,
         tests=(named(plan).slug,),
         folders=tuple(f"{folder}/{one.slug}" for one in plans),
-        image="" if on_rig else options.image,
         backend=options.backend,
-        services=() if on_rig else options.services,
-        before_script="" if on_rig else options.before_script,
     )
 
 

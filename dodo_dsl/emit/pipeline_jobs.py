@@ -17,7 +17,7 @@ SPARE_MINUTES = 10
 
 @dataclass(frozen=True)
 class PipelineJob:
-    """``rig`` is the resource that it locks, ``image`` that of its container, both may be empty.
+    """``rig`` is the resource that it locks, empty for any other runner; ``tags`` are those of a rig's.
 
     ``pool`` has the names of the rigs of which it takes any; GitLab cannot lock one of several.
 
@@ -26,25 +26,26 @@ class PipelineJob:
 
     name: str
     stage: str
-    tags: tuple[str, ...]
     gated: bool
     rig: str
     minutes: int
-    interruptible: bool
     tests: tuple[str, ...]
     folders: tuple[str, ...] = ()
-    image: str = ""
+    tags: tuple[str, ...] = ()
     pool: tuple[str, ...] = ()
     backend: str = ""
     """What the tests run on unless the options of a pipeline name another; empty for dodo's own choice."""
-    services: tuple[str | Mapping[str, Any], ...] = ()
-    before_script: str = ""
+
+    @property
+    def on_rig(self) -> bool:
+        """Whether a rig's own runner takes it, and not those of all other jobs."""
+        return bool(self.rig or self.pool)
 
     @property
     def script(self) -> str:
         compiled = " ".join(f"--compiled {shlex.quote(folder)}" for folder in self.folders)
         backend = f" --backend {self.backend}" if self.backend else ""
-        alone = (self.rig or self.pool) and len(self.tests) > 1  # else they would wait for each other's lease
+        alone = self.on_rig and len(self.tests) > 1  # else they would wait for each other's lease
         jobs = " --jobs 1" if alone else ""
         return f"dodo run {compiled}{backend} --report dodo-report $DODO_RUN_OPTIONS{jobs}"
 
@@ -127,39 +128,3 @@ class JobOptions:
 
 
 NO_OPTIONS = JobOptions()
-
-
-@dataclass(frozen=True)
-class CommonSettings:
-    """What jobs of tests have in common; those on rigs have ``tags`` of their own instead."""
-
-    tags: tuple[str, ...] = ()
-    image: str = ""
-    services: tuple[str | Mapping[str, Any], ...] = ()
-    before_script: str = ""
-
-
-NOTHING_COMMON = CommonSettings()
-
-
-def factored(jobs: Sequence[PipelineJob], options: JobOptions) -> tuple[CommonSettings, tuple[PipelineJob, ...]]:
-    """What the jobs have in common, and the jobs without it.
-
-    A job cannot be without an image, services or commands that it inherits, so these are common only to all jobs.
-    """
-    wanted = CommonSettings(options.tags, options.image, options.services, options.before_script)
-    shared = {
-        name: value
-        for name, value in vars(wanted).items()
-        if all(getattr(job, name) == value for job in jobs) or (name == "tags" and _are_replaced(jobs, options.tags))
-    }
-    kept = (
-        replace(job, **{name: type(value)() for name, value in shared.items() if getattr(job, name) == value})
-        for job in jobs
-    )
-    return CommonSettings(**shared), tuple(kept)
-
-
-def _are_replaced(jobs: Sequence[PipelineJob], tags: Sequence[str]) -> bool:
-    """Whether some jobs have the tags, and all others have tags instead."""
-    return any(job.tags == tags for job in jobs) and all(job.tags for job in jobs)
