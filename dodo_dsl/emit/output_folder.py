@@ -91,6 +91,7 @@ def _update(wanted: _Entries) -> None:
         if path.is_symlink() or isinstance(entry, _Link):
             path.unlink(missing_ok=True)
         if isinstance(entry, _Link):
+            path.parent.mkdir(parents=True, exist_ok=True)
             _put(path, entry)
         else:
             with atomic.replacing(path) as part:
@@ -100,13 +101,15 @@ def _update(wanted: _Entries) -> None:
 def _write_new(folder: Path, wanted: _Entries) -> None:
     """A new test: its folder appears as a whole."""
     with atomic.new_folder(folder) as stage:
-        for path, entry in wanted.items():
-            _put(stage / path.relative_to(folder), entry)
+        staged = {stage / path.relative_to(folder): entry for path, entry in wanted.items()}
+        for parent in {path.parent for path in staged}:
+            parent.mkdir(parents=True, exist_ok=True)
+        for path, entry in staged.items():
+            _put(path, entry)
         _open_to_containers(stage / FILES)
 
 
 def _put(path: Path, entry: _Entry) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     if isinstance(entry, _Link):
         path.symlink_to(entry.text)
     elif isinstance(entry, Path):
