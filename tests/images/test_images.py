@@ -16,10 +16,9 @@ import yaml
 from dodo_dsl import __version__
 from dodo_dsl.images import build_context
 from dodo_dsl.spec.manifest import Manifest, load_manifests
-from tests.images.conftest import docker, own_volume
-from tests.images.dockerfile import ROOT, stages
+from tests.images.conftest import ROOT, docker, own_volume
 from tests.images.layers import layers
-from tests.images.service_folders import folders_of
+from tests.images.targets import folders_of, targets
 
 pytestmark = pytest.mark.engine
 
@@ -97,7 +96,7 @@ print(json.dumps({"modules": len(names), "held": held, "files": files}))
 """
 
 
-def holds_its_own_service(told: str, folders: list[str]) -> None:
+def holds_its_own_service(told: str, folders: set[str]) -> None:
     """Its modules and no others, all that they import (also where a flag asks for it), and the bytecode of each."""
     found = json.loads(told)
     assert found["modules"] >= 2
@@ -117,7 +116,7 @@ def tried(built: dict[str, str]) -> Iterator[dict[str, Future[None]]]:
 
 def starts_with_all_it_needs(image: str, manifest: Manifest) -> None:
     inside = ("python3", "-c", INSIDE, f"services.{manifest.folder.name}")
-    holds_its_own_service(run(image, *inside), folders_of(manifest))
+    holds_its_own_service(run(image, *inside), folders_of(manifest.image))
     about = yaml.safe_load((manifest.folder / "service.yml").read_text())
     if "example" not in about or manifest.devices == ("{serial}",):  # which needs a rig, or the clock of a test
         out = docker("run", "--rm", "--network", "none", *HARDENED, image, "--help")
@@ -215,7 +214,8 @@ def test_layers_are_shared(built: dict[str, str]) -> None:
     rows = docker(*words, *built.values()).splitlines()
     found = dict(zip(built, map(json.loads, rows), strict=True))
     for name in {*built} - {"base", "geometry", "vision"}:
-        below = found[stages()[name].stands_on]
+        stage = "base" if name == "sandbox" else targets()[name]["args"]["STAGE"]
+        below = found["base" if stage == "rig" else stage]
         assert found[name][: len(below)] == below, name
         assert len(found[name]) - len(below) <= MOST_LAYERS, name
 
@@ -234,8 +234,7 @@ def test_images_weigh_little_together(built: dict[str, str]) -> None:
 def test_a_second_build_makes_the_same_files(built: dict[str, str], base_image: str, tmp_path: Path) -> None:
     """The stage of the sources, built anew from files with other dates: its layers stay shared."""
     folder = tmp_path / "dodo-images-again"
-    folder.mkdir()
-    build_context.assemble(folder, None)
+    build_context.assemble(folder)
     for path in folder.rglob("*.py"):
         path.touch()
     words = ["docker", "buildx", "build", "--quiet", "--no-cache", "--target", "code", "--file", "services/Dockerfile"]
@@ -245,7 +244,7 @@ def test_a_second_build_makes_the_same_files(built: dict[str, str], base_image: 
     try:
         sums = "find . -type f -exec sha256sum {} + | sort"
         again = docker("run", "--rm", "--workdir", "/shared", image, "sh", "-c", sums)
-        first = docker("run", "--rm", "--workdir", "/opt/dodo", built["sandbox"], "sh", "-c", sums)
+        first = docker("run", "--rm", "--workdir", "/opt/dodo", built["base"], "sh", "-c", sums)
         assert again == first
     finally:
         docker("image", "rm", "--force", image)
