@@ -95,12 +95,12 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.action == "push":
         _push(names, series, options.platform, stdout)
         return Exit.OK
+    files = {name: _dockerfile(name, own[name], series) for name in names if name in own}
     for one in series.each(options.platform):
         if of_dodo := [name for name in names if name not in own]:
             _build(options, of_dodo, one, stdout)
-        for name in names:
-            if name in own:
-                _build_own(name, own[name], one, stdout)
+        for name, file in files.items():
+            _build_own(name, file, one, stdout)
     return Exit.OK
 
 
@@ -153,16 +153,21 @@ def _build(options: argparse.Namespace, names: Sequence[str], series: Series, st
     _say_built(names, series, stdout)
 
 
-def _build_own(name: str, dockerfile: Path | None, series: Series, stdout: TextIO) -> None:
-    """Builds an image; the context is the folder above that of all services.
-
-    Raises UsageError if its Dockerfile or the image below it is missing, and DockerError.
-    """
+def _dockerfile(name: str, dockerfile: Path | None, series: Series) -> Path:
+    """The Dockerfile of an own image; raises UsageError if there is none."""
     if dockerfile is None:
         raise UsageError(
             f"there is no Dockerfile next to the service.yml of '{name}': write one there, or build "
             f"{series.reference(name)} from your own Dockerfile on {series.reference('base')}"
         )
+    return dockerfile
+
+
+def _build_own(name: str, dockerfile: Path, series: Series, stdout: TextIO) -> None:
+    """Builds an image; the context is the folder above that of all services.
+
+    Raises UsageError if the image below it is missing, and DockerError.
+    """
     below = base_of(dockerfile)
     base = series.reference(below)
     if series.prefix == Deployment.image_prefix and not docker_command.is_local(base):
