@@ -25,7 +25,8 @@ def ask(*words: str) -> str:
     """The standard output of a docker command; raises DockerError with the last line of its standard error."""
     result = subprocess.run((_docker(), *words), capture_output=True, text=True, errors="replace", check=False)
     if result.returncode:
-        said = [line.strip() for line in result.stderr.splitlines() if line.strip()]
+        lines = (line.strip() for line in result.stderr.splitlines())
+        said = [line for line in lines if line and not line.startswith("Run 'docker ")]
         raise DockerError(said[-1] if said else f"docker {words[0]} ended with {result.returncode}")
     return result.stdout.strip()
 
