@@ -138,6 +138,7 @@ def _build(options: argparse.Namespace, names: Sequence[str], series: Series, st
         base = options.base_image or build_context.default_base_image()
         python = build_context.python_of(base, series.platform)
         stdout.write(f"downloading packages for Python 3.{python.minor} on {python.machine} with pip\n")
+        stdout.flush()
         wheels = build_context.provide_wheels(python, build_context.cache_folder())
     variables = {"PREFIX": series.prefix, "TAG": series.tag, "VERSION": __version__, "SOURCE": options.source}
     variables |= {"BASE_IMAGE": options.base_image, "DOCKER_IMAGE": options.docker_image}
