@@ -23,7 +23,6 @@ from dodo_dsl import package_data
 PACKAGES = {
     "lsp": ("pygls",),
     "mcap": ("foxglove-schemas-protobuf", "mcap", "mcap-protobuf-support"),
-    "sbom": ("cyclonedx-python-lib",),
     "search": ("scipy",),
     "storage": ("psycopg[binary]",),
 }
@@ -31,12 +30,11 @@ PACKAGES = {
 _LOADED = {
     "lsp": ("pygls.lsp.server", "lsprotocol.types"),
     "mcap": ("mcap.writer", "mcap_protobuf.schema", "foxglove_schemas_protobuf"),
-    "sbom": ("cyclonedx.output.json",),
     "search": ("scipy",),
     "storage": ("psycopg",),
 }
 """Modules of these, which load what they need themselves."""
-_OF_SETUP = ("lsp", "mcap", "sbom", "search")
+_OF_SETUP = ("lsp", "mcap", "search")
 """Extras that ``scripts/setup`` installs."""
 _DISTRIBUTION = "dodo-dsl"
 _PLUGINS = {

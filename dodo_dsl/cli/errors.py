@@ -80,7 +80,6 @@ def _of_no_utf8(error: UnicodeEncodeError) -> str:
 def _usage_errors() -> tuple[type[Exception], ...]:
     """Errors of the user's files and words."""
     from dodo_dsl.atomic import NotReplaceable, OutputExists
-    from dodo_dsl.images.names import NoSuchImage
     from dodo_dsl.opendlv.odvd import OdvdError
     from dodo_dsl.opendlv.recording import RecordingError
     from dodo_dsl.opendlv.regular_file import NotAFile
@@ -106,15 +105,14 @@ def _usage_errors() -> tuple[type[Exception], ...]:
         NotAFile,
         NotReplaceable,
     )
-    return (*recordings, FilesError, NoSuchImage, ResultsError, NoChildJobs, RegistryTooLarge)
+    return (*recordings, FilesError, ResultsError, NoChildJobs, RegistryTooLarge)
 
 
 def _machine_errors() -> tuple[type[Exception], ...]:
     """Errors of the machine, its engine, rigs and databases. ``usage`` of a rig's error makes it one of the user."""
     from dodo_dsl.images.build_context import WheelsError
     from dodo_dsl.images.docker_command import DockerError
-    from dodo_dsl.images.sbom import SbomError
     from dodo_dsl.run.protocol import BackendError
     from dodo_dsl.search.postgres import StorageProblem
 
-    return DockerError, SbomError, WheelsError, BackendError, StorageProblem
+    return DockerError, WheelsError, BackendError, StorageProblem

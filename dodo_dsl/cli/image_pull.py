@@ -3,7 +3,7 @@
 import argparse
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
@@ -14,8 +14,9 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked
 from dodo_dsl.diagnostics import did_you_mean, has_errors
-from dodo_dsl.images import docker_command, remote
-from dodo_dsl.images.remote import UNPACKED, RemoteImage
+from dodo_dsl.images import docker_command
+from dodo_dsl.images.docker_command import DockerError
+from dodo_dsl.images.remote import UNPACKED, layers
 from dodo_dsl.run.docker import pulls
 from dodo_dsl.run.docker.compose import with_images
 from dodo_dsl.spec.rig import Rig
@@ -36,8 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def pull(options: argparse.Namespace, stdout: TextIO) -> int:
     """Pulls what is missing or newer in its registry; raises UsageError if there is no room for it."""
     checked, rig = _tests(options)
-    docker_command.require_engine()
-    docker_command.require_buildx()
+    docker_command.require()
     engine = docker_command.ask("version", "--format", "{{.Server.Os}}/{{.Server.Arch}}")
     platform = f"linux/{rig.arch}" if rig.arch else engine
     if platform != engine:
@@ -48,16 +48,16 @@ def pull(options: argparse.Namespace, stdout: TextIO) -> int:
     if not wanted:
         stdout.write(f"the tests of rig '{rig.name}' need no images of a registry\n")
         return Exit.OK
-    images = [_remote(name, platform, hints.get(name, "")) for name in wanted]
-    stdout.write(_room(rig, images))
-    for number, image in enumerate(images, 1):
-        stdout.write(f"[{number}/{len(images)}] {printable(image.reference)}\n")
-        code, _ = docker_command.show(("pull", "--platform", platform, image.reference), stdout)
-        if code:
-            raise docker_command.DockerError(f"{image.reference} cannot be pulled; the output above says why")
-    for image in images:
-        size = docker_command.size(image.reference)
-        stdout.write(f"{printable(image.reference)}  {docker_command.platform(image.reference)}  {_megabytes(size)}\n")
+    stdout.write(_room(rig, {name: _layers(name, platform, hints.get(name, "")) for name in wanted}))
+    for number, name in enumerate(wanted, 1):
+        stdout.write(f"[{number}/{len(wanted)}] {printable(name)}\n")
+        if not docker_command.show("pull", "--platform", platform, name):
+            raise DockerError(f"{name} cannot be pulled; the output above says why")
+    for name in wanted:
+        size, found = docker_command.size(name), docker_command.platform(name)
+        if found != platform:
+            raise DockerError(f"{name} is for {found}, not for {platform}")
+        stdout.write(f"{printable(name)}  {found}  {_megabytes(size)}\n")
     return Exit.OK
 
 
@@ -77,12 +77,12 @@ def _tests(options: argparse.Namespace) -> tuple[Checked, Rig]:
     return replace(checked, tests=tests), rigs[options.rig]
 
 
-def _remote(name: str, platform: str, hint: str) -> RemoteImage:
-    """An image of a registry; raises DockerError with the ``hint`` if it has none."""
+def _layers(name: str, platform: str, hint: str) -> Mapping[str, int]:
+    """The layers of an image of a registry; raises DockerError with the ``hint`` if it has none."""
     try:
-        return remote.remote_image(name, platform)
-    except docker_command.DockerError as error:
-        raise docker_command.DockerError(f"{error}; {hint}" if hint else str(error)) from None
+        return layers(name, platform)
+    except DockerError as error:
+        raise DockerError(f"{error}; {hint}" if hint else str(error)) from None
 
 
 def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str], dict[str, str]]:
@@ -106,24 +106,28 @@ def _images(checked: Checked, with_own: bool) -> tuple[list[str], list[str], dic
     return sorted(wanted), sorted(built), hints
 
 
-def _room(rig: Rig, images: Sequence[RemoteImage]) -> str:
-    """How much room the images need and find; raises UsageError if they find too little."""
-    all_of_them = UNPACKED * remote.bytes_of(images)
-    packed = remote.bytes_of(images, remote.local_layers())
-    folder = Path(docker_command.ask("info", "--format", "{{.DockerRootDir}}"))
-    free = shutil.disk_usage(folder).free if folder.is_dir() else None
+def _room(rig: Rig, images: Mapping[str, Mapping[str, int]]) -> str:
+    """How much room the images need and find; raises UsageError if they find too little.
+
+    Those that the engine has count for the rig's budget alone.
+    """
+    sizes = {digest: size for image in images.values() for digest, size in image.items()}
+    there = {digest for name, image in images.items() if docker_command.is_local(name) for digest in image}
+    all_of_them, packed = UNPACKED * sum(sizes.values()), sum(sizes[digest] for digest in sizes.keys() - there)
     if rig.disk is not None and all_of_them > rig.disk:
         text = f"the images of rig '{rig.name}' take about {_megabytes(all_of_them)}, and its 'disk' in dodo.yml is"
         raise UsageError(f"{text} {_megabytes(rig.disk)}; make them smaller, or the budget larger")
     need = UNPACKED * packed
+    folder = Path(docker_command.ask("info", "--format", "{{.DockerRootDir}}"))
+    free = shutil.disk_usage(folder).free if folder.is_dir() else None
     if free is not None and need > free:
         raise UsageError(
             f"the images need about {_megabytes(need)} more, and {folder} has {_megabytes(free)} left; "
             "'docker image prune' removes images that have no name"
         )
     budget = f", budget {_megabytes(rig.disk)}" if rig.disk is not None else ""
-    there = f", free {_megabytes(free)}" if free is not None else ""
-    return f"to fetch {_megabytes(packed)}, room about {_megabytes(need)} of {_megabytes(all_of_them)}{budget}{there}\n"
+    left = f", free {_megabytes(free)}" if free is not None else ""
+    return f"to fetch {_megabytes(packed)}, room about {_megabytes(need)} of {_megabytes(all_of_them)}{budget}{left}\n"
 
 
 def _megabytes(size: int) -> str:

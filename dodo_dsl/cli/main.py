@@ -41,7 +41,7 @@ COMMANDS = {
     "completion": Subcommand(
         "completion", "print a script that lets a shell complete commands, options, tests, services and rigs"
     ),
-    "images": Subcommand("images", "build, push and pull images, and list what they are made of"),
+    "images": Subcommand("images", "build, push and pull images"),
     "rig": Subcommand("rig", "operate a rig manually: status, motion, calibration, quarantine and camera"),
     "doctor": Subcommand("doctor", "check what this machine can run, what it lacks and what killed runs left behind"),
 }

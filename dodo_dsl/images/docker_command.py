@@ -1,10 +1,11 @@
-"""The docker command: checks that it is complete, and passes on its output."""
+"""The docker command: asks it, or lets it show what it does, and says which part of Docker is missing."""
 
+import os
 import shutil
 import subprocess
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TextIO
 
 from dodo_dsl import advice
 
@@ -20,27 +21,23 @@ def _docker() -> str:
     return path
 
 
-def ask(*words: str, folder: Path | None = None) -> str:
+def ask(*words: str) -> str:
     """The standard output of a docker command; raises DockerError with the last line of its standard error."""
-    command = (_docker(), *words)
-    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+    result = subprocess.run((_docker(), *words), capture_output=True, text=True, errors="replace", check=False)
     if result.returncode:
-        said = [line.strip() for line in result.stderr.splitlines() if line.strip()]
+        lines = (line.strip() for line in result.stderr.splitlines())
+        said = [line for line in lines if line and not line.startswith("Run 'docker ")]
         raise DockerError(said[-1] if said else f"docker {words[0]} ended with {result.returncode}")
     return result.stdout.strip()
 
 
-def require_engine() -> None:
-    """Raises DockerError when the docker command is missing or no engine answers it."""
+def require() -> None:
+    """Raises DockerError when no engine answers the docker command, or when it cannot build with buildx."""
     _docker()
     try:
         ask("version", "--format", "{{.Server.Version}}")
     except DockerError as error:
         raise DockerError(f"no Docker engine answers ({str(error).rstrip('.')}): {advice.engine()}") from None
-
-
-def require_buildx() -> None:
-    """Raises DockerError when docker cannot build with buildx."""
     try:
         ask("buildx", "version")
     except DockerError:
@@ -62,22 +59,7 @@ def platform(reference: str) -> str:
     return ask("image", "inspect", "--format", "{{.Os}}/{{.Architecture}}", reference)
 
 
-def show(words: Sequence[str], stdout: TextIO, folder: Path | None = None) -> tuple[int, str]:
-    """Runs a docker command with its progress on ``stdout``: exit code, and its output where that is not a terminal.
-
-    On a terminal docker draws by itself; elsewhere its lines are passed on as they come.
-    """
-    stdout.flush()
-    live = stdout.isatty()
-    sink = {"stdout": stdout, "stderr": stdout} if live else {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    output = []
-    with subprocess.Popen((_docker(), *words), cwd=folder, text=True, errors="replace", **sink) as process:
-        try:
-            for line in process.stdout or ():
-                output.append(line)
-                stdout.write(line)
-                stdout.flush()
-            return process.wait(), "".join(output)
-        except BaseException:
-            process.terminate()
-            raise
+def show(*words: str, folder: Path | None = None, variables: Mapping[str, str] | None = None) -> bool:
+    """Whether a docker command succeeds, which shows its progress by itself."""
+    sys.stdout.flush()
+    return subprocess.call((_docker(), *words), cwd=folder, env={**os.environ, **(variables or {})}) == 0

@@ -14,7 +14,6 @@ from dodo_dsl.cli.main import COMMANDS, main
 from dodo_dsl.cli.selection import NoSuchTest
 from dodo_dsl.images.build_context import WheelsError
 from dodo_dsl.images.docker_command import DockerError
-from dodo_dsl.images.names import NoSuchImage
 from dodo_dsl.opendlv.odvd import OdvdError
 from dodo_dsl.opendlv.recording import RecordingError
 from dodo_dsl.opendlv.session import SessionError
@@ -41,7 +40,7 @@ def ended(error: BaseException, monkeypatch: pytest.MonkeyPatch, command: str = 
 
 
 USAGE = (
-    UsageError, NoSuchTest, NoSuchImage, OdvdError, RecordingError, FilesError, NothingSelected, OutputExists,
+    UsageError, NoSuchTest, OdvdError, RecordingError, FilesError, NothingSelected, OutputExists,
     TruthError, ResultsError,
 )  # fmt: skip
 

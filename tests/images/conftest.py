@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from tests.firmware.programs import make
-from tests.images.dockerfile import ROOT
 
+ROOT = Path(__file__).parents[2]
 BASE, WITH_PROGRAMS = "dodo-test-base", "dodo-test-programs:images"
 PROGRAMS = {"docker": "usr/local/bin", "bwrap": "usr/bin", "git": "usr/bin"}
 PLUGINS = ("docker-compose", "docker-buildx")

@@ -1,46 +1,35 @@
-"""The Dockerfile has a stage for each service, and says of it what its manifest says."""
+"""The bake file has a target for each image, which starts what the manifest says."""
 
 import re
-import shutil
 import subprocess
-import sys
 from pathlib import Path
 
-import pytest
-
 from dodo_dsl import __version__
-from dodo_dsl.images.names import SANDBOX, SHARED, known
-from dodo_dsl.spec.manifest import Manifest, load_manifests
-from tests.images.dockerfile import ROOT, stages
-from tests.images.service_folders import folders_of
+from dodo_dsl.images.names import DODO, SANDBOX, SHARED, known
+from dodo_dsl.spec.manifest import load_manifests
+from tests.images.conftest import ROOT
+from tests.images.targets import folders_of, targets
 
 MANIFESTS, _ = load_manifests()
-DOCKERFILES = (ROOT / "services" / "Dockerfile", ROOT / "examples" / "kiwi" / "Dockerfile")
 
 
-@pytest.mark.parametrize("manifest", MANIFESTS.values(), ids=lambda m: m.name)
-def test_each_service_has_a_stage_that_starts_it(manifest: Manifest) -> None:
-    stage = stages()[manifest.image]
-    assert stage.entrypoint == ["python3", *manifest.process[1:]]
-    assert stage.copies == [(f"/opt/dodo/services/{name}", f"services/{name}") for name in folders_of(manifest)]
-    assert stage.labels == {"org.opencontainers.image.title": manifest.image, "dodo.service": manifest.name}
-    assert stage.stands_on in ("base", "geometry", "vision")
+def test_every_image_is_a_target_with_a_stage() -> None:
+    assert set(targets()) == {*known(MANIFESTS.values()), DODO}
+    stages = re.findall(r"^FROM \S+ AS (\S+)$", (ROOT / "services" / "Dockerfile").read_text(), re.MULTILINE)
+    wanted = {target["target"] for target in targets().values()}
+    assert wanted == {"service", SANDBOX, DODO, *SHARED} and wanted <= set(stages)
+    assert {target["args"]["STAGE"] for target in targets().values() if "args" in target} <= set(stages)
 
 
-def test_every_image_is_a_stage() -> None:
-    names = known(MANIFESTS.values())
-    assert set(names) <= set(stages())
-    assert {SANDBOX, *SHARED} <= set(names)
-
-
-def test_shared_stages_are_a_chain_so_that_layers_are_shared() -> None:
-    found = stages()
-    assert [found[n].stands_on for n in ("python-vision", "python-geometry")] == ["python-geometry", "python"]
-    assert [found[n].stands_on for n in ("base", "geometry", "vision")] == [
-        "python",
-        "python-geometry",
-        "python-vision",
-    ]
+def test_services_stand_on_what_they_import_and_start_as_their_manifest_says() -> None:
+    for manifest in MANIFESTS.values():
+        target = targets()[manifest.image]
+        assert (target["target"], target["args"]["FOLDER"]) == ("service", manifest.folder.name)
+        assert [*manifest.process[1:]] == ["-m", f"services.{manifest.folder.name}"]
+        assert target["labels"]["dodo.service"] == manifest.name == target["labels"]["org.opencontainers.image.title"]
+        sources = "".join(path.read_text() for path in manifest.folder.rglob("*.py"))
+        imported = set(re.findall(r"^(?:from|import) services\.(\w+)", sources, re.MULTILINE))
+        assert imported - {"base"} <= folders_of(manifest.image), manifest.name
 
 
 def test_every_requirement_is_locked() -> None:
@@ -63,14 +52,5 @@ def test_a_requirement_that_is_not_locked_ends_the_build(tmp_path: Path) -> None
 
 
 def test_the_example_stands_on_this_version() -> None:
-    default = re.search(r"^ARG DODO_BASE=(\S+)$", DOCKERFILES[1].read_text(), re.MULTILINE)
+    default = re.search(r"^ARG DODO_BASE=(\S+)$", (ROOT / "examples" / "kiwi" / "Dockerfile").read_text(), re.MULTILINE)
     assert default and default[1] == f"dodo/vision:{__version__}"
-
-
-@pytest.mark.parametrize("path", DOCKERFILES, ids=lambda p: p.parent.name)
-def test_hadolint_has_nothing_to_say(path: Path) -> None:
-    hadolint = shutil.which("hadolint") or shutil.which("hadolint", path=str(Path(sys.executable).parent))
-    if hadolint is None:
-        pytest.skip("hadolint is not installed")
-    result = subprocess.run([hadolint, str(path)], capture_output=True, text=True, check=False)
-    assert (result.returncode, result.stdout) == (0, "")

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from dodo_dsl import __version__
-from tests.images.conftest import PLUGINS, PROGRAMS, WITH_PROGRAMS, build, docker, with_programs
-from tests.images.dockerfile import ROOT
+from tests.images.conftest import PLUGINS, PROGRAMS, ROOT, WITH_PROGRAMS, build, docker, with_programs
 
 pytestmark = pytest.mark.engine
 

@@ -7,11 +7,11 @@ import pytest
 from dodo_dsl.images import build_context
 from dodo_dsl.images.build_context import Python
 
-ARM = Python((3, 11), "aarch64", (2, 36))
+ARM = Python(11, "aarch64", 36)
 
 
 def test_platforms_go_from_the_base_images_glibc_down_to_manylinux2014() -> None:
-    platforms = Python((3, 12), "x86_64", (2, 19)).platforms()
+    platforms = Python(12, "x86_64", 19).platforms()
     assert platforms == [
         "manylinux_2_19_x86_64",
         "manylinux_2_18_x86_64",

@@ -1,0 +1,32 @@
+"""The targets of the bake file, as bake reads them without an engine."""
+
+import functools
+import json
+import shutil
+import subprocess
+from typing import Any
+
+import pytest
+
+from dodo_dsl.images.build_context import BAKE
+from tests.images.conftest import ROOT
+
+
+@functools.cache
+def targets() -> dict[str, dict[str, Any]]:
+    """What is built, by the image's name."""
+    if not shutil.which("docker"):
+        pytest.skip("the docker command is not installed")
+    words = ["docker", "buildx", "bake", "--file", BAKE, "--print", "default", "dodo"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode and "buildx" in done.stderr.splitlines()[0]:
+        pytest.skip("docker's buildx is not installed (scripts/install-test-tools)")
+    assert done.returncode == 0, done.stderr
+    found: dict[str, dict[str, Any]] = json.loads(done.stdout)["target"]
+    return found
+
+
+def folders_of(image: str) -> set[str]:
+    """What the image of a service holds of ``services``, beside what all share: its own folder, and often the scene."""
+    arguments = targets()[image]["args"]
+    return {arguments["FOLDER"], *(["scene"] if arguments["STAGE"] == "vision" else [])}
