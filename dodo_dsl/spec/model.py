@@ -197,14 +197,21 @@ def _uses(node: Mapping) -> Iterator[Use]:
                 yield Use(layer, name, entry.key, uses, _entries(_part(entry.value, "with")))
 
 
+_MOST_WEIGHT = 1000
+
+
 @dataclass(frozen=True)
 class Goal:
     """A check that scores 0 at ``zero``, 1 at ``one``, both in its unit, and linearly between; never beyond."""
 
     check: str
+    """Name of the check whose value is scored."""
     zero: float
+    """Value that scores 0, in the check's unit."""
     one: float
+    """Value that scores 1, in the check's unit."""
     weight: float = 1.0
+    """Weight of the goal among those of its test: above 0, at most 1000."""
 
     def score(self, value: float | None) -> float:
         """Of a value, 0 to 1; a check without a value scores 0."""
@@ -218,4 +225,4 @@ def is_goal(goal: Goal) -> bool:
     numbers = (goal.zero, goal.one, goal.weight)
     if not all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):
         return False
-    return goal.weight > 0 and goal.zero != goal.one
+    return 0 < goal.weight <= _MOST_WEIGHT and goal.zero != goal.one
