@@ -7,7 +7,7 @@ folder or its ``results.json``, is untrusted.
 import dataclasses
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -171,8 +171,7 @@ def read_results(path: Path) -> GivenReport:
         if document["dodo"] != "results" or document["version"] != VERSION:
             raise ResultsError(f"{path}: not results of version {VERSION}")
         found = msgspec.convert(document, Results)
-        for problem in _unknown(document, dataclasses.asdict(found), "$"):
-            raise ValueError(problem)
+        _check_keys(document, dataclasses.asdict(found), "$")
         json.dumps(document, ensure_ascii=False).encode()  # raises for strings that UTF-8 cannot encode
         if not all(is_goal(goal) for outcome in found.tests for goal in outcome.goals):
             raise ResultsError(f"{path}: a goal whose numbers make no score")
@@ -190,18 +189,18 @@ def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) < _MOST_DIGITS else float(digits)
 
 
-def _unknown(value: Any, known: Any, place: str) -> Iterator[str]:
-    """Keys of a document that no class has, which are not among what was ``known`` of it."""
+def _check_keys(value: Any, known: Any, place: str) -> None:
+    """Raises ValueError for a key of a document that no class has: it is not among what was ``known`` of it."""
     if isinstance(value, dict):
         for key, below in value.items():
             if key not in known:
                 hint = did_you_mean(key, known.keys() - value.keys())
-                yield f"{place}: unknown key '{key[:_MAX_PROBLEM_TEXT]}'" + (f"; {hint}" if hint[:3] == "did" else "")
-            else:
-                yield from _unknown(below, known[key], f"{place}.{key}")
+                said = f"{place}: unknown key '{key[:_MAX_PROBLEM_TEXT]}'"
+                raise ValueError(f"{said}; {hint}" if hint.startswith("did") else said)
+            _check_keys(below, known[key], f"{place}.{key}")
     elif isinstance(value, list):
         for number, (below, of_known) in enumerate(zip(value, known, strict=True)):
-            yield from _unknown(below, of_known, f"{place}[{number}]")
+            _check_keys(below, of_known, f"{place}[{number}]")
 
 
 MOST_SLUG = 240
