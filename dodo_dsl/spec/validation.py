@@ -194,13 +194,15 @@ def _violations(document: object, root: Node, name: str) -> list[Violation]:
 
 
 def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
+    """What these steps lead to; a reference to what it means and what stands beside it."""
     root, part = schema, schema
     for step in steps:
-        part = part[step]  # type: ignore[index]
+        beside, part = part, part[step]  # type: ignore[index]
         if step == "$ref":
             file, _, pointer = str(part).partition("#/")
             root = _by_address(file) if file else root
             part = functools.reduce(lambda below, key: below[key], pointer.split("/"), root)
+            part = part | {key: value for key, value in beside.items() if key != "$ref"}
     return part
 
 

@@ -68,7 +68,7 @@ def test_its_limits_are_one_text_for_its_memory() -> None:
 
 def test_limits_have_the_names_and_units_of_the_schema_and_of_the_rigs_memory() -> None:
     schema = json.loads((package_data.schemas() / "deployment.schema.json").read_text())
-    limits = schema["$defs"]["rig"]["properties"]["limits"]["properties"]
+    limits = schema["$defs"]["limits"]["properties"]
     assert {name: about["x-unit"] for name, about in limits.items()} == LIMIT_UNITS == UNITS
     assert list(LIMIT_UNITS) == list(LIMITS)
 
