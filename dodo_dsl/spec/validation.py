@@ -143,7 +143,7 @@ class Violation:
     def __init__(self, error: Any, root: Node, name: str) -> None:
         *steps, self.keyword = error.evaluation_path
         self.path: Path = tuple(error.instance_path)
-        self.schema = _part(schema_of(name), steps)
+        self.schema = _part(_root_of(steps, name), steps)
         self.wanted = error.kind.property if self.keyword == "required" else self.schema[self.keyword]
         is_of_key = error.kind.name == "propertyNames"
         self.instance: Any = error.kind.error.instance if is_of_key else error.instance
@@ -191,6 +191,15 @@ def _violations(document: object, root: Node, name: str) -> list[Violation]:
     found = [Violation(error, root, name) for error in errors]
     typed = {v.path: v for v in reversed(found) if v.keyword in _OF_TYPE and v.of_key is None}
     return [v for v in found if v.of_key or typed.get(v.path, v) is v]
+
+
+def _root_of(steps: list[str], name: str) -> dict[str, Any]:
+    """The schema in which a path begins: of keywords of our own it is that in the file where they stand."""
+    schema = schema_of(name)
+    if steps[:1] != ["$defs"] or steps[1] in schema["$defs"]:
+        return schema
+    roots = (_by_address(f"{other}.schema.json") for other in ("deployment", OF_COMPOSE))
+    return next(root for root in roots if steps[1] in root["$defs"])
 
 
 def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
