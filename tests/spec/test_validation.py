@@ -101,22 +101,6 @@ def test_lines_that_are_indented_one_level_off_are_one_error(first: int, last: i
     assert plain(node) == plain(mapping(BLOCK))
 
 
-@pytest.mark.parametrize(
-    ("text", "schema", "expected"),
-    [
-        ("dodo: 1\nregistry: [a, 3]\n", "deployment", "2:15 wrong-type"),
-        ("dodo: 1\nrigs: {Kiwi: {kind: static, cid: 121}}\n", "deployment", "2:8 wrong-value"),
-        ("dodo: 1\nrigs: {kiwi: {kind: static, cid: 121.0}}\n", "deployment", "2:34 wrong-type"),
-        ("dodo: 1\napplication: {files: a.yml, cid: x}\n", "deployment", "2:34 wrong-type"),
-        ("dodo: 1\nsandbox: {memory: 2}\n", "deployment", "2:19 wrong-unit"),
-        ("dodo: 1\nother: 1\n", "deployment", "2:1 unknown-key"),
-        ("services: {a: {image: 3}}\n", "application", "1:23 wrong-type"),
-    ],
-)
-def test_other_files(text: str, schema: str, expected: str) -> None:
-    assert said(text, schema)[0] == expected
-
-
 def test_what_is_not_valid_is_left_out_and_the_rest_stays() -> None:
     text = (
         BLOCK.replace("60 s", "60").replace("{uses: integrator}", "3") + "other: 1\nrecord: {frames: 1, limit: 2 MB}\n"

@@ -78,19 +78,6 @@ def test_the_fixture_compiles(folder: Path) -> None:
     assert compiled(folder) == (0, "1 test compiled into generated\n")
 
 
-def test_ten_megabytes(folder: Path) -> None:
-    write(folder, "dodo: 1\nname: t\ndescription: '" + "x" * (10 << 20) + "'\n")
-    refused(folder, "too-large")
-
-
-@pytest.mark.thorough
-def test_thousands_of_mistakes(folder: Path) -> None:
-    write(folder, "dodo: 1\nname: t\n" + "".join(f"key-{i}: {{}}\n" for i in range(3000)))
-    code, said = compiled(folder)
-    assert code == 2
-    assert said.count("[unknown-key]") >= 1
-
-
 @pytest.mark.parametrize("name", ["tests/t/t.dodo.yml", "app.yml", "dodo.yml", "tests/maps/straight/map.json"])
 def test_a_pipe_that_nobody_writes(folder: Path, name: str) -> None:
     (folder / name).unlink()
@@ -133,16 +120,3 @@ def test_metacharacters_stay_what_they_are(folder: Path) -> None:
     assert json.loads((folder / "generated" / "t" / "test.json").read_text())["description"] == METACHARACTERS
     for path in (folder / "generated").glob("**/*.yml"):
         yaml.safe_load(path.read_text())
-
-
-def test_a_bomb_of_aliases(folder: Path) -> None:
-    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
-    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)]
-    write(folder, "\n".join(lines))
-    refused(folder, "too-large")
-
-
-def test_a_matrix_that_explodes(folder: Path) -> None:
-    matrix = {f"d{i}": list(range(50)) for i in range(8)}
-    write(folder, {**GOOD, "name": "t", "matrix": matrix})
-    refused(folder, "matrix-size")
