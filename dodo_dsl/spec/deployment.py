@@ -11,17 +11,15 @@ import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
-from dodo_dsl.spec.quantity import convert
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.slips import mended
-from dodo_dsl.spec.validation import schema_of_keys, valid_part
+from dodo_dsl.spec.validation import schema_of_keys, valid_part, values
 
 MANIFEST = "service.yml"
 _TAKEN = ("services", "dodo_dsl")
@@ -168,7 +166,7 @@ class _Reading:
             paths=self._paths(),
             outside=raw.get("outside", False),
             rigs=rigs,
-            sandbox=_sandbox(raw.get("sandbox", {})),
+            sandbox=_sandbox(self.node.get("sandbox")),
         )
         self._check_messages(found.messages)
         self._check_services()
@@ -289,11 +287,7 @@ class _Reading:
         return network
 
 
-def _sandbox(raw: dict[str, Any]) -> SandboxLimits:
-    values = {key.replace("-", "_"): value for key, value in raw.items() if key != "read"}
-    for key in ("memory", "file_size", "copies"):
-        if key in values:
-            values[key] = int(convert(values[key], "B"))
-    if "cpus" in values:
-        values["cpus"] = float(values["cpus"])
-    return SandboxLimits(reads=tuple(raw.get("read", ())), **values)
+def _sandbox(node: Node | None) -> SandboxLimits:
+    raw = values(node, schema_of_keys("deployment")["properties"]["sandbox"]) if node else {}
+    reads, cpus = tuple(raw.pop("read", ())), raw.pop("cpus", None)
+    return SandboxLimits(reads=reads, cpus=cpus, **{key.replace("-", "_"): int(value) for key, value in raw.items()})

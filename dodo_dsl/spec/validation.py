@@ -18,7 +18,7 @@ import yaml
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, shown_path
-from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, resolve
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.registry import SUFFIX, as_file
 from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
@@ -75,6 +75,16 @@ def schema_of_keys(name: str) -> dict[str, Any]:
 
     found: dict[str, Any] = inlined({key: value for key, value in schema.items() if key != "$defs"})
     return found
+
+
+def values(node: Node, schema: dict[str, Any]) -> Any:
+    """A valid node as ``plain`` has it, with quantities as numbers in their units; the schema has no references."""
+    if isinstance(node, Mapping):
+        keys = schema.get("properties", {})
+        return {key: values(entry.value, keys.get(key, {})) for key, entry in node.entries.items()}
+    if isinstance(node, Scalar) and UNIT in schema and node.text not in schema.get(WORDS, ()):
+        return float(quantity.convert(node.text, schema[UNIT]))
+    return plain(node)
 
 
 def _exact(part: dict[str, Any]) -> dict[str, Any]:
