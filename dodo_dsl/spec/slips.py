@@ -135,7 +135,7 @@ def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> No
             own = _children(above.value)
             if reported != home:
                 deep = next((e.key.column for e in own.values() if e.key.line > above.key.line), entry.key.column + 2)
-                message = f"'{key}' stands beside '{home}'; indent it by {deep - 1} spaces"
+                message = f"'{key}' stands beside '{home}'; {_place(deep)}"
                 found.append(Diagnostic(entry.key, "unknown-key", message, f"it belongs to '{home}'"))
             entries[home] = Entry(above.key, Mapping(above.value.span, {**own, key: entry}, above.value.tag))
             reported = home
@@ -143,6 +143,10 @@ def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> No
             entries[key], home = entry, key
     below = {key: Entry(entry.key, _indented(entry.value, _of(schema, key), found)) for key, entry in entries.items()}
     return Mapping(node.span, below, node.tag)
+
+
+def _place(column: int) -> str:
+    return f"indent it by {column - 1} spaces" if column > 1 else "begin it in the first column"
 
 
 def _raised(node: Mapping, schema: dict[str, Any], found: list[Diagnostic]) -> Iterator[tuple[str, Entry]]:
@@ -156,7 +160,7 @@ def _raised(node: Mapping, schema: dict[str, Any], found: list[Diagnostic]) -> I
             is_free = is_known and name not in node.entries and inner.key.line > entry.key.line
             if is_free and isinstance(inner.value, Mapping) and not _takes(home, name, inner.value):
                 deep[name] = inner
-                message = f"'{name}' stands below '{key}'; indent it by {entry.key.column - 1} spaces"
+                message = f"'{name}' stands below '{key}'; {_place(entry.key.column)}"
                 found.append(Diagnostic(inner.key, "unknown-key", message, f"it belongs beside '{key}'"))
         if deep:
             rest = {name: inner for name, inner in _children(entry.value).items() if name not in deep}

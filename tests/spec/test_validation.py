@@ -85,8 +85,8 @@ MOVED = [
     (8, 12, -2, "8:1 unknown-key: 'camera' stands beside 'environment'; indent it by 2 spaces"),
     (14, 16, -2, "14:1 unknown-key: 'vehicle' stands beside 'action'; indent it by 2 spaces"),
     (16, 16, -2, "16:1 unknown-key: 'pose' stands beside 'action'; indent it by 2 spaces"),
-    (13, 16, 2, "13:3 unknown-key: 'action' stands below 'environment'; indent it by 0 spaces"),
-    (17, 21, 2, "17:3 unknown-key: 'evaluation' stands below 'action'; indent it by 0 spaces"),
+    (13, 16, 2, "13:3 unknown-key: 'action' stands below 'environment'; begin it in the first column"),
+    (17, 21, 2, "17:3 unknown-key: 'evaluation' stands below 'action'; begin it in the first column"),
 ]
 
 
