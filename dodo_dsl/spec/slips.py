@@ -131,7 +131,7 @@ def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> No
     home, reported = "", ""
     for key, entry in written.items():
         above = entries.get(home)
-        if above and _is_stray(key, entry, above, schema, _of(schema, home)):
+        if above and _is_stray(key, entry, above, schema, schema_at(schema, home)):
             own = _children(above.value)
             if reported != home:
                 deep = next((e.key.column for e in own.values() if e.key.line > above.key.line), entry.key.column + 2)
@@ -141,7 +141,9 @@ def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> No
             reported = home
         else:
             entries[key], home = entry, key
-    below = {key: Entry(entry.key, _indented(entry.value, _of(schema, key), found)) for key, entry in entries.items()}
+    below = {
+        key: Entry(entry.key, _indented(entry.value, schema_at(schema, key), found)) for key, entry in entries.items()
+    }
     return Mapping(node.span, below, node.tag)
 
 
@@ -153,7 +155,7 @@ def _raised(node: Mapping, schema: dict[str, Any], found: list[Diagnostic]) -> I
     """The entries, and those of this mapping's own keys that stand in one of them, which has no such key."""
     known = schema.get("properties", {})
     for key, entry in node.entries.items():
-        home = _of(schema, key)
+        home = schema_at(schema, key)
         deep = {}
         for name, inner in _children(entry.value).items():
             is_known = name in known and known[name].get("type") == "object"
@@ -181,7 +183,7 @@ def _takes(schema: dict[str, Any], key: str, value: Node) -> bool:
     return more is not False and not inner.keys().isdisjoint(_children(value))
 
 
-def _of(schema: dict[str, Any], key: str) -> dict[str, Any]:
+def schema_at(schema: dict[str, Any], key: str) -> dict[str, Any]:
     """The schema of the value at a key."""
     found = schema.get("properties", {}).get(key) or schema.get("additionalProperties")
     return found if isinstance(found, dict) else {}

@@ -21,7 +21,7 @@ from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, sh
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.registry import SUFFIX, as_file
-from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
+from dodo_dsl.spec.slips import boolean_meant, meant, repaired, schema_at, unknown_key
 
 OF_COMPOSE = "application"
 REPORTED = "\0"
@@ -41,7 +41,6 @@ _TYPE_NAMES = {
     "null": "no value",
 }
 _MOST_READ = 200
-_DEFS = "#/$defs/"
 
 Path = tuple[str | int, ...]
 
@@ -61,27 +60,32 @@ def schema_of(name: str) -> dict[str, Any]:
 
 @functools.cache
 def schema_of_keys(name: str) -> dict[str, Any]:
-    """The same without references within it."""
-    schema = schema_of(name)
-
-    def inlined(part: Any) -> Any:
-        if isinstance(part, list):
-            return [inlined(each) for each in part]
-        if not isinstance(part, dict):
-            return part
-        reference = str(part.get("$ref", ""))
-        base = inlined(schema["$defs"][reference.removeprefix(_DEFS)]) if reference.startswith(_DEFS) else {}
-        return {**base, **{key: inlined(value) for key, value in part.items() if key != "$ref"}}
-
-    found: dict[str, Any] = inlined({key: value for key, value in schema.items() if key != "$defs"})
+    """The same without references."""
+    found: dict[str, Any] = _inlined(schema_of(name), schema_of(name))
+    del found["$defs"]
     return found
+
+
+def _inlined(part: Any, root: dict[str, Any]) -> Any:
+    if isinstance(part, list):
+        return [_inlined(each, root) for each in part]
+    if not isinstance(part, dict):
+        return part
+    base = _inlined(*_target(part["$ref"], root)) if isinstance(part.get("$ref"), str) else {}
+    return {**base, **{key: _inlined(value, root) for key, value in part.items() if key != "$ref"}}
+
+
+def _target(reference: str, root: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """What a reference means, and the file in which that stands."""
+    file, _, pointer = reference.partition("#/")
+    root = _by_address(file) if file else root
+    return functools.reduce(lambda below, key: below[key], pointer.split("/"), root), root
 
 
 def values(node: Node, schema: dict[str, Any]) -> Any:
     """A valid node as ``plain`` has it, with quantities as numbers in their units; the schema has no references."""
     if isinstance(node, Mapping):
-        keys = schema.get("properties", {})
-        return {key: values(entry.value, keys.get(key, {})) for key, entry in node.entries.items()}
+        return {key: values(entry.value, schema_at(schema, key)) for key, entry in node.entries.items()}
     if isinstance(node, Scalar) and UNIT in schema and node.text not in schema.get(WORDS, ()):
         return float(quantity.convert(node.text, schema[UNIT]))
     return plain(node)
@@ -131,6 +135,7 @@ def _validator(schema: dict[str, Any]) -> Any:
     )
 
 
+@functools.cache
 def _by_address(address: str) -> dict[str, Any]:
     """The schema that a reference means: ``application.schema.json``."""
     text = (package_data.schemas() / address.rpartition("/")[2]).read_text(encoding="utf-8")
@@ -218,9 +223,7 @@ def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
     for step in steps:
         beside, part = part, part[step]  # type: ignore[index]
         if step == "$ref":
-            file, _, pointer = str(part).partition("#/")
-            root = _by_address(file) if file else root
-            part = functools.reduce(lambda below, key: below[key], pointer.split("/"), root)
+            part, root = _target(str(part), root)
             part = part | {key: value for key, value in beside.items() if key != "$ref"}
     return part
 
