@@ -20,6 +20,7 @@ Count = Annotated[int, Meta(ge=0)]
 Measured = Amount | None
 Share = Annotated[float, Meta(ge=0, le=1)]
 ON_EMULATED = "on an emulated rig: no hardware took part"
+EVIDENCE_KEY = "^[a-z][a-z0-9-]{0,39}$"
 NEXT_REPORT = ".next-"
 """How the name of a folder inside a report's begins in which the next report is written."""
 
@@ -236,7 +237,7 @@ class Verdict(TypedDict):
     """One sentence."""
     evidence: Annotated[
         dict[
-            Annotated[str, Meta(pattern="^[a-z][a-z0-9-]{0,39}$")],
+            Annotated[str, Meta(pattern=EVIDENCE_KEY)],
             int | float | Annotated[str, Meta(max_length=200)] | None,
         ],
         Meta(max_length=20),
