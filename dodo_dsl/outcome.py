@@ -20,7 +20,6 @@ Count = Annotated[int, Meta(ge=0)]
 Measured = Amount | None
 Share = Annotated[float, Meta(ge=0, le=1)]
 ON_EMULATED = "on an emulated rig: no hardware took part"
-EVIDENCE_KEY = "^[a-z][a-z0-9-]{0,39}$"
 NEXT_REPORT = ".next-"
 """How the name of a folder inside a report's begins in which the next report is written."""
 
@@ -226,6 +225,11 @@ class Check(TypedDict):
     value or a limit."""
 
 
+_Key = Annotated[str, Meta(pattern="^[a-z][a-z0-9-]{0,39}$")]
+_Datum = int | float | Annotated[str, Meta(max_length=200)] | None
+Evidence = Annotated[dict[_Key, _Datum], Meta(max_length=20)]
+
+
 class Verdict(TypedDict):
     """What an evaluator found."""
 
@@ -235,13 +239,7 @@ class Verdict(TypedDict):
     """What this evaluator found."""
     reason: str
     """One sentence."""
-    evidence: Annotated[
-        dict[
-            Annotated[str, Meta(pattern=EVIDENCE_KEY)],
-            int | float | Annotated[str, Meta(max_length=200)] | None,
-        ],
-        Meta(max_length=20),
-    ]
+    evidence: Evidence
     """The data of the decision: 'time' in seconds of the test, and what the evaluator saw then and where."""
 
 

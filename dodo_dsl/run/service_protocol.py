@@ -1,17 +1,15 @@
 """The protocol of services on standard output: JSON lines with the key ``dodo`` are for the runner, others are log."""
 
-import dataclasses
 import json
 import math
 import re
-import sys
 from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta, Struct
 
 from dodo_dsl.opendlv.address import Address
-from dodo_dsl.outcome import EVIDENCE_KEY, Response, with_margin
+from dodo_dsl.outcome import Evidence, Response, with_margin
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.run.protocol import (
     Event,
@@ -36,9 +34,6 @@ JUDGED = b'{"dodo": "judged"'
 _STOPS = ("unanswered", "stuck", "timedout")
 _MAX_TEXT = 2000
 _ADDRESS = re.compile(r"(?P<host>[0-9]{1,3}(\.[0-9]{1,3}){3}):(?P<port>[0-9]{1,5})", re.ASCII)
-_UNASKED = ("surplus", "surplus_frames", "differing", "pauses", "unasked")
-"""Counts of what no frame asked for."""
-_MOST_DIGITS = 300
 
 
 def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
@@ -49,7 +44,7 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
     if not text.startswith(b"{") or b'"dodo"' not in text:
         return None
     try:
-        message = json.loads(text, parse_int=_whole)
+        message = json.loads(text, parse_int=_finite, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError):
         return Malformed(service, "its JSON cannot be read") if is_evaluator and b'"verdict"' in text else None
     if not isinstance(message, dict):
@@ -124,41 +119,26 @@ def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
 
 def _response(message: dict[str, Any]) -> Responded | None:
     """How long the application took, where all of the numbers can be."""
-    facts: dict[str, Any] = {field.name: message.get(field.name) for field in dataclasses.fields(Response)}
-    facts |= {name: message.get(name, 0) for name in ("uncopied", "worst_frame", *_UNASKED)}
-    counts = [facts["answers"], facts["slow"], facts["over"] or 0, facts["uncopied"]]
-    times = [value for name, value in facts.items() if name.endswith("_s")]
-    if not all(type(count) is int and 0 <= count <= counts[0] for count in counts) or counts[0] == 0:
+    processor = message.get("processor")
+    try:
+        found = msgspec.convert({**message, "processor": processor if _is_text(processor) else ""}, Response)
+    except msgspec.ValidationError:
         return None
-    if not all(type(facts[name]) is int and 0 <= facts[name] < 1 << 63 for name in _UNASKED):
-        return None
-    if type(facts["worst_frame"]) is not int or not 0 <= facts["worst_frame"] <= counts[0] + 1:
-        return None
-    if not all(_is_number(time, none=True) and (time or 0) >= 0 for time in times) or None in times[:4]:
-        return None
-    name = facts["processor"]
-    return Responded(Response(**{**facts, "processor": name if _is_text(name) else ""}))
+    counts = (found.slow, found.over or 0, found.uncopied, found.worst_frame - 1)
+    return Responded(found) if max(counts) <= found.answers else None
 
 
-_MOST = sys.float_info.max
-_Number = int | Annotated[float, Meta(ge=-_MOST, le=_MOST)]
 _Text = Annotated[str, Meta(min_length=1, max_length=_MAX_TEXT)]
-_Evidence = Annotated[
-    dict[
-        Annotated[str, Meta(pattern=EVIDENCE_KEY)], _Number | Annotated[str, Meta(min_length=1, max_length=200)] | None
-    ],
-    Meta(max_length=20),
-]
 
 
 class _Limit(Struct, forbid_unknown_fields=True):
-    min: _Number = 0
-    max: _Number = 0
+    min: int | float = 0
+    max: int | float = 0
 
 
 class _Check(Struct, forbid_unknown_fields=True):
     name: _Text
-    value: _Number | None
+    value: int | float | None
     limit: _Limit
     unit: Annotated[str, Meta(max_length=_MAX_TEXT)]
     ok: bool
@@ -169,7 +149,7 @@ class _Verdict(Struct):
     outcome: Literal["passed", "failed"]
     reason: _Text
     checks: list[_Check]
-    evidence: _Evidence = {}
+    evidence: Evidence = {}
 
 
 def _verdict(service: str, message: dict[str, Any]) -> Event:
@@ -185,18 +165,14 @@ def _verdict(service: str, message: dict[str, Any]) -> Event:
     return VerdictEvent(service, passed, message["reason"], tuple(map(with_margin, message["checks"])), evidence)
 
 
-def _whole(digits: str) -> int | float:
-    """A number that no float holds is infinite, so that it is none of a verdict."""
-    return int(digits) if len(digits) < _MOST_DIGITS else math.inf
+def _finite(text: str) -> Any:
+    """A number; what is none, or what no float holds, is a list, which may stand nowhere."""
+    number = float(text)
+    return [] if not math.isfinite(number) else int(text) if text.lstrip("-").isdecimal() else number
 
 
-def _is_number(value: object, none: bool = False) -> bool:
-    if value is None:
-        return none
-    try:
-        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    except OverflowError:
-        return False
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _is_text(value: object) -> bool:
