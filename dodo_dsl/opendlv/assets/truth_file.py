@@ -15,7 +15,6 @@ Area = tuple[float, float, float, float]
 """x, y, width and height as fractions of the image."""
 
 LARGEST = 2**63
-_MOST_NAMED = 10
 _FAR, _FARTHER = 1.1, 1.5
 """Times the image, up to which boxes may go on outside it: those that could be corners, and others."""
 PREFIX = "color:"
@@ -91,30 +90,12 @@ def corners(path: Path) -> Iterator[TruthFileError]:
             return
 
 
-def unread_keys(path: Path) -> Iterator[TruthFileError]:
-    """Keys that are none of the format: those near one that is read, and the others together; the file is read."""
+def unread_keys(path: Path) -> Iterator[InputError]:
+    """Keys that are none of the format, each once; the file is read."""
     document = _document(path)
-    others: dict[str, str] = {}
     for kind, known in _KEYS.items():
-        entries = document[kind] if kind else [document]
-        first: dict[str, int] = {}
-        for index, entry in enumerate(entries):
-            for key in entry:
-                if key not in known:
-                    first.setdefault(key, index)
-        for key, index in first.items():
-            where = f"{kind}[{index}].{key}" if kind else key
-            close = difflib.get_close_matches(key, known, n=1, cutoff=0.7)
-            if close:
-                hint = f"did you mean '{close[0]}'?"
-                what = f"nothing reads '{key}'"
-                yield TruthFileError(path, what, where, hint=hint, is_slip=True, is_of_key=True)
-            else:
-                others.setdefault(f"'{key}' of {kind}" if kind else f"'{key}'", where)
-    if others:
-        more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
-        what = f"nothing reads {', '.join(list(others)[:_MOST_NAMED])}{more}"
-        yield TruthFileError(path, what, next(iter(others.values())), is_slip=True, is_of_key=True)
+        entries = {f"$.{kind}[{n}]": entry for n, entry in enumerate(document[kind])} if kind else {"$": document}
+        yield from json_file.unread([json_file.Node(path, *entry) for entry in entries.items()], sorted(known))
 
 
 def no_box(name: str, labels: Collection[str]) -> str:
