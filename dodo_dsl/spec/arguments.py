@@ -320,13 +320,13 @@ def resolved(
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
         entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
-        is_of_test = parameter.driving or parameter.within_timeout
-        same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
+        depends = parameter.when or parameter.driving or parameter.within_timeout
         if not holds(parameter.when, texts):
-            arguments[name] = known if known and same and known.value is None else Argument(parameter, entry)
-            continue
-        is_known = known is not None and same and not (parameter.when and known.value is None)
-        found = known if known is not None and is_known else argument(spec, use, parameter, rig)
+            found = Argument(parameter, entry)
+        elif known and known.parameter is parameter and known.entry is entry and not depends:
+            found = known
+        else:
+            found = argument(spec, use, parameter, rig)
         arguments[name] = found
         if found.value is not None:
             texts[name] = found.value.text

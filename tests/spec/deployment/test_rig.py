@@ -60,7 +60,7 @@ def test_a_rig_that_turns_without_end_alone_gives_its_kind_to_the_gantry() -> No
 
 
 def test_its_limits_are_one_text_for_its_memory() -> None:
-    rig = Rig("kiwi", "dynamic", 121, mapping("limits: {speed: 40 cm/s, x: 150 cm, yaw: 90 deg, y: many}\n"))
+    rig = Rig("kiwi", "dynamic", 121, mapping("limits: {speed: 40 cm/s, x: 150 cm, yaw: 90 deg}\n"))
     entry = rig.entry(MEMORY)
     assert entry is not None and isinstance(entry.value, Scalar) and entry is rig.entry(MEMORY)
     assert entry.value.text == "x=1.5,yaw=1.5707963267949,speed=0.4"
