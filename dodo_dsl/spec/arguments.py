@@ -320,13 +320,12 @@ def resolved(
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
         entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
-        depends = parameter.when or parameter.driving or parameter.within_timeout
-        if not holds(parameter.when, texts):
-            found = Argument(parameter, entry)
-        elif known and known.parameter is parameter and known.entry is entry and not depends:
+        has_effect, is_of_test = holds(parameter.when, texts), parameter.driving or parameter.within_timeout
+        is_same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
+        if known and is_same and not (parameter.when and has_effect is (known.value is None)):
             found = known
         else:
-            found = argument(spec, use, parameter, rig)
+            found = argument(spec, use, parameter, rig) if has_effect else Argument(parameter, entry)
         arguments[name] = found
         if found.value is not None:
             texts[name] = found.value.text
