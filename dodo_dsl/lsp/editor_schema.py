@@ -79,12 +79,8 @@ def _parameter(parameter: Parameter) -> Schema:
 def description(parameter: Parameter) -> str:
     """What a parameter is for, its range, and who else may give it."""
     facts = [parameter.help]
-    low, high = parameter.minimum, parameter.maximum
-    unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
-    if low is not None and high is not None:
-        facts.append(f"From {low} to {high}{unit}.")
-    elif low is not None or high is not None:
-        facts.append(f"At {'most' if low is None else 'least'} {high if low is None else low}{unit}.")
+    if bounds := parameter.bounds:
+        facts.append(f"A{bounds[1:]}." if bounds.startswith("at") else f"From {bounds}.")
     if parameter.required and not parameter.rig and not parameter.shared:
         facts.append("Required.")
     if parameter.when:

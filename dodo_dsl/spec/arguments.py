@@ -121,14 +121,9 @@ def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:
             text = f" is {scalar.text}, expected a multiple of {parameter.multiple_of}"
             raise ValueProblem(parameter, scalar, "out-of-range", text, f"write for example {int(number) - 1}")
         return Value(quantity.decimal_text(number))
-    unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
-    if low is not None and high is not None:
-        expected = f"{low:g} to {high:g}{unit}"
-    else:
-        expected = f"at least {low:g}{unit}" if low is not None else f"at most {high:g}{unit}"
     is_percent = parameter.unit == quantity.SHARE and high == 1 and 1 < number <= 100 and "%" not in scalar.text
     hint = f"write '{scalar.text} %'" if is_percent else ""
-    raise ValueProblem(parameter, scalar, "out-of-range", f" is {scalar.text}, expected {expected}", hint)
+    raise ValueProblem(parameter, scalar, "out-of-range", f" is {scalar.text}, expected {parameter.bounds}", hint)
 
 
 def _text(parameter: Parameter, node: Node, _: Path) -> Value:

@@ -14,6 +14,7 @@ from typing import Any
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
 from dodo_dsl.source import Mapping, Node, Reader, Scalar, Sequence, plain, read, walk
+from dodo_dsl.spec.quantity import SHARE
 from dodo_dsl.spec.validation import validate
 
 RULE = "wrong-manifest"
@@ -167,6 +168,15 @@ class Parameter:
     when: When = field(default_factory=dict)
     driving: bool = False
     deprecated: str = ""
+
+    @property
+    def bounds(self) -> str:
+        """The numbers that it may have, as ``0.1 to 1000 Hz`` or ``at least 1``; empty for any."""
+        low, high, unit = self.minimum, self.maximum, f" {self.unit}" if self.unit not in ("", SHARE) else ""
+        if low is not None and high is not None:
+            return f"{low:.10g} to {high:.10g}{unit}"
+        ends = (("at least", low), ("at most", high))
+        return next((f"{word} {end:.10g}{unit}" for word, end in ends if end is not None), "")
 
 
 @dataclass(frozen=True)
