@@ -15,7 +15,6 @@ import contextlib
 import errno
 import io
 import os
-import secrets
 import shutil
 import stat
 from collections.abc import Iterable, Iterator
@@ -150,7 +149,7 @@ def _stage(path: Path) -> Iterator[Path]:
 
 def _beside(path: Path) -> Path:
     path = path if path.name else path.resolve()
-    return path.with_name(f".{path.name[:_MOST_NAME]}.{secrets.token_hex(8)}{path.suffix[:_MOST_NAME]}")
+    return path.with_name(f".{path.name[:_MOST_NAME]}.{os.urandom(8).hex()}{path.suffix[:_MOST_NAME]}")
 
 
 def _keep_permissions(path: Path, part: Path) -> None:

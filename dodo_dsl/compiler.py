@@ -4,7 +4,7 @@ import functools
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from dodo_dsl import package_data
 from dodo_dsl.application.model import Access, ApplicationSource
@@ -19,11 +19,11 @@ from dodo_dsl.check.suite_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
-from dodo_dsl.spec.load import Loaded, Settings, applied, load_spec, on_each, varied
+from dodo_dsl.spec.load import Settings, applied, load_spec, on_each, varied
 from dodo_dsl.spec.manifest import Manifest, load_manifests
 from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.registry import Location, locate
+from dodo_dsl.spec.registry import locate
 from dodo_dsl.spec.rig import PORT
 from dodo_dsl.spec.vary import Values
 
@@ -38,42 +38,6 @@ UNSATISFIED = ("no-producer", "no-sample", "true-pose")
 RUN, SAMPLE = "run", "sample"
 """What announces the number of a test at values of its ranges; the report groups samples by the second."""
 _MOST_READ = 256  # files that are kept for the tests that extend them
-
-
-class CheckInputs(NamedTuple):
-    """What every test is checked with."""
-
-    manifests: Mapping[str, Manifest]
-    deployment: Deployment
-    application: ApplicationSource | None
-
-
-@dataclass(frozen=True)
-class CheckResult:
-    """The tests that instances are, and what the rules found, by the path of their spec."""
-
-    tests: tuple[ResolvedTest, ...] = ()
-    problems: Mapping[Path, Sequence[Diagnostic]] = field(default_factory=dict)
-
-
-class Sources:
-    """Where compiling starts, and how files are read and checked: all of them. An editor's know what has not changed.
-
-    The deployment is looked for at ``start``, then above the tests. ``read`` may know texts that are not saved yet.
-    """
-
-    def __init__(self, start: Path | None = None, read: Reader = read) -> None:
-        self.start, self.read = start or Path.cwd(), read
-
-    def load(self, locations: Iterable[Location]) -> dict[Path, Loaded]:
-        """The specs of files."""
-        once = functools.lru_cache(maxsize=_MOST_READ)(self.read)
-        return {location.path: load_spec(location, once) for location in locations}
-
-    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> CheckResult:
-        """Resolves and checks the instances, and those at the ends of their ranges."""
-        tests = tuple(resolve(specs, *inputs))
-        return CheckResult(tests, check(tests, *inputs, resolve(corners, *inputs)))
 
 
 @dataclass(frozen=True)
@@ -138,19 +102,21 @@ def load(
     paths: Sequence[Path],
     application: Sequence[Path] = (),
     settings: Settings = Settings(),  # noqa: B008  (it is frozen)
-    sources: Sources | None = None,
+    start: Path | None = None,
+    reader: Reader = read,
+    services_only: bool = False,
 ) -> Checked:
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
-    ``application`` are compose files that replace the deployment's.
+    ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
+    tests. ``reader`` may know texts that are not saved yet. With ``services_only`` no test is read.
     """
-    sources = sources or Sources()
-    reader = sources.read
-    deployment, found = load_deployment(find_deployment(sources.start, paths), reader)
+    deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
     own = check_problems.problems(deployment.services, reader, known_messages(deployment.messages))
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
-    loaded = sources.load(locations)
+    once = functools.lru_cache(maxsize=_MOST_READ)(reader)
+    loaded = {} if services_only else {location.path: load_spec(location, once) for location in locations}
     source = None
     if files := application or deployment.application:
         source, of_application = read_application(
@@ -164,12 +130,13 @@ def load(
         deployment = replace(deployment, rigs=rigs)
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
     specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
-    corners = [applied(corner, settings) for spec in specs for corner in spec.corners]
-    result = sources.check(specs, corners, CheckInputs(manifests, deployment, source))
+    shared = {id(corner): corner for spec in specs for corner in spec.corners}  # by instances of a matrix
+    corners = [applied(corner, settings) for corner in shared.values()]
+    tests, at_ends = (tuple(resolve(some, manifests, deployment, source)) for some in (specs, corners))
+    by_rules = check(tests, manifests, deployment, source, at_ends)
     as_read = {path: of_file for path, (_, of_file) in loaded.items()}
-    problems = Problems(tuple(found), (*manifest_problems, *own), as_read, result.problems)
-    checked = Checked(deployment, manifests, (), (), settings, source, tuple(empty), problems)
-    return _with_tests(checked, result.tests)
+    problems = Problems(tuple(found), (*manifest_problems, *own), as_read, by_rules)
+    return _with_tests(Checked(deployment, manifests, (), (), settings, source, tuple(empty), problems), tests)
 
 
 def narrowed(checked: Checked, specs: Collection[Spec]) -> Checked:

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from dodo_dsl.terminal import WIDE
+from tests import engine
 from tests.faults import Book
 
 settings.register_profile("search", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -67,7 +68,8 @@ def pytest_collection_finish() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
-    A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs.
+    A test in real time has two more tries, as other work on this machine may keep it waiting; none if it hangs. One of
+    an engine has another one, which is for an engine that is stuck alone.
     """
     for item in items:
         if "firmware" in getattr(item, "fixturenames", ()):
@@ -77,11 +79,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(
                 pytest.mark.flaky(reruns=REALTIME_RERUNS, reruns_delay=REALTIME_REST_S, rerun_except=[HANGS])
             )
+        if item.get_closest_marker("engine"):
+            item.add_marker(pytest.mark.timeout(engine.LIMIT_S))
+            item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=engine.STUCK))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
         for mark in WORDS:
             if item.get_closest_marker(mark) and not says(item.path, mark):
                 raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', and its file does not say so")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("engine") and getattr(item, "execution_count", 1) > 1:
+        assert engine.is_stuck() and engine.start_anew(), "the engine was not stuck: the test itself hung"
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -8,7 +8,7 @@ import os
 import pwd
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 ASK = "keep it in the repository, or allow it with 'paths' in dodo.yml"
@@ -71,6 +71,7 @@ class HostPaths:
     folder: Path
     roots: tuple[Path, ...]
     allowed: tuple[Path, ...] = ()
+    _names: dict[str, tuple[str, ...]] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     def whole(self, text: str) -> str:
         """A path as the engine would see it, without ``..``; symbolic links stay."""
@@ -78,8 +79,10 @@ class HostPaths:
 
     def names(self, text: str) -> tuple[str, ...]:
         """The path as it is written, and where its symbolic links lead: with ``..`` resolved before and after them."""
-        written = self.folder / _expanded(text)
-        return tuple(dict.fromkeys((self.whole(text), real(self.whole(text)), real(written))))
+        if text not in self._names:
+            written, whole = self.folder / _expanded(text), self.whole(text)
+            self._names[text] = tuple(dict.fromkeys((whole, real(whole), real(written))))
+        return self._names[text]
 
     def is_own(self, text: str) -> bool:
         """Whether a path, and what its symbolic links lead to, lie in the repository or below an allowed path."""

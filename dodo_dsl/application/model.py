@@ -209,7 +209,7 @@ class ApplicationSource:
         roots = (*repository(self.folder), *self.other_roots)
         return HostPaths(self.folder, roots, tuple(map(Path, self.access.paths)))
 
-    @property
+    @functools.cached_property
     def other_roots(self) -> tuple[Path, ...]:
         """The folders besides its repository whose files are the application's own."""
         own = repository(self.folder)

@@ -1,6 +1,6 @@
 """The rules: each is a module with one concern, in one explicit list."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,12 +47,10 @@ def check(
     deployment: Deployment,
     application: ApplicationSource | None = None,
     corners: Iterable[ResolvedTest] = (),
-    only: Collection[Path] | None = None,
 ) -> dict[Path, list[Diagnostic]]:
-    """All problems of all instances, by spec; ``tests`` are also the ones whose names may collide.
+    """All problems of all instances, by spec.
 
     ``corners`` are instances at the ends of their ranges, whose problems are added to those of the others.
-    With ``only``, these are the problems of some specs.
     """
     everything = tuple(tests)
     by_name: dict[str, dict[Path, Spec]] = {}
@@ -71,7 +69,7 @@ def check(
     at_ends = by_path(corners)
     return {
         path: [*_with_instances(group), *_of_corners(at_ends.get(path, ()), {d for _, found in group for d in found})]
-        for path, group in by_path(t for t in everything if only is None or t.spec.path in only).items()
+        for path, group in by_path(everything).items()
     }
 
 

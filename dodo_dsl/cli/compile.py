@@ -14,8 +14,8 @@ from dodo_dsl import atomic, package_data
 from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError
-from dodo_dsl.cli.numbers import patience, positive
-from dodo_dsl.compiler import Checked, Compilation, plan
+from dodo_dsl.cli.numbers import positive
+from dodo_dsl.compiler import Checked, plan
 from dodo_dsl.diagnostics import (
     Diagnostic,
     Fix,
@@ -84,7 +84,6 @@ EXAMPLES = """examples:
   dodo compile --check                     problems of all tests; writes nothing
   dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
   dodo compile --check --format gitlab     the same as a code quality report
-  dodo compile --forecast 4 --times dodo-report    how long the pipeline takes with four runners
   dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
   dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
   dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
@@ -92,7 +91,6 @@ EXAMPLES = """examples:
 """
 
 
-_OVERHEAD_S = 10.0  # from when GitLab gives a job to a runner until its test begins, and at its end
 _WORKERS = 4
 _SHORT_DIFF = 30  # lines that are shown without --diff
 _MOST_NAMES = 8
@@ -116,13 +114,8 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
     parser.add_argument("--format", choices=tuple(FORMATS), default="text",
                         help="format of diagnostics (default: text); with gitlab the text goes to stderr")  # fmt: skip
-    parser.add_argument(
-        "--forecast", type=positive, metavar="R", help="show the duration of the pipeline with R runners"
-    )
     parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
-                        help="results or report with times; repeatable (default: the history here)")  # fmt: skip
-    parser.add_argument("--overhead", type=patience, default=_OVERHEAD_S, metavar="S",
-                        help="seconds that a runner needs to start a job (default: %(default)g)")  # fmt: skip
+                        help="with --jobs: results or report with the tests' times; repeatable")  # fmt: skip
     parser.add_argument("--search", action="append", default=[], metavar="TEST",
                         help="add jobs that together search TEST; repeatable")  # fmt: skip
     parser.add_argument("--workers", type=positive, metavar="N",
@@ -132,12 +125,12 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    if options.forecast and options.check:
-        raise UsageError("--forecast needs the pipeline, which --check does not write: call dodo compile without it")
     if options.fix and not options.check:
         raise UsageError("--fix applies to --check")
     if options.images and options.check:
         raise UsageError("--images are for what is written: call dodo compile without --check")
+    if options.times and not options.jobs:
+        raise UsageError("--times are for --jobs")
     if options.workers and not options.search:
         raise UsageError("--workers are jobs of a search: name its test with --search")
     checked = selection.select(options.path, (), options.application)
@@ -239,7 +232,6 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     _show(diagnostics, options.format, stdout, stderr)
     if has_errors(diagnostics):
         return Exit.USAGE
-    expected = _forecast(made, options)
     gone = [folder.name for folder in stale_folders(made.compiled, options.output)]
     write(made.compiled, made.pipeline, options.output)
     if options.images:
@@ -250,7 +242,10 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         stdout.write(f"{_count(len(plans))} compiled into {options.output}\n")
         if gone:
             stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
-    (stdout if options.format == "text" else stderr).write(expected)
+    if options.jobs and made.compiled.suite.plans:
+        from dodo_dsl.cli.forecast import packing_text
+
+        (stdout if options.format == "text" else stderr).write(packing_text(made.compiled.suite, made.jobs))
     return Exit.OK
 
 
@@ -260,18 +255,6 @@ def _searches(options: argparse.Namespace) -> tuple[SearchJobs, ...]:
     from dodo_dsl.cli.search_session import search_jobs
 
     return search_jobs(options.search, options.workers or _WORKERS, options.application)
-
-
-def _forecast(made: Compilation, options: argparse.Namespace) -> str:
-    """How long the pipeline or its longest job takes, if that is wanted; raises UsageError for what has no times."""
-    suite = made.compiled.suite
-    if not (options.forecast or options.jobs) or not suite.plans:
-        return ""
-    from dodo_dsl.cli.forecast import forecast_text, packing_text
-
-    if options.forecast:
-        return forecast_text(suite, made.jobs, options.forecast, options.overhead)
-    return packing_text(suite, made.jobs)
 
 
 def _count(number: int, what: str = "test") -> str:

@@ -4,19 +4,17 @@ import argparse
 import os
 import shlex
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl import package_data
 from dodo_dsl.cli import display, selection
 from dodo_dsl.cli.errors import Exit, UsageError
-from dodo_dsl.compiler import Checked, Sources, load, without_unsatisfied
+from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
-from dodo_dsl.spec.load import Loaded
 from dodo_dsl.spec.manifest import Manifest, in_words
 from dodo_dsl.spec.model import LEVEL_WORDS, Spec
-from dodo_dsl.spec.registry import Location
 from dodo_dsl.terminal import clipped, json_text, printable, width_of
 
 EXAMPLES = """examples:
@@ -46,8 +44,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     if options.test and options.services is not None:
         raise UsageError("--services lists services: name tests without it")
     of_services = options.services is not None
-    sources = _WithoutTests() if of_services else None
-    everything = selection.select(options.test, (), ()) if options.test else load([], sources=sources)
+    everything = selection.select(options.test, (), ()) if options.test else load([], services_only=of_services)
     if options.services:
         return _explain(everything, options.services, stdout)
     width = None if options.verbose else width_of(stdout)
@@ -64,13 +61,6 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         return Exit.OK
     stderr.write(f"problems in {_places(checked)}; dodo compile --check shows them\n")
     return Exit.USAGE
-
-
-class _WithoutTests(Sources):
-    """Of services, no test is read."""
-
-    def load(self, locations: Iterable[Location]) -> dict[Path, Loaded]:
-        return {}
 
 
 def _places(checked: Checked) -> str:

@@ -53,8 +53,6 @@ _PROCESSES = {"python": "python, steering.py", "cpp": "build/steering"}
 LANGUAGES = tuple(_PROCESSES)
 ANSWERS = ("bus", "printed", "wheels")
 """Of the application that ``dodo new --application`` writes, as are its languages."""
-PIPELINES = ("application", "deployment", "run")
-"""The templates for GitLab, each of them a component in its folder."""
 _SPEC_SCHEMA = "dodo.schema.json"
 _MESSAGES = "messages.odvd"
 
@@ -99,7 +97,7 @@ def missing_schemas(root: Path) -> list[New]:
 
 
 def pipeline_template(name: str) -> bytes:
-    """The text of one of ``PIPELINES``."""
+    """The text of one of ``package_data.PIPELINES``."""
     return (package_data.templates() / name / "template.yml").read_bytes()
 
 
@@ -147,7 +145,10 @@ def deployment_files(root: Path, *, images: bool = False) -> list[New]:
         New(root / application, filled("deployment/docker-compose.yml")),
         New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
         New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", templates=included(images))),
-        *(New(root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml", pipeline_template(name)) for name in PIPELINES),
+        *(
+            New(root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml", pipeline_template(name))
+            for name in package_data.PIPELINES
+        ),
         *_schemas(root),
         New(root / ".gitignore", filled("deployment/gitignore", builds=images)),
     ]

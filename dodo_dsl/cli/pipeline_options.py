@@ -3,14 +3,13 @@
 import argparse
 import json
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
 from dodo_dsl.cli.numbers import positive
-from dodo_dsl.emit.pipeline_jobs import DEFAULT_TAGS, JobOptions, Seconds
+from dodo_dsl.emit.pipeline_jobs import DEFAULT_TAGS, JobOptions
 from dodo_dsl.opendlv import regular_file
 
 _ACCESS = ("all", "developer", "none")
@@ -39,7 +38,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--run-options", default="", metavar="OPTIONS",
                         help="dodo run options of every test; the variable DODO_RUN_OPTIONS replaces them")  # fmt: skip
     parser.add_argument("--jobs", type=positive, metavar="N",
-                        help="pack the tests into N jobs, evenly by their times, and one a rig "
+                        help="pack the tests into N jobs, evenly by their times or timeouts, and one a rig "
                         "(default: one a test)")  # fmt: skip
     parser.add_argument("--images", type=Path, metavar="FILE",
                         help="lines DODO_IMAGE_<SERVICE>=IMAGE of the application's images that were built: tests run "
@@ -68,13 +67,11 @@ def job_options(options: argparse.Namespace) -> JobOptions:
         from_repository=options.files == REPOSITORY,
         artifact_mb=options.artifact_limit,
     )
-    return replace(made, seconds=_seconds(options.times)) if options.jobs or options.forecast else made
-
-
-def _seconds(times: Sequence[Path]) -> Seconds:
+    if not (options.jobs and options.times):
+        return made
     from dodo_dsl.cli.forecast import known_seconds
 
-    return known_seconds(times)
+    return replace(made, seconds=known_seconds(options.times))
 
 
 def _images(path: Path) -> tuple[str, ...]:

@@ -7,22 +7,53 @@ import json
 import os
 import shutil
 import stat
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import atomic
 from dodo_dsl.emit.render import File, render_plan
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.build import Compiled
-from dodo_dsl.plan.test_files import SHARED, FileCopy, is_shared_name, link
+from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.test_files import SHARED, is_shared_name, link
 
 PLAN_FILE = "test.json"
 FILES = "files"
 
 
+@dataclass(frozen=True)
+class _Link:
+    text: str
+
+
+_Entry = str | Path | _Link
+"""What stands at a path: a text, the copy of a file, or a link."""
+_Entries = Mapping[Path, _Entry]
+
+
 def pipeline_folder(out: Path) -> str:
     """The output folder as a pipeline's jobs name it: as it was given, or its last part when that is absolute."""
     return out.name if out.is_absolute() else out.as_posix()
+
+
+def _of_test(compiled: Compiled, plan: Plan, out: Path) -> dict[Path, _Entry]:
+    """Everything in the folder of a test."""
+    files = out / plan.slug / FILES
+    copies = (
+        (files / copy.target, _Link(copy.link) if copy.shared else copy.source) for copy in compiled.copies[plan.slug]
+    )
+    return {**{out / file.path: file.text for file in render_plan(plan, compiled.defaults)}, **dict(copies)}
+
+
+def _of_all(compiled: Compiled, out: Path) -> dict[Path, _Entry]:
+    """The files that tests share: copies, or links to those of the repository; the name depends on the content."""
+    folder = out / SHARED
+    shared = {copy.shared: copy for copies in compiled.copies.values() for copy in copies if copy.shared}
+    return {
+        folder / name: _Link(os.path.relpath(copy.source, folder.resolve())) if copy.is_linked else copy.source
+        for name, copy in shared.items()
+    }
 
 
 def write(compiled: Compiled, pipeline: File, out: Path) -> None:
@@ -33,63 +64,72 @@ def write(compiled: Compiled, pipeline: File, out: Path) -> None:
     for plan in compiled.suite.plans:
         _refuse_links(out / plan.slug)
     _refuse_link(out / SHARED)
-    _update(out, [pipeline])
-    _write_shared(out / SHARED, _shared(compiled))
+    shared = _of_all(compiled, out)
+    _update({out / pipeline.path: pipeline.text, **shared})
     for plan in compiled.suite.plans:
-        folder, files, copies = out / plan.slug, render_plan(plan, compiled.defaults), compiled.copies[plan.slug]
+        folder, wanted = out / plan.slug, _of_test(compiled, plan, out)
         if folder.exists():
-            _update(out, files)
-            _write_copies(folder / FILES, copies)
+            for path in _surplus(folder / FILES, wanted):  # before anything else: a folder may replace it
+                path.unlink()
+            _update(wanted)
+            _open_to_containers(folder / FILES)
         else:
-            _write_new(folder, [(file.path.removeprefix(f"{plan.slug}/"), file.text) for file in files], copies)
-    for folder in stale_folders(compiled, out):
-        shutil.rmtree(folder)
-    _remove_unshared(out / SHARED, _shared(compiled))
-
-
-def _shared(compiled: Compiled) -> dict[str, FileCopy]:
-    """The files that tests share, by name."""
-    return {copy.shared: copy for copies in compiled.copies.values() for copy in copies if copy.shared}
-
-
-def _write_shared(folder: Path, wanted: Mapping[str, FileCopy]) -> None:
-    """Copies of files, or links to those of the repository; the name depends on the content."""
-    for name, copy in wanted.items():
-        if _is_shared_as(folder / name, copy):
-            continue
-        if copy.is_linked:
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / name).unlink(missing_ok=True)
-            (folder / name).symlink_to(_repository_link(folder, copy))
-        else:
-            with atomic.replacing(folder / name) as part:
-                shutil.copyfile(copy.source, part)
-    if wanted:
-        _open_to_containers(folder)
-
-
-def _is_shared_as(path: Path, copy: FileCopy) -> bool:
-    if copy.is_linked:
-        return path.is_symlink() and path.readlink() == _repository_link(path.parent, copy)
-    return path.is_file() and not path.is_symlink() and filecmp.cmp(copy.source, path, shallow=False)
-
-
-def _repository_link(folder: Path, copy: FileCopy) -> Path:
-    return Path(os.path.relpath(copy.source, folder.resolve()))
-
-
-def _remove_unshared(folder: Path, wanted: Mapping[str, FileCopy]) -> None:
-    for path in _unshared(folder, wanted):
+            _write_new(folder, wanted)
+    for stale in stale_folders(compiled, out):
+        shutil.rmtree(stale)
+    for path in _surplus(out / SHARED, shared):
         path.unlink()
-    if folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()
+    _open_to_containers(out / SHARED)
+    if (out / SHARED).is_dir() and not any((out / SHARED).iterdir()):
+        (out / SHARED).rmdir()
 
 
-def _unshared(folder: Path, wanted: Mapping[str, FileCopy]) -> list[Path]:
-    """What earlier compilations shared and this one does not."""
-    found = sorted(folder.iterdir()) if folder.is_dir() else []
-    files = [path for path in found if path.is_symlink() or path.is_file()]
-    return [path for path in files if is_shared_name(path.name) and path.name not in wanted]
+def _update(wanted: _Entries) -> None:
+    for path, entry in wanted.items():
+        if _is_written(path, entry):
+            continue
+        if path.is_symlink() or isinstance(entry, _Link):
+            path.unlink(missing_ok=True)
+        if isinstance(entry, _Link):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _put(path, entry)
+        else:
+            with atomic.replacing(path) as part:
+                _put(part, entry)
+
+
+def _write_new(folder: Path, wanted: _Entries) -> None:
+    """A new test: its folder appears as a whole."""
+    with atomic.new_folder(folder) as stage:
+        staged = {stage / path.relative_to(folder): entry for path, entry in wanted.items()}
+        for parent in {path.parent for path in staged}:
+            parent.mkdir(parents=True, exist_ok=True)
+        for path, entry in staged.items():
+            _put(path, entry)
+        _open_to_containers(stage / FILES)
+
+
+def _put(path: Path, entry: _Entry) -> None:
+    if isinstance(entry, _Link):
+        path.symlink_to(entry.text)
+    elif isinstance(entry, Path):
+        shutil.copyfile(entry, path)
+    else:
+        path.write_bytes(entry.encode())
+
+
+def _is_written(path: Path, entry: _Entry) -> bool:
+    if isinstance(entry, _Link):
+        return path.is_symlink() and str(path.readlink()) == entry.text
+    if path.is_symlink() or not path.is_file():
+        return False
+    return path.read_bytes() == entry.encode() if isinstance(entry, str) else filecmp.cmp(entry, path, shallow=False)
+
+
+def _surplus(folder: Path, wanted: _Entries) -> list[Path]:
+    """What earlier compilations put into a folder, and this one does not."""
+    found = [path for path in sorted(folder.rglob("*")) if path.is_symlink() or path.is_file()]
+    return [p for p in found if p not in wanted and (folder.name == FILES or is_shared_name(p.name))]
 
 
 def add_images(compiled: Compiled, images: Sequence[str], out: Path) -> None:
@@ -118,59 +158,6 @@ def _is_own_link(path: Path, files: Path) -> bool:
     return is_shared_name(text.name) and str(text) == link(path.relative_to(files).as_posix(), text.name)
 
 
-def _update(out: Path, files: Iterable[File]) -> None:
-    for file in files:
-        path = out / file.path
-        if not path.is_file() or path.read_bytes() != file.text.encode():
-            atomic.write_text(path, file.text)
-
-
-def _write_new(folder: Path, files: Iterable[tuple[str, str]], copies: Sequence[FileCopy]) -> None:
-    """A new test: its folder appears as a whole."""
-    with atomic.new_folder(folder) as stage:
-        for name, text in files:
-            (stage / name).write_text(text, encoding="utf-8")
-        for copy in copies:
-            target = stage / FILES / copy.target
-            target.parent.mkdir(parents=True, exist_ok=True)
-            if copy.shared:
-                target.symlink_to(copy.link)
-            else:
-                shutil.copyfile(copy.source, target)
-        _open_to_containers(stage / FILES)
-
-
-def _write_copies(folder: Path, wanted: Sequence[FileCopy]) -> None:
-    for path in _former_links(folder, wanted):  # before anything else: a folder may replace it
-        path.unlink()
-    for copy in wanted:
-        if _is_copied(folder, copy):
-            continue
-        if copy.shared:
-            (folder / copy.target).parent.mkdir(parents=True, exist_ok=True)
-            (folder / copy.target).unlink(missing_ok=True)
-            (folder / copy.target).symlink_to(copy.link)
-        else:
-            with atomic.replacing(folder / copy.target) as part:
-                shutil.copyfile(copy.source, part)
-    for path in _surplus(folder, wanted):
-        path.unlink()
-    _open_to_containers(folder)
-
-
-def _former_links(folder: Path, wanted: Sequence[FileCopy]) -> list[Path]:
-    links = {copy.target: copy.link for copy in wanted if copy.shared}
-    found = [path for path in folder.rglob("*") if path.is_symlink()]
-    return [path for path in found if links.get(path.relative_to(folder).as_posix()) != str(path.readlink())]
-
-
-def _is_copied(folder: Path, copy: FileCopy) -> bool:
-    target = folder / copy.target
-    if copy.shared:
-        return target.is_symlink() and str(target.readlink()) == copy.link
-    return target.is_file() and not target.is_symlink() and filecmp.cmp(copy.source, target, shallow=False)
-
-
 def _open_to_containers(folder: Path) -> None:
     """Everybody may read the files, for any umask, as users of containers must; the folder above may be closed."""
     for path in (folder, *folder.rglob("*")) if folder.is_dir() else ():
@@ -180,13 +167,6 @@ def _open_to_containers(folder: Path) -> None:
         mode = path.stat().st_mode
         if mode & more != more:
             path.chmod(stat.S_IMODE(mode) | more)
-
-
-def _surplus(folder: Path, wanted: Sequence[FileCopy]) -> Iterator[Path]:
-    names = {copy.target for copy in wanted}
-    for path in sorted(folder.rglob("*")):
-        if (path.is_file() or path.is_symlink()) and path.relative_to(folder).as_posix() not in names:
-            yield path
 
 
 def stale_folders(compiled: Compiled, out: Path) -> list[Path]:
@@ -208,36 +188,25 @@ def _ours(path: Path) -> bool:
 
 def differences(compiled: Compiled, pipeline: File, out: Path) -> dict[str, str]:
     """What writing would change below ``out``, a unified diff by test, the pipeline's first; empty when up to date."""
-    found = {pipeline.path: _text_difference(pipeline, out)}
+    found = {pipeline.path: _difference({out / pipeline.path: pipeline.text}, out)}
     for plan in compiled.suite.plans:
-        texts = (_text_difference(file, out) for file in render_plan(plan, compiled.defaults))
-        copies = _copy_differences(out / plan.slug / FILES, compiled.copies[plan.slug], out)
-        found[plan.slug] = "".join([*texts, *copies])
-    found[SHARED] = "".join(_shared_differences(out / SHARED, _shared(compiled)))
+        wanted = _of_test(compiled, plan, out)
+        found[plan.slug] = _difference(wanted, out, out / plan.slug / FILES)
+    found[SHARED] = _difference(_of_all(compiled, out), out, out / SHARED)
     found.update((folder.name, f"only in {out.name}: {folder.name}\n") for folder in stale_folders(compiled, out))
     return {name: text for name, text in found.items() if text}
 
 
-def _text_difference(file: File, out: Path) -> str:
-    path = out / file.path
-    before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
-    if before == file.text:
-        return ""
-    names = (f"a/{file.path}", f"b/{file.path}")
-    return "".join(difflib.unified_diff(before.splitlines(True), file.text.splitlines(True), *names))
-
-
-def _shared_differences(folder: Path, wanted: Mapping[str, FileCopy]) -> Iterator[str]:
-    for name, copy in wanted.items():
-        if not _is_shared_as(folder / name, copy):
-            yield f"differs: {SHARED}/{name}\n"
-    for path in _unshared(folder, wanted):
-        yield f"no longer needed: {SHARED}/{path.name}\n"
-
-
-def _copy_differences(folder: Path, wanted: Sequence[FileCopy], out: Path) -> Iterator[str]:
-    for copy in wanted:
-        if not _is_copied(folder, copy):
-            yield f"differs: {(folder / copy.target).relative_to(out)}\n"
-    for path in _surplus(folder, wanted):
-        yield f"no longer needed: {path.relative_to(out)}\n"
+def _difference(wanted: _Entries, out: Path, folder: Path | None = None) -> str:
+    lines: list[str] = []
+    for path, entry in wanted.items():
+        name = path.relative_to(out).as_posix()
+        if _is_written(path, entry):
+            continue
+        if isinstance(entry, str):
+            before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+            lines += difflib.unified_diff(before.splitlines(True), entry.splitlines(True), f"a/{name}", f"b/{name}")
+        else:
+            lines.append(f"differs: {name}\n")
+    surplus = _surplus(folder, wanted) if folder else ()
+    return "".join([*lines, *(f"no longer needed: {path.relative_to(out)}\n" for path in surplus)])

@@ -1,27 +1,14 @@
-"""The child pipeline: one job per instance or per batch, GitLab's limits for it, and how long it will take.
+"""The child pipeline: one job per instance or per batch, and GitLab's limits for it."""
 
-The forecast is for so many runners, from how long the tests took before.
-"""
-
-import heapq
 import math
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
-from dodo_dsl.emit.pipeline_jobs import (
-    NO_OPTIONS,
-    NOTHING_COMMON,
-    SPARE_MINUTES,
-    CommonSettings,
-    JobOptions,
-    PipelineJob,
-    factored,
-    packed,
-)
+from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, SPARE_MINUTES, JobOptions, PipelineJob, packed
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.runs import by_test, named, pooled
 from dodo_dsl.plan.test_files import FileCopy
@@ -69,10 +56,7 @@ class SearchJobs:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The stages in order, whether a gate precedes hil, the variables, the jobs, and what those without a test have.
-
-    What is ``common`` to the jobs of tests is not in them.
-    """
+    """The stages in order, whether a gate precedes hil, the variables, and the jobs with what they have in common."""
 
     stages: tuple[str, ...]
     gate: bool
@@ -80,7 +64,6 @@ class Pipeline:
     jobs: tuple[PipelineJob, ...]
     searches: tuple[SearchJobs, ...] = ()
     options: JobOptions = NO_OPTIONS
-    common: CommonSettings = NOTHING_COMMON
 
 
 def pipeline(
@@ -99,9 +82,8 @@ def pipeline(
     jobs = tuple(_job(plans, gate, folder, options) for plans in pooled(suite.plans))
     if options.most_jobs:
         timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
-        jobs = packed(jobs, options.most_jobs, {**timeouts, **options.seconds(by_test(suite.plans))})
-    common, jobs = factored(jobs, options)
-    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options, common)
+        jobs = packed(jobs, options.most_jobs, {**timeouts, **options.seconds})
+    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options)
 
 
 def _variables(suite: Suite, options: JobOptions) -> dict[str, str]:
@@ -128,18 +110,14 @@ def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) ->
     return PipelineJob(
         name=named(plan).slug,
         stage=plan.level,
-        tags=(plan.tag, *shared) if on_rig else options.tags,
+        tags=(plan.tag, *shared) if on_rig else (),
         gated=gate and plan.level == "hil",
         rig=rig if on_rig and not plan.pool else "",
         pool=tuple(one.rig for one in plans) if on_rig and plan.pool else (),
         minutes=max(math.ceil((p.timeout_s + sum(s.setup_s for s in p.services)) / 60) for p in plans) + SPARE_MINUTES,
-        interruptible=not on_rig,
         tests=(named(plan).slug,),
         folders=tuple(f"{folder}/{one.slug}" for one in plans),
-        image="" if on_rig else options.image,
         backend=options.backend,
-        services=() if on_rig else options.services,
-        before_script="" if on_rig else options.before_script,
     )
 
 
@@ -207,53 +185,3 @@ def _largest(suite: Suite, message: str, hint: str, severity: Severity) -> Diagn
 def _place(plan: Plan) -> Span:
     place = plan.source_map.get("matrix") or plan.source_map.get("name")
     return Span(place.file, place.line, place.column) if place else Span(plan.spec)
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """Seconds until the last job has ended, seconds of all jobs together, and the job that ends last."""
-
-    seconds: float
-    work: float
-    last: str
-
-
-def forecast(pipeline: Pipeline, took: Callable[[str], float], runners: int, overhead: float) -> Forecast:
-    """Jobs in their order, each to the first runner that is free.
-
-    ``took`` gives a test's seconds by its slug; those of a job add up, and to them comes the ``overhead`` in s that a
-    runner needs for any job.
-    There are ``runners`` of the tag ``sil``, and one of each rig; of a pool, that which is free first takes the job.
-    Jobs behind the gate wait for all others and for the gate, which is a job, too.
-    """
-    free: dict[str, list[float]] = {"": [0.0] * runners}
-    before = [job for job in pipeline.jobs if not job.gated]
-    behind = [job for job in pipeline.jobs if job.gated]
-    ends = _ends(before, free, 0.0, took, overhead)
-    if behind:
-        opened = max(ends.values(), default=0.0) + overhead
-        ends |= _ends(behind, free, opened, took, overhead)
-    last = max(ends, key=lambda name: ends[name], default="")
-    return Forecast(ends.get(last, 0.0), sum(_seconds(job, took) + overhead for job in pipeline.jobs), last)
-
-
-def _seconds(job: PipelineJob, took: Callable[[str], float]) -> float:
-    return sum(took(test) for test in job.tests)
-
-
-def _ends(
-    jobs: Sequence[PipelineJob],
-    free: dict[str, list[float]],
-    begin: float,
-    took: Callable[[str], float],
-    overhead: float,
-) -> dict[str, float]:
-    """When each job ends; ``free`` has for each rig, and for all other runners as "", when they are free again."""
-    ends = {}
-    for job in jobs:
-        rigs = [free.setdefault(rig, [0.0]) for rig in job.pool or (job.rig,)]
-        runners = min(rigs, key=lambda one: one[0])
-        start = max(heapq.heappop(runners), begin)
-        ends[job.name] = start + overhead + _seconds(job, took)
-        heapq.heappush(runners, ends[job.name])
-    return ends

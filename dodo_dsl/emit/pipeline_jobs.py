@@ -5,11 +5,10 @@ Tests share jobs in suites whose jobs cost more to begin than to run.
 
 import heapq
 import shlex
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dodo_dsl.plan.model import Plan
 from dodo_dsl.spec.model import LEVELS
 
 SPARE_MINUTES = 10
@@ -18,7 +17,7 @@ SPARE_MINUTES = 10
 
 @dataclass(frozen=True)
 class PipelineJob:
-    """``rig`` is the resource that it locks, ``image`` that of its container, both may be empty.
+    """``rig`` is the resource that it locks, empty for any other runner; ``tags`` are those of a rig's.
 
     ``pool`` has the names of the rigs of which it takes any; GitLab cannot lock one of several.
 
@@ -27,25 +26,26 @@ class PipelineJob:
 
     name: str
     stage: str
-    tags: tuple[str, ...]
     gated: bool
     rig: str
     minutes: int
-    interruptible: bool
     tests: tuple[str, ...]
     folders: tuple[str, ...] = ()
-    image: str = ""
+    tags: tuple[str, ...] = ()
     pool: tuple[str, ...] = ()
     backend: str = ""
     """What the tests run on unless the options of a pipeline name another; empty for dodo's own choice."""
-    services: tuple[str | Mapping[str, Any], ...] = ()
-    before_script: str = ""
+
+    @property
+    def on_rig(self) -> bool:
+        """Whether a rig's own runner takes it, and not those of all other jobs."""
+        return bool(self.rig or self.pool)
 
     @property
     def script(self) -> str:
         compiled = " ".join(f"--compiled {shlex.quote(folder)}" for folder in self.folders)
         backend = f" --backend {self.backend}" if self.backend else ""
-        alone = (self.rig or self.pool) and len(self.tests) > 1  # else they would wait for each other's lease
+        alone = self.on_rig and len(self.tests) > 1  # else they would wait for each other's lease
         jobs = " --jobs 1" if alone else ""
         return f"dodo run {compiled}{backend} --report dodo-report $DODO_RUN_OPTIONS{jobs}"
 
@@ -94,13 +94,6 @@ def _joined(share: Sequence[PipelineJob], name: str) -> PipelineJob:
 
 DEFAULT_TAGS = ("sil",)
 
-Seconds = Callable[[Sequence[Plan]], Mapping[str, float]]
-"""How long tests take, by slug, of those of which it is known."""
-
-
-def _unknown(_plans: Sequence[Plan]) -> Mapping[str, float]:
-    return {}
-
 
 @dataclass(frozen=True)
 class JobOptions:
@@ -111,8 +104,9 @@ class JobOptions:
 
     ``run_options`` are those of ``dodo run`` in each test, which a variable ``DODO_RUN_OPTIONS`` replaces. ``images``
     are those of the application that the parent has built, as lines ``DODO_IMAGE_<SERVICE>=<image>``. Where
-    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds``. Jobs have large files ``from_repository``,
-    as they check it out, or else from the artifact of the parent, which may have ``artifact_mb`` MB; 0 for any number.
+    ``most_jobs`` is not 0, tests share so many jobs, evenly by ``seconds`` of each slug, or else by their timeouts.
+    Jobs have large files ``from_repository``, as they check it out, or else from the artifact of the parent, which may
+    have ``artifact_mb`` MB; 0 for any number.
     """
 
     tags: tuple[str, ...] = DEFAULT_TAGS
@@ -120,7 +114,7 @@ class JobOptions:
     run_options: str = ""
     images: tuple[str, ...] = ()
     most_jobs: int = 0
-    seconds: Seconds = _unknown
+    seconds: Mapping[str, float] = field(default_factory=dict)
     services: tuple[str | Mapping[str, Any], ...] = ()
     before_script: str = ""
     artifacts_access: str = ""
@@ -134,39 +128,3 @@ class JobOptions:
 
 
 NO_OPTIONS = JobOptions()
-
-
-@dataclass(frozen=True)
-class CommonSettings:
-    """What jobs of tests have in common; those on rigs have ``tags`` of their own instead."""
-
-    tags: tuple[str, ...] = ()
-    image: str = ""
-    services: tuple[str | Mapping[str, Any], ...] = ()
-    before_script: str = ""
-
-
-NOTHING_COMMON = CommonSettings()
-
-
-def factored(jobs: Sequence[PipelineJob], options: JobOptions) -> tuple[CommonSettings, tuple[PipelineJob, ...]]:
-    """What the jobs have in common, and the jobs without it.
-
-    A job cannot be without an image, services or commands that it inherits, so these are common only to all jobs.
-    """
-    wanted = CommonSettings(options.tags, options.image, options.services, options.before_script)
-    shared = {
-        name: value
-        for name, value in vars(wanted).items()
-        if all(getattr(job, name) == value for job in jobs) or (name == "tags" and _are_replaced(jobs, options.tags))
-    }
-    kept = (
-        replace(job, **{name: type(value)() for name, value in shared.items() if getattr(job, name) == value})
-        for job in jobs
-    )
-    return CommonSettings(**shared), tuple(kept)
-
-
-def _are_replaced(jobs: Sequence[PipelineJob], tags: Sequence[str]) -> bool:
-    """Whether some jobs have the tags, and all others have tags instead."""
-    return any(job.tags == tags for job in jobs) and all(job.tags for job in jobs)

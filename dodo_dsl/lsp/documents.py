@@ -3,7 +3,6 @@
 YAML counts lines and columns, an editor lines and code units.
 """
 
-import bisect
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,54 +59,29 @@ def saved_text(path: Path) -> str:
         return ""
 
 
-_EDITOR_BREAK = re.compile(r"\r\n|[\n\r]")
-_YAML_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+_BREAK = re.compile(r"\r\n|[\n\r]")
 _BOM = "\ufeff"
 
 
 class Lines:
-    """The lines of a text. YAML breaks them at characters, too, at which editors do not."""
+    """The lines of a text, in which a span lies in the line where it begins, as far as the text has it."""
 
     def __init__(self, text: str, codec: PositionCodec) -> None:
-        self.text = text.removeprefix(_BOM)
+        self._lines = _BREAK.split(text.removeprefix(_BOM))
         self._codec = codec
-        self._starts = _starts(_EDITOR_BREAK, self.text)
-        self._yaml_starts = _starts(_YAML_BREAK, self.text)
 
     def range(self, span: Span) -> Range:
-        """The range of a span, as far as the text has it; it ends in the line in which it begins."""
-        start = self.offset(span.line, span.column)
-        end = min(start + span.length, self._end(bisect.bisect_right(self._starts, start) - 1))
-        return Range(self.position(start), self.position(max(start, end)))
+        number, line, start, end = self._place(span)
+        units = [self._codec.client_num_units(line[:index]) for index in (start, end)]
+        return Range(*(Position(number, unit) for unit in units))
 
-    def offset(self, line: int, column: int) -> int:
-        """The index in the text of a line and column that count from 1."""
-        if line > len(self._yaml_starts):
-            return len(self.text)
-        return min(self._yaml_starts[line - 1] + column - 1, len(self.text))
+    def text(self, span: Span) -> str:
+        _, line, start, end = self._place(span)
+        return line[start:end]
 
-    def position(self, offset: int) -> Position:
-        line = bisect.bisect_right(self._starts, offset) - 1
-        before = self.text[self._starts[line] : min(offset, self._end(line))]
-        return Position(line, self._codec.client_num_units(before))
-
-    def index(self, position: Position) -> int:
-        """The index in the text of an editor's position; that of the line's end where the line is shorter."""
-        if position.line >= len(self._starts):
-            return len(self.text)
-        start, end = self._starts[position.line], self._end(position.line)
-        units = 0
-        for index in range(start, end):
-            if units >= position.character:
-                return index
-            units += self._codec.client_num_units(self.text[index])
-        return end
-
-    def _end(self, line: int) -> int:
-        """The index of a line's break."""
-        next_start = self._starts[line + 1] if line + 1 < len(self._starts) else len(self.text)
-        return self._starts[line] + len(self.text[self._starts[line] : next_start].rstrip("\r\n"))
-
-
-def _starts(line_break: re.Pattern[str], text: str) -> list[int]:
-    return [0, *(found.end() for found in line_break.finditer(text))]
+    def _place(self, span: Span) -> tuple[int, str, int, int]:
+        """Number and text of the line, from 0, and between which characters of it the span is."""
+        number = min(span.line, len(self._lines)) - 1
+        line = self._lines[number]
+        start = min(span.column - 1, len(line)) if number == span.line - 1 else len(line)
+        return number, line, start, min(start + span.length, len(line))

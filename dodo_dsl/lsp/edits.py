@@ -20,7 +20,7 @@ def quick_fixes(
         place = lines.range(diagnostic.span)
         if diagnostic.fix is None or not _touch(place, wanted.range):
             continue
-        text = lines.text[lines.index(place.start) : lines.index(place.end)]
+        text = lines.text(diagnostic.span)
         mended = diagnostic.fix.mended(text)
         if mended == text:
             continue

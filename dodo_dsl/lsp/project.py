@@ -1,22 +1,18 @@
 """The tests around the open files: which belong together, and what is wrong with them.
 
-What the editor shows counts in place of what the files hold. What a change cannot affect is not checked again.
+What the editor shows counts in place of what the files hold.
 """
 
-import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from dodo_dsl.check import check, forget_files
-from dodo_dsl.check.resolve import resolve
-from dodo_dsl.compiler import Checked, CheckInputs, CheckResult, Sources, load, without_unsatisfied
+from dodo_dsl.check import forget_files
+from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.source import Node, Reader, parse_bytes, read
+from dodo_dsl.source import Node, parse_bytes, read
 from dodo_dsl.spec.deployment import FILE_NAME, find_deployment, load_deployment
-from dodo_dsl.spec.load import Loaded, load_spec
 from dodo_dsl.spec.manifest import load_manifests
-from dodo_dsl.spec.model import Spec
-from dodo_dsl.spec.registry import SUFFIX, Location
+from dodo_dsl.spec.registry import SUFFIX
 
 Parsed = tuple[Node | None, list[Diagnostic]]
 
@@ -44,54 +40,6 @@ class Texts:
         return known[1]
 
 
-class ChangedSources(Sources):
-    """Those of one project, which load and check again only what a change can affect."""
-
-    def __init__(self, start: Path, texts: Texts) -> None:
-        super().__init__(start, texts)
-        self._loaded: dict[Location, tuple[list[tuple[Path, Parsed]], Loaded]] = {}
-        self._inputs: CheckInputs | None = None
-        self._result = CheckResult()
-
-    def load(self, locations: Iterable[Location]) -> dict[Path, Loaded]:
-        """Loads again only where a file that specs were made of has changed."""
-        once = functools.cache(self.read)
-        return {location.path: self._load(location, once) for location in locations}
-
-    def _load(self, location: Location, reader: Reader) -> Loaded:
-        known = self._loaded.get(location)
-        if known and all(reader(path) is parsed for path, parsed in known[0]):
-            return known[1]
-        made_of: list[tuple[Path, Parsed]] = []
-
-        def recorded(path: Path) -> Parsed:
-            made_of.append((path, reader(path)))
-            return made_of[-1][1]
-
-        self._loaded[location] = made_of, load_spec(location, recorded)
-        return self._loaded[location][1]
-
-    def check(self, specs: Sequence[Spec], corners: Sequence[Spec], inputs: CheckInputs) -> CheckResult:
-        """Instances that are the very objects of the check before keep what it found.
-
-        A test is checked again, too, if another one took or gave up its name.
-        """
-        former = self._result if self._inputs == inputs else CheckResult()
-        known = {id(test.spec): test for test in former.tests}
-        new = [spec for spec in specs if id(spec) not in known]
-        paths = {spec.path for spec in new}
-        fresh = {id(test.spec): test for test in resolve((s for s in specs if s.path in paths), *inputs)}
-        tests = tuple(fresh.get(id(spec)) or known[id(spec)] for spec in specs)
-        here = {id(spec) for spec in specs}
-        gone = [test.spec for key, test in known.items() if key not in here]
-        names = {spec.name for spec in (*new, *gone)}
-        affected = {spec.path for spec in specs if spec.name in names} | paths | {spec.path for spec in gone}
-        at_ends = resolve((corner for corner in corners if corner.path in affected), *inputs)
-        again = {**former.problems, **check(tests, *inputs, at_ends, affected)}
-        self._inputs, self._result = inputs, CheckResult(tests, {spec.path: again[spec.path] for spec in specs})
-        return self._result
-
-
 def parse_text(text: str, path: Path) -> Parsed:
     """The document of an editor's text, with the limits of a file."""
     return parse_bytes(text.encode("utf-8", "surrogatepass"), str(path))
@@ -112,11 +60,10 @@ def is_ours(path: Path) -> bool:
 
 
 class Projects:
-    """The projects of the open tests and deployments; what a change cannot affect is not checked again."""
+    """The projects of the open tests and deployments."""
 
-    def __init__(self, texts: Texts | None = None) -> None:
-        self._texts = texts or Texts()
-        self._sources: dict[Path, ChangedSources] = {}
+    def __init__(self) -> None:
+        self._texts = Texts()
         self._is_outdated = False
 
     def forget(self) -> None:
@@ -127,7 +74,6 @@ class Projects:
         """The projects, checked with the texts that are shown, by resolved path."""
         if self._is_outdated:
             self._is_outdated = False
-            self._sources.clear()
             load_manifests.cache_clear()
             forget_files()
         self._texts.show(shown)
@@ -143,8 +89,7 @@ class Projects:
             registry = load_deployment(key, self._texts)[0].registry
             outside = [file for file in specs if not any(file.is_relative_to(folder) for folder in registry)]
             paths = [*registry, *outside] if outside else []
-        sources = self._sources.setdefault(key, ChangedSources(key.parent, self._texts))
-        return without_unsatisfied(load(paths, sources=sources), specs)
+        return without_unsatisfied(load(paths, start=key.parent, reader=self._texts), specs)
 
 
 def by_file(found: Iterable[Diagnostic]) -> Mapping[Path, list[Diagnostic]]:

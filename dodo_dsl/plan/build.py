@@ -138,6 +138,7 @@ class _Shared:
     folder: Path
     rewritten: Callable[[Setting], Application]
     subnets: addresses.Subnets
+    real: Callable[[Path], Path] = field(default_factory=lambda: functools.cache(Path.resolve))
 
     @functools.cached_property
     def imports(self) -> tuple[str, ...]:
@@ -301,17 +302,14 @@ class _Builder:
         return Flag(argument.parameter.name, value.text, value.kind)
 
     def _file_flag(self, parameter: Parameter, path: Path) -> Flag:
-        root = self.spec.location.root
-        found = needed(parameter, path, root)
+        real, found = self.shared.real, needed(parameter, path, self.spec.location.root)
         if isinstance(found, str):
             raise FilesError(found)
         self.files.update(itertools.starmap(FileCopy, found.items()))
         folder = path.parent if parameter.format == "map" and path.suffix == ".json" else path
-        is_around = self.application.folder.resolve().is_relative_to(folder.resolve())
-        self.named.update(
-            (path.resolve(), folder.resolve() / MAP) if is_around else (folder.resolve(), *found.values())
-        )
-        return Flag(parameter.name, path.relative_to(root.resolve()).as_posix(), "path")
+        is_around = real(self.application.folder).is_relative_to(real(folder))
+        self.named.update((real(path), real(folder) / MAP) if is_around else (real(folder), *found.values()))
+        return Flag(parameter.name, path.relative_to(real(self.spec.location.root)).as_posix(), "path")
 
 
 def _leaving_out(flag: Flag, messages: Sequence[str]) -> Flag:

@@ -22,8 +22,7 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike, Rect
 
-from dodo_dsl.opendlv.session import Session
-from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv import Session, SharedMemory, SharedMemoryError
 
 TYPES = {"yellow": 1, "blue": 2, "car": 3}
 HSV_RANGES = {"yellow": ((22, 150, 45), (36, 255, 255)), "blue": ((102, 124, 20), (130, 255, 255))}

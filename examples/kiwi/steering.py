@@ -16,8 +16,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv import Envelope, Session
 
 CAMERA_HEIGHT = 0.095  # m
 FOCAL = 0.5 / math.tan(math.radians(48.8) / 2)  # in heights of the image

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from view import view
 
-from dodo_dsl.opendlv.session import Session
-from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv import Session, SharedMemory, SharedMemoryError
 
 LIMIT = 0.290888  # rad
 PEDAL = 0.08

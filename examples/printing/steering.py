@@ -9,8 +9,7 @@ import argparse
 
 import numpy as np
 
-from dodo_dsl.opendlv.session import Session
-from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv import Session, SharedMemory, SharedMemoryError
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--cid", type=int, required=True)

@@ -11,8 +11,7 @@ import argparse
 import signal
 import sys
 
-from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv import Envelope, Session
 
 DISTANCE, VOLTAGE = "opendlv.proxy.DistanceReading", "opendlv.proxy.VoltageReading"
 FRONT, LEFT, RIGHT = 0, 1, 3  # sender stamps

@@ -15,8 +15,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from dodo_dsl.opendlv.session import Session
-from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
+from dodo_dsl.opendlv import Session, SharedMemory, SharedMemoryError
 
 WHITE = 200
 ROWS = (0.62, 0.75)  # of the frame's height, in which it looks for the lines

@@ -127,7 +127,7 @@ def compiled(
     (root / "dodo.yml").write_text(written({**_DEPLOYMENT, **rigs, **deployment}))
     forget_lines()
     out = root / "generated"
-    checked = compiler.load([root / "tests" / f"{way}.dodo.yml"], settings=settings, sources=compiler.Sources(root))
+    checked = compiler.load([root / "tests" / f"{way}.dodo.yml"], settings=settings, start=root)
     if not checked.ok:
         return Compiled(out / way, tuple(_told(checked.diagnostics, root)), {}, None)
     made = compiler.plan(checked, out)

@@ -13,7 +13,7 @@ from tests.check import examples
 def checked(example: str, folder: Path) -> Checked:
     """The tests of a folder with an example's files."""
     examples.write(example, folder)
-    return compiler.load([], sources=compiler.Sources(folder))
+    return compiler.load([], start=folder)
 
 
 def resolved(example: str, folder: Path) -> ResolvedTest:

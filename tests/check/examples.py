@@ -88,7 +88,7 @@ def problems(folder: Path) -> list[Diagnostic]:
 
 def compiled(folder: Path) -> tuple[list[Diagnostic], list[File]]:
     """The problems of the folder's tests and the compiled files, which are not written."""
-    checked = compiler.load([], sources=compiler.Sources(folder))
+    checked = compiler.load([], start=folder)
     if not checked.ok:
         return list(checked.diagnostics), []
     made = compiler.plan(checked, folder / "generated")

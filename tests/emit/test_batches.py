@@ -13,7 +13,7 @@ TESTS = st.lists(st.tuples(st.sampled_from(PLACES), st.floats(0, 600)), min_size
 
 
 def job(name: str, level: str = "sil", gated: bool = False, rig: str = "", minutes: int = 11) -> PipelineJob:
-    return PipelineJob(name, level, ("sil",), gated, rig, minutes, not rig, (name,), (f"out/{name}",))
+    return PipelineJob(name, level, gated, rig, minutes, (name,), (f"out/{name}",))
 
 
 @given(tests=TESTS, most=st.integers(1, 12))

@@ -20,7 +20,8 @@ from tests.emit.readers import ROOT, tree
 GOLDEN = Path(__file__).parent / "golden"
 WHOLE = ("sil-closed-straight", "hil-dynamic")
 """The tests whose compose files are compared as they are: a simulation in lockstep and a rig."""
-PLAN = "sil-closed-straight/test.json"
+PLAN = "sil-closed-straight/plan.yml"
+"""Its plan in few lines."""
 SUMMARY = "summary.yml"
 SEARCH = "search.gitlab-ci.yml"
 """A child pipeline that also searches its test."""
@@ -36,8 +37,9 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     first = {plan.spec: plan.slug for plan in reversed(made.compiled.suite.plans)}  # one instance of a matrix
     plans = [plan for plan in made.compiled.suite.plans if first[plan.spec] == plan.slug]
     written = {plan.slug: render_plan(plan, made.compiled.defaults) for plan in plans}
-    whole = [file for slug in WHOLE for file in written[slug]]
-    files = {f.path: f.text for f in whole if f.path == PLAN or not f.path.endswith("/test.json")}
+    whole = {file.path: file.text for slug in WHOLE for file in written[slug]}
+    files = {path: text for path, text in whole.items() if not path.endswith("/test.json")}
+    files[PLAN] = _plan(whole[f"{WHOLE[0]}/test.json"])
     files[CHILD] = made.pipeline.text
     summaries = {slug: _summary({Path(file.path).name: file.text for file in test}) for slug, test in written.items()}
     files[SUMMARY] = yaml.safe_dump(summaries, sort_keys=False, width=150)
@@ -51,6 +53,16 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
             (GOLDEN / path).write_text(text)
     golden = {p.relative_to(GOLDEN).as_posix(): p.read_text() for p in GOLDEN.rglob("*") if p.is_file()}
     assert files == golden
+
+
+def _plan(text: str) -> str:
+    """A plan without the application's compose file, which stands beside it, and with flags as words."""
+    plan = json.loads(text)
+    del plan["application"]["compose"]
+    for service in plan["services"]:
+        service["flags"] = [f"{flag['kind']} {flag['name']}={flag['value']}" for flag in service["flags"]]
+    plan["source_map"] = {key: ":".join(map(str, place.values())) for key, place in plan["source_map"].items()}
+    return yaml.safe_dump(plan, sort_keys=False, width=150, default_flow_style=None)
 
 
 def _summary(files: Mapping[str, str]) -> dict[str, object]:

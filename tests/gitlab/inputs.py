@@ -10,8 +10,8 @@ from typing import Any
 import yaml
 
 from dodo_dsl import package_data
-from dodo_dsl.cli.new_files import PIPELINES
-from dodo_dsl.cli.pipeline_rules import is_made, may_be_there
+from dodo_dsl.package_data import PIPELINES
+from tests.gitlab.rules import is_made, may_be_there
 
 TEMPLATES = [package_data.templates() / name / "template.yml" for name in PIPELINES]
 TYPES = {"string": str, "array": list, "boolean": bool, "number": (int, float)}

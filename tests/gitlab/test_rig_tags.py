@@ -59,8 +59,8 @@ def test_jobs_have_the_tag_of_their_rig_s_kind(
     found = plans(tmp_path, rigs, registry)
     made = pipeline(Suite(tuple(found.values())), "generated")
     jobs = {job.name: job for job in made.jobs}
-    assert [jobs[name].tags or made.common.tags for name in TESTS] == [*(tuple(tag.split()) for tag in tags), ("sil",)]
-    assert [(jobs[name].rig, jobs[name].interruptible) for name in TESTS[:3]] == [(one, not one) for one in groups]
+    assert [jobs[name].tags or made.options.tags for name in TESTS] == [*(tuple(tag.split()) for tag in tags), ("sil",)]
+    assert [(jobs[name].rig, not jobs[name].on_rig) for name in TESTS[:3]] == [(one, not one) for one in groups]
     assert tuple(name for name in TESTS if found[name].is_real) == real
     for name, tag, group in zip(TESTS, tags, groups, strict=False):
         plan = from_json(to_json(found[name]))

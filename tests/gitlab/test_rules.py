@@ -1,22 +1,19 @@
-"""Which of DoDo's jobs and of the team's are in which kind of pipeline: as a table for the documentation, and in files
-as teams write them, for each template, by lists that are kept beside them."""
+"""Which kinds of pipelines have DoDo's jobs: as a table for the documentation, and in files as teams write them."""
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
 
-from dodo_dsl.cli import pipeline_file
-from dodo_dsl.cli.pipeline_rules import KINDS
 from tests.gitlab.inputs import TEMPLATES, Config, included, jobs, listed, merged, specified
+from tests.gitlab.rules import KINDS
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/gitlab.md"
 BEGIN, END = "<!-- the table is written by tests/gitlab/test_rules.py -->\n\n", "\n\n<!-- end of the table -->"
 FOREIGN = {path.stem: path for path in sorted((Path(__file__).parent / "foreign").glob("*.yml"))}
-WORKFLOW = pipeline_file.read(FOREIGN["workflow"]).config["workflow"]
+WORKFLOW = yaml.safe_load(FOREIGN["workflow"].read_text())["workflow"]
 COLUMNS: dict[str, tuple[str, Config]] = {
     "`joined`": ("joined", {}),
     "`joined`, and a [workflow](#one-pipeline-for-both)": ("joined", {"workflow": WORKFLOW}),
@@ -88,68 +85,31 @@ def test_rules_of_the_team_s_own_are_those_of_all_jobs() -> None:
 
 @functools.cache
 def foreign(name: str) -> tuple[Config, Config]:
-    """A file of a team's as DoDo reads it, and the inputs with which it includes a template."""
-    path = FOREIGN[name]
-    first = path.read_text().splitlines()[0]
-    inputs = yaml.safe_load(first.removeprefix("# inputs: "))
-    return pipeline_file.read(path).config, {key.replace("-", "_"): value for key, value in inputs.items()}
+    """A file of a team's without what it includes, and the inputs with which it includes a template."""
+    text = FOREIGN[name].read_text()
+    inputs = yaml.safe_load(text.splitlines()[0].removeprefix("# inputs: "))
+    config = {key: value for key, value in yaml.safe_load(text).items() if key != "include"}
+    return config, {key.replace("-", "_"): value for key, value in inputs.items()}
 
 
-def around(template: Path, name: str) -> Config:
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_part_of_the_jobs_is_in_no_pipeline_of_a_team(name: str) -> None:
+    """Else it would test nothing, and be green."""
     config, inputs = foreign(name)
-    return merged(included(template, **inputs), config)
-
-
-def lists(name: str) -> Iterator[str]:
-    """A line for each kind of pipeline: the team's jobs, and the templates whose jobs are all beside them."""
-    configs = {template: around(template, name) for template in TEMPLATES}
-    mine = {template: jobs(included(template)).keys() - {"dodo-deployment"} for template in TEMPLATES}
-    for kind, variables in KINDS.items():
-        there = {template: listed(config, variables) for template, config in configs.items()}
-        (team,) = {frozenset(there[template] - mine[template]) for template in TEMPLATES}
-        tested = [template for template in TEMPLATES if there[template] & mine[template]]
-        assert all(mine[template] <= there[template] for template in tested), "a part would test nothing, and be green"
-        yield f"{kind}: {' '.join(sorted(team)) or '-'} + {' '.join(t.parent.name for t in tested) or '-'}"
-
-
-@pytest.mark.parametrize("name", FOREIGN)
-def test_each_kind_of_pipeline_has_its_jobs(name: str, update_goldens: bool) -> None:
-    golden, text = FOREIGN[name].with_suffix(".txt"), "\n".join(lists(name)) + "\n"
-    if update_goldens:
-        golden.write_text(text)
-    assert golden.read_text() == text
-
-
-@pytest.mark.parametrize("name", FOREIGN)
-def test_no_merge_request_has_a_pipeline_of_one_side_alone(name: str, tmp_path: Path) -> None:
-    """With the inputs that the file names; and where they are others, --check says so."""
+    chosen = inputs.get("rules", "joined")
     for template in TEMPLATES:
-        config, mine = around(template, name), jobs(included(template)).keys()
-        there = listed(config, KINDS["merge request"])
-        assert bool(there & mine) == bool(there - mine)
-    _, inputs = foreign(name)
-    wanted = inputs.get("rules", "joined")
-    said = {rules: problems(name, tmp_path, {**inputs, "rules": rules}) for rules in ("joined", "merge-requests")}
-    assert said[wanted] == []
-    other = "joined" if wanted == "merge-requests" else "merge-requests"
-    by_workflow = "workflow" in foreign(name)[0]
-    assert [problem.rule for problem in said[other]] == ([] if by_workflow else ["pipeline-jobs"])
-
-
-def problems(name: str, folder: Path, inputs: dict[str, Any]) -> list[Any]:
-    given = {key.replace("_", "-"): value for key, value in inputs.items()}
-    entry = {"local": ".gitlab/dodo/run.gitlab-ci.yml", "inputs": given}
-    text = FOREIGN[name].read_text().replace("include:\n", "")
-    text = text.replace("  - template: Workflows/MergeRequest-Pipelines.gitlab-ci.yml\n", "")
-    (folder / ".gitlab-ci.yml").write_text(f"{yaml.safe_dump({'include': [entry]})}{text}")
-    return pipeline_file.problems(folder)
+        mine = jobs(included(template)).keys() - {"dodo-deployment"}
+        around = {key: value for key, value in config.items() if key == "workflow"}
+        for variables in KINDS.values():
+            there = listed(merged(included(template, rules=chosen), around), variables)
+            assert not there & mine or mine <= there
 
 
 @pytest.mark.thorough
 def test_gitlab_accepts_them(tmp_path: Path, accepted: Callable[..., None]) -> None:
     for name in FOREIGN:
         for template in TEMPLATES:
-            config = around(template, name)
+            config = merged(included(template, **foreign(name)[1]), foreign(name)[0])
             whole = {key: value for key, value in config.items() if key in ("workflow", "stages", "default")}
             text = yaml.safe_dump({**whole, **jobs(config)})
             (tmp_path / f"{name}.{template.parent.name}.yml").write_text(text)

@@ -15,9 +15,9 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.cli.main import main
-from dodo_dsl.cli.pipeline_rules import KINDS
 from tests.emit.readers import pipeline
 from tests.gitlab.inputs import TEMPLATES, Refused, included, jobs, listed, merged, specified
+from tests.gitlab.rules import KINDS
 
 APPLICATION, DEPLOYMENT, RUN = TEMPLATES
 TRIGGERS = {"allow_failure", "extends", "inherit", "interruptible", "needs", "rules", "stage", "trigger", "variables"}

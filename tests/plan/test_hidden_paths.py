@@ -38,9 +38,7 @@ def compiled(root: Path, spec: str, application: str, deployment: str = "") -> c
     for name, text in files.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
-    return compiler.plan(
-        compiler.load([root / spec], [root / application], sources=compiler.Sources(root)), root / "generated"
-    )
+    return compiler.plan(compiler.load([root / spec], [root / application], start=root), root / "generated")
 
 
 NAMED = ("maps/plain", "sil-a/sil-a.dodo.yml", "truths/a.json", "truths/b.json")

@@ -76,9 +76,9 @@ def tests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ResolvedTest]:
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
             assert run("new", "--application", *words)[0] == 0
-            (found[name],) = compiler.load([], sources=compiler.Sources(folder)).tests
+            (found[name],) = compiler.load([], start=folder).tests
     for example in ("wheels", "ranges"):
-        (test,) = compiler.load([], sources=compiler.Sources(package_data.root() / "examples" / example)).tests
+        (test,) = compiler.load([], start=package_data.root() / "examples" / example).tests
         found[test.spec.slug] = test
     return found
 

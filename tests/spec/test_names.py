@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.compiler import Sources, load
+from dodo_dsl.compiler import load
 from dodo_dsl.source import resolve
 from dodo_dsl.spec.registry import KEYWORDS, is_free, near
 from tests.check import examples
@@ -39,7 +39,7 @@ def test_a_test_has_a_good_name_when_it_does_what_the_hint_says(tmp_path: Path, 
 def _hint(path: Path, text: str, name: str) -> str:
     """What is told to write as the name of a test of this name in this file; empty where nothing is wrong."""
     path.write_text(text.replace("name: example", f"name: {name}", 1))
-    found = [d for d in load([path], sources=Sources(path.parent)).diagnostics if d.rule in NAMING and d.span.line <= 2]
+    found = [d for d in load([path], start=path.parent).diagnostics if d.rule in NAMING and d.span.line <= 2]
     path.unlink()
     assert len(found) <= 1, found
     return found[0].hint if found else ""

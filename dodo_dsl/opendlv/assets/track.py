@@ -161,7 +161,7 @@ THIN = 1e-6
 def _free_ground(track: Track, pose: VehiclePose, box: VehicleBox) -> tuple[shapely.Geometry, shapely.Geometry]:
     """Where the centre may be, half the vehicle's width from walls: with a way around all of the map, and without."""
     known = [outline(pose, box), *track.walls.values(), *track.goal.values(), *(lines for _, lines in track.gates)]
-    hull = shapely.convex_hull(shapely.union_all(known))
+    hull = shapely.convex_hull(shapely.geometrycollections(known))
     reach = min(box.length, box.width) / 2
     if reach not in track.reaches:
         parts = shapely.get_parts([*track.walls.values()])

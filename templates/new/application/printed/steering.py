@@ -2,7 +2,7 @@ import argparse
 
 import numpy as np
 
-from dodo_dsl.opendlv.shared_memory import SharedMemory
+from dodo_dsl.opendlv import SharedMemory
 
 WIDTH, HEIGHT = 640, 480
 parser = argparse.ArgumentParser()

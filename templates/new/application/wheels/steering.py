@@ -1,6 +1,6 @@
 import argparse
 
-from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv import Session
 
 FRONT, LEFT, RIGHT = 0, 1, 3  # sender stamps of the range sensors, which look ahead, and ahead to the left and right
 PEDAL, GAIN, STOP = 0.4, 0.4, 0.2  # GAIN in pedal per m, STOP in m
