@@ -109,7 +109,8 @@ class Failure:
         """The line that is not as meant: where a key was expected, or above an unexpected colon; -1 for none."""
         if self.kind == "key" and self.begin:
             return self.begin[0]
-        return self.above(self.mark[0]) if self.kind == "colon" and ": " not in self.before else -1
+        is_above = self.kind == "mapping" or (self.kind == "colon" and ": " not in self.before)
+        return self.above(self.mark[0]) if is_above else -1
 
     @functools.cached_property
     def tokens(self) -> list[Any]:
@@ -295,6 +296,8 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
              "write the list in brackets, or each item into its own line"),
     _Pattern("mapping sequence other", "mark", r".*\0(?P<at>[]}]).*",
              "'{at}' closes nothing", "remove it: there is one bracket too many"),
+    _Pattern("mapping", "suspect", r"\s*(?P<at>\*[\w.-]+)\s*",
+             "'{at}' stands among keys, expected a key before it", "write '<<: {at}'", "<<: {at}"),
     _between_levels,
     _open_bracket,
     _Pattern("flow", "mark", r".*\0(?P<at>[]}]).*", "'{at}' closes what '{opening}' opened", "write '{closing}'"),

@@ -12,6 +12,10 @@ SLIPS: dict[str, tuple[dict[int, str | None], str]] = {
         },
         "14:13 yaml-syntax",
     ),
+    "alias-bare": (
+        {11: "  vehicle: &rate", 12: "    uses: dynamic-model", 15: "  pose:\n    *rate\n    with: {freq: 100 Hz}"},
+        "16:5 yaml-syntax",
+    ),
     "alias-star-behind": ({20: "      goal: *finish*"}, "20:13 yaml-syntax"),
     "block-above-brace-too-many": (
         {
