@@ -30,7 +30,7 @@ help:
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
-	@echo "make schema   put what manifests say into the schema that editors read"
+	@echo "make schema   make the schemas that follow from manifests and from the classes of results"
 	@echo "make site     build the documentation and a report to look at as a site, into build/site"
 	@echo "make release  check the version and the changelog, build wheel and sdist twice, into build/release"
 	@echo "make clean    remove what was built"

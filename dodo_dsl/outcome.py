@@ -1,57 +1,79 @@
-"""What became of a test, and how far its checks are from their limits."""
+"""What became of a test, and how far its checks are from their limits.
+
+``schemas/results.schema.json`` is made of these classes: of a field's type, and of the text below it.
+"""
 
 import math
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, NotRequired, TypedDict, cast
 
-from dodo_dsl.spec.model import Goal
+from msgspec import Meta
+
+from dodo_dsl.spec.model import KINDS, LAYERS, LEVELS, STEPPED_CLOCKS, Goal
 
 Result = Literal["passed", "failed", "error"]
+Amount = Annotated[float, Meta(ge=0)]
+Count = Annotated[int, Meta(ge=0)]
+Measured = Amount | None
+Share = Annotated[float, Meta(ge=0, le=1)]
 ON_EMULATED = "on an emulated rig: no hardware took part"
 NEXT_REPORT = ".next-"
 """How the name of a folder inside a report's begins in which the next report is written."""
 
 
+def one_of(*words: str) -> Meta:
+    """Of a text that is one of these words."""
+    return Meta(pattern=f"^({'|'.join(words)})$", extra_json_schema={"enum": list(words)})
+
+
+Level = Annotated[str, one_of(*LEVELS)]
+
+
 @dataclass(frozen=True)
 class Wait:
-    """What some services of a test ran on processors together, and how long one of them waited for one; times in s.
+    """What some services of a test ran on processors together, and how long one of them waited for one."""
 
-    ``longest`` is the service that waited the longest; ``displaced_s`` is the part of its wait in which the machine was
-    full and others than the application took most of it.
-    """
-
-    ran_s: float
-    waited_s: float
-    displaced_s: float
+    ran_s: Amount
+    """Seconds on processors, of all services and threads together."""
+    waited_s: Amount
+    """Seconds for which the busiest thread of the service in 'longest' was ready to run and got no processor."""
+    displaced_s: Amount
+    """The part of 'waited_s' in which the machine was full and others than the application took most of it."""
     longest: str
+    """The service that waited the longest; empty when there is none."""
 
 
 @dataclass(frozen=True)
 class MachineLoad:
-    """How busy the machine was during a test in real time; times in s, None for what was not measured."""
+    """How busy the machine was during a test in real time."""
 
-    duration_s: float
-    cores: int | None = None
+    duration_s: Amount
+    """Seconds over which the machine was measured: the test's, without set-up."""
+    cores: Count | None = None
+    """Cores that the test could use; null when the load was not measured."""
     application: Wait | None = None
+    """What the application's services ran and waited; null when that was not measured."""
     services: Wait | None = None
-    """DoDo's own, of the same test."""
-    others_share: float | None = None
-    """Share of the cores that others than this test took."""
-    crowded_s: float | None = None
-    """For how long the machine was full, and others than the application took most of it."""
-    late_pictures_share: float = 0.0
+    """What DoDo's services of this test ran and waited; null when that was not measured."""
+    others_share: Measured = None
+    """Share of the cores that others than this test took, 0 to 1; null when that was not measured."""
+    crowded_s: Measured = None
+    """Seconds in which the machine was full and others than the application took most of it; null when that was not
+    measured."""
+    late_pictures_share: Share = 0.0
     """Share of the pictures that came later than half a period."""
-    late_updates_share: float = 0.0
-    """Share of the updates of any other of DoDo's services, the one with the largest."""
-    lateness_s: float = 0.0
-    """How late an update of DoDo's services ended, at worst."""
-    paused_s: float = 0.0
+    late_updates_share: Share = 0.0
+    """Share of the other updates of DoDo's services that ended later than half a period, of the service with the
+    largest."""
+    lateness_s: Amount = 0.0
+    """How late an update of DoDo's services ended, at worst; 0 when none was later than half its period."""
+    paused_s: Amount = 0.0
     """For how long the emulated rig stood still, because it could not keep real time."""
     undecided: bool = False
-    """Whether a test that failed is in error, as the machine was too busy."""
+    """Whether the test is in error because the machine was too busy to judge a failure."""
 
 
 SLOW_ANSWERS = "slow-answers"
@@ -73,36 +95,44 @@ SAMPLE_TIMES = "uncopied-sample-times"
 
 @dataclass(frozen=True)
 class Response:
-    """How long the application took for an answer in lockstep, without the first; times in s.
+    """How long the application took for an answer in lockstep."""
 
-    The time is the wall time less what the application waited for a processor. ``processor_*`` is the processor time,
-    None if the application's processes cannot be seen from the test's services. ``slow`` counts answers that took
-    longer than the period of the frames, ``over`` those beyond the limit of the test, None without one, ``uncopied``
-    those that did not carry the sample time of their frame. ``surplus`` counts answers beyond the one that counts for
-    a frame, ``surplus_frames`` the frames with any, and ``differing`` those of them that say something else. In
-    ``unasked`` of the ``pauses``, in which no frame is shown, the application went on sending, by its own clock.
-    """
-
-    answers: int
-    period_s: float
-    median_s: float
-    p95_s: float
-    worst_s: float
-    processor_median_s: float | None
-    processor_p95_s: float | None
-    processor_worst_s: float | None
-    slow: int
-    over: int | None
+    answers: Annotated[int, Meta(ge=1)]
+    """Answers that were measured: all but the first."""
+    period_s: Amount
+    """Period of the frames in seconds of test time."""
+    median_s: Amount
+    """Time of an answer in seconds: the wall time less what the application waited for a processor."""
+    p95_s: Amount
+    """95 % of the answers took at most this."""
+    worst_s: Amount
+    """The longest time of an answer."""
+    processor_median_s: Measured
+    """Processor time of an answer in seconds, over all processes of the application; null if they cannot be seen."""
+    processor_p95_s: Measured
+    """95 % of the answers took at most this processor time."""
+    processor_worst_s: Measured
+    """The longest processor time of an answer."""
+    slow: Count
+    """Answers that took longer than the period of the frames."""
+    over: Count | None
+    """Answers that took longer than the test allows; null where it sets no limit."""
     processor: str
-    """The processor by its name, with its clock."""
-    uncopied: int = 0
-    worst_frame: int = 0
+    """The processor of this machine."""
+    uncopied: Count = 0
+    """Answers that did not carry the sample time of their frame."""
+    worst_frame: Count = 0
     """The number of the frame whose answer took the longest, from 1 on; 0 if that is not known."""
-    surplus: int = 0
-    surplus_frames: int = 0
-    differing: int = 0
-    pauses: int = 0
-    unasked: int = 0
+    surplus: Count = 0
+    """Answers beyond the one that counts for each frame."""
+    surplus_frames: Count = 0
+    """Frames with such answers."""
+    differing: Count = 0
+    """Surplus answers that say something else than the one that counts for their frame."""
+    pauses: Count = 0
+    """Pauses of the clock in which no frame was shown, to see whether the application waits."""
+    unasked: Count = 0
+    """Pauses in which the application went on sending, by its own clock."""
 
     def in_words(self) -> str:
         """The times in a sentence, with the processor that they were measured on."""
@@ -117,19 +147,21 @@ def _ms(seconds: float) -> str:
 
 @dataclass(frozen=True)
 class ServiceUse:
-    """What a service of the application used from the start of the test to its end, with all its processes.
-
-    ``processor_share`` is its processor time by the test's own time, 1 for one processor all the time.
-    ``memory_growth_bytes_per_s`` is that of the second half of the test, by the test's own time, 0 if it does not
-    grow steadily, None if the test was too short to measure. ``memory_limit_bytes`` is None if there is none.
-    """
+    """What a service of the application used from the start of the test to its end."""
 
     service: str
-    processor_s: float
-    processor_share: float | None
-    peak_memory_bytes: int
-    memory_growth_bytes_per_s: float | None
-    memory_limit_bytes: int | None
+    """The service of the application, with all its processes."""
+    processor_s: Amount
+    """Processor time in seconds, also of processes that have ended."""
+    processor_share: Measured
+    """Processor time by the test's own time: 1 is one processor all the time; null where the test had no time."""
+    peak_memory_bytes: Count
+    """The most memory that was seen, without programs and files that are only read."""
+    memory_growth_bytes_per_s: Measured
+    """How fast memory grew over the second half of the test, in bytes by a second of the test's own time; 0 if it did
+    not grow steadily, null where the test was too short to measure."""
+    memory_limit_bytes: Annotated[int, Meta(ge=1)] | None
+    """The memory that the service may use before it is ended; null if there is no limit."""
 
     def in_words(self) -> str:
         """The figures in a line."""
@@ -147,50 +179,142 @@ def megabytes(size: float) -> str:
     return f"{number:,.0f} MB" if number >= 100 or not number else f"{number:.3g} MB"
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a test; times in seconds, None if the test did not get so far."""
+class EndedService(TypedDict):
+    """A service of a test, and how it ended."""
 
     name: str
-    slug: str
-    spec: str
-    level: str
-    kind: str
-    outcome: Result
+    """Name in the test."""
+    layer: Annotated[str, one_of(*LAYERS, "application")]
+    """Layer of the service."""
+    uses: str | None
+    """Service of DoDo or of the deployment; null for the application's."""
+    exit_code: int | None
+    """Null when it ran until the end."""
+
+
+class Limit(TypedDict):
+    """Of a check's value."""
+
+    min: NotRequired[int | float]
+    """Smallest value that passes, unless 'exclusive' is true."""
+    max: NotRequired[int | float]
+    """Largest value that passes, unless 'exclusive' is true."""
+
+
+class Check(TypedDict):
+    """A measurement of an evaluator."""
+
+    name: str
+    """What was measured."""
+    value: int | float | None
+    """The value; null when nothing could be measured."""
+    limit: NotRequired[Limit]
+    """The limits; a value without limits is only reported."""
+    unit: NotRequired[str]
+    """Unit of value and limits; empty for a bare number."""
+    ok: bool
+    """Whether the value is within its limits."""
+    exclusive: NotRequired[bool]
+    """Whether a value at a limit fails, as of a distance that has to be more than 0; false by default."""
+    margin: NotRequired[int | float | None]
+    """Distance of the value to its nearest limit in the check's unit: 0 at the limit, negative beyond it; null without
+    a value or a limit."""
+    margin_share: NotRequired[Annotated[float, Meta(ge=-1, le=1)] | None]
+    """The margin as margin / (abs(margin) + size), with the limit's size, or half the range between both limits, or 1
+    where the limit is 0; negative exactly where the check fails, -1 where it fails at its limit, and null without a
+    value or a limit."""
+
+
+_Key = Annotated[str, Meta(pattern="^[a-z][a-z0-9-]{0,39}$")]
+_Datum = int | float | Annotated[str, Meta(max_length=200)] | None
+Evidence = Annotated[dict[_Key, _Datum], Meta(max_length=20)]
+
+
+class Verdict(TypedDict):
+    """What an evaluator found."""
+
+    evaluator: str
+    """Name in the test."""
+    outcome: Annotated[str, one_of("passed", "failed")]
+    """What this evaluator found."""
     reason: str
-    cid: int
-    seed: int
-    clock: str
-    backend: str
-    setup_s: float | None = None
-    execution_s: float | None = None
-    sim_s: float | None = None
-    services: tuple[dict[str, Any], ...] = ()
-    checks: tuple[dict[str, Any], ...] = ()
-    verdicts: tuple[dict[str, Any], ...] = ()
-    """Of each evaluator: its name, outcome, reason, and ``evidence``, the data of its decision."""
+    """One sentence."""
+    evidence: Evidence
+    """The data of the decision: 'time' in seconds of the test, and what the evaluator saw then and where."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a test."""
+
+    name: str
+    """Name of the instance."""
+    slug: str
+    """The name in folders and jobs."""
+    spec: str
+    """The spec's file, relative to its repository, or else to its registry."""
+    level: Level
+    """Software, data or hardware in the loop: the world is simulated, recorded or real."""
+    kind: Annotated[str, one_of(*KINDS)]
+    """What was judged: detections, a signal, or driving."""
+    outcome: Result
+    """failed: the application is to blame; error: the test gave no answer about it."""
+    reason: str
+    """One sentence."""
+    cid: Annotated[int, Meta(ge=1, le=254)]
+    """CID of the test's bus."""
+    seed: Count
+    """Seed of everything random in the test."""
+    clock: Annotated[str, one_of("realtime", *STEPPED_CLOCKS)]
+    """Clock of the test."""
+    backend: Annotated[str, one_of("process", "docker", "mixed")]
+    """How services were started."""
+    setup_s: Measured = None
+    """From start until all services were ready."""
+    execution_s: Measured = None
+    """From ready to the end."""
+    sim_s: Measured = None
+    """Test time in lockstep, null in real time."""
+    services: tuple[EndedService, ...] = ()
+    """All services of the test, including the application's."""
+    checks: tuple[Check, ...] = ()
+    """Measurements of the evaluators, with their limits."""
+    verdicts: tuple[Verdict, ...] = ()
+    """The verdict of each evaluator."""
     last_lines: tuple[str, ...] = ()
+    """Last lines of the decisive service."""
     notes: tuple[str, ...] = ()
+    """Further notes on the test, such as messages that the recorder lost."""
     description: str = ""
+    """What the application must achieve."""
     machine: MachineLoad | None = None
+    """How busy the machine was during a test in real time; null in lockstep."""
     response: Response | None = None
+    """How long the application took for its answers in lockstep; null in real time, or without a second answer."""
     resources: tuple[ServiceUse, ...] = ()
-    """Of the application's services; empty if nothing was measured."""
+    """What each service of the application used from the start of the test to its end; empty if nothing was
+    measured."""
     goals: tuple[Goal, ...] = ()
+    """The soft goals of the test, for dodo rank."""
 
 
 @dataclass(frozen=True)
 class NotRun:
-    """A test of a run that never began, and why in words; it has no outcome."""
+    """A test of a run that never began; it has no outcome."""
 
     name: str
+    """Name of the instance."""
     slug: str
+    """The name in folders and jobs."""
     spec: str
-    level: str
+    """The spec's file, relative to its repository, or else to its registry."""
+    level: Level
+    """Software, data or hardware in the loop: the world is simulated, recorded or real."""
     reason: str
+    """Why it never began."""
 
 
-def with_margin(check: Mapping[str, Any]) -> dict[str, Any]:
+def with_margin(check: Mapping[str, Any]) -> Check:
     """A check with its ``margin`` and ``margin_share``, None if it has no value or no limit.
 
     ``margin`` is the distance of the value to its nearest limit in the check's unit, negative beyond the limit.
@@ -199,7 +323,7 @@ def with_margin(check: Mapping[str, Any]) -> dict[str, Any]:
     with ``ok``: a check that holds has no negative share, and one that fails at its limit or within has -1, as a wall
     that is touched.
     """
-    return {**check, "margin": (margin := _margin(check)), "margin_share": _share(check, margin)}
+    return cast(Check, {**check, "margin": (margin := _margin(check)), "margin_share": _share(check, margin)})
 
 
 def worst_margin(outcome: Outcome) -> float | None:

@@ -109,7 +109,8 @@ class Failure:
         """The line that is not as meant: where a key was expected, or above an unexpected colon; -1 for none."""
         if self.kind == "key" and self.begin:
             return self.begin[0]
-        return self.above(self.mark[0]) if self.kind == "colon" and ": " not in self.before else -1
+        is_above = self.kind == "mapping" or (self.kind == "colon" and ": " not in self.before)
+        return self.above(self.mark[0]) if is_above else -1
 
     @functools.cached_property
     def tokens(self) -> list[Any]:
@@ -271,7 +272,7 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _foreign_blank,
     _open_quote,
     _Pattern("mapping flow sequence other", "mark", r".*[\"']\s*(?P<at>\0)[^\s,\]}:].*",
-             "text stands behind the closing quotation mark", "put the whole text in quotes"),
+             "text stands behind the closing quotation mark", "put the whole text in quotes of the other kind"),
     _Pattern("escape", "mark", r".*(?P<at>\0)(?P<sign>..?).*", "'{sign}' means nothing within double quotes",
              "write the text in single quotes, where a backslash is a backslash"),
     _Pattern(_SUSPECTS, "suspect", r" *(?P<at>-)(?P<value>[^-\s].*)",
@@ -282,7 +283,9 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _Pattern("colon", "mark", r"\s*(?:- )?(?P<key>[^:]*): .*(?P<at>\0).*",
              "a second colon in the value of '{key}', which must be one string",
              "put the text in quotes, or write a mapping in braces or into the next lines"),
-    _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}[\s=;]+(?P<value>\S.*)",
+    _Pattern(_SUSPECTS, "suspect", rf"\s*(?:- )?{_NAME}(?P<at>[;\uff1a])\s*(?P<value>\S.*)",
+             "'{at}' stands after '{key}', expected a colon", _WRITE, ": "),
+    _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}[\s=]+(?P<value>\S.*)",
              "a colon is missing after '{key}'", _WRITE + ", or indent the line if it goes on with the text above"),
     _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}\s*", "a colon is missing after '{key}'",
              "write '{key}:', or indent the line if it goes on with the text above"),
@@ -293,6 +296,8 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
              "write the list in brackets, or each item into its own line"),
     _Pattern("mapping sequence other", "mark", r".*\0(?P<at>[]}]).*",
              "'{at}' closes nothing", "remove it: there is one bracket too many"),
+    _Pattern("mapping", "suspect", r"\s*(?P<at>\*[\w.-]+)\s*",
+             "'{at}' stands among keys, expected a key before it", "write '<<: {at}'", "<<: {at}"),
     _between_levels,
     _open_bracket,
     _Pattern("flow", "mark", r".*\0(?P<at>[]}]).*", "'{at}' closes what '{opening}' opened", "write '{closing}'"),

@@ -13,7 +13,7 @@ from dodo_dsl.cli import display, selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.compiler import Checked, load, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, shown_path
-from dodo_dsl.spec.manifest import Manifest, Parameter, in_words
+from dodo_dsl.spec.manifest import Manifest, in_words
 from dodo_dsl.spec.model import LEVEL_WORDS, Spec
 from dodo_dsl.terminal import clipped, json_text, printable, width_of
 
@@ -103,7 +103,8 @@ def _explain(checked: Checked, name: str, stdout: TextIO) -> int:
             others = [*["another service of the test"] * bool(parameter.shared), *["the rig"] * bool(parameter.rig)]
             facts += f", required unless {' or '.join(others)} provides it" if others else ", required"
         unit = parameter.unit.replace("1", "")  # of a share, nothing is written
-        notes = (_bounds(parameter), in_words(parameter.when) if parameter.when else "")
+        choices = f"one of {', '.join(parameter.choices)}" if parameter.choices else ""
+        notes = (choices or parameter.bounds, in_words(parameter.when) if parameter.when else "")
         bounds = "".join(f"; {text}" for text in notes if text)
         lines += [f"  {parameter.name}: {facts} {unit}".rstrip() + bounds, f"      {parameter.help}"]
     for title, ports in (("messages", manifest.messages), ("shared memory", manifest.memory)):
@@ -132,16 +133,6 @@ def _found_by(manifest: Manifest) -> str:
     if not manifest.folder.is_relative_to(package_data.services()):
         folders.append(manifest.folder.resolve().parents[1])
     return f"PYTHONPATH={shlex.quote(os.pathsep.join(map(str, folders)))} " if folders else ""
-
-
-def _bounds(parameter: Parameter) -> str:
-    """What values it may have."""
-    if parameter.choices:
-        return f"one of {', '.join(parameter.choices)}"
-    low, high = parameter.minimum, parameter.maximum
-    if low is not None and high is not None:
-        return f"{low:.10g} to {high:.10g}"
-    return f"at least {low:.10g}" if low is not None else f"at most {high:.10g}" if high is not None else ""
 
 
 def _write_levels(specs: Sequence[Spec], unfolded: bool, stdout: TextIO, width: int | None) -> None:

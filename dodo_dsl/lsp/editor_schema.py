@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.source import plain, read
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import Manifest, Parameter, in_words, load_manifests
 
@@ -34,17 +33,11 @@ def schema_path() -> Path:
 def generate(text: str, manifests: Mapping[str, Manifest]) -> str:
     """The text of the schema with these services and their parameters."""
     schema = json.loads(text)
-    offered = [m for _, m in sorted(manifests.items()) if is_offered(m)]
+    offered = [m for _, m in sorted(manifests.items()) if not m.automatic]
     definitions = {k: v for k, v in schema["$defs"].items() if not k.startswith(PREFIX)}
     definitions["use"]["allOf"] = [_uses(offered), *map(_when, offered)]
     schema["$defs"] = {**definitions, **{PREFIX + m.name: _with(m) for m in offered}}
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
-
-
-def is_offered(manifest: Manifest) -> bool:
-    """Whether specs use the service, as DoDo does not add it by itself."""
-    node, _ = read(manifest.folder / "service.yml")
-    return node is not None and not plain(node).get("automatic", False)
 
 
 def _uses(manifests: Iterable[Manifest]) -> Schema:
@@ -86,12 +79,8 @@ def _parameter(parameter: Parameter) -> Schema:
 def description(parameter: Parameter) -> str:
     """What a parameter is for, its range, and who else may give it."""
     facts = [parameter.help]
-    low, high = parameter.minimum, parameter.maximum
-    unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
-    if low is not None and high is not None:
-        facts.append(f"From {low} to {high}{unit}.")
-    elif low is not None or high is not None:
-        facts.append(f"At {'most' if low is None else 'least'} {high if low is None else low}{unit}.")
+    if bounds := parameter.bounds:
+        facts.append(f"A{bounds[1:]}." if bounds.startswith("at") else f"From {bounds}.")
     if parameter.required and not parameter.rig and not parameter.shared:
         facts.append("Required.")
     if parameter.when:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import numbers, regular_file
 from dodo_dsl.opendlv.assets import truth_file
+from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.picture_size import problem_of
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def boxes(path: Path) -> list[tuple[str, truth_file.Area]]:
     """The classes and boxes of a COCO file of one frame, as fractions of it; raises TruthError."""
     try:
         (found,) = truth_file.read(path, "one").values()
-    except truth_file.TruthFileError as error:
+    except InputError as error:
         raise TruthError(str(error)) from None
     return found
 

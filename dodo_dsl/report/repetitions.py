@@ -19,10 +19,12 @@ _MOST_SHOWN, _MAX_SHOWN = 4, 100
 
 @dataclass(frozen=True)
 class Difference:
-    """What is not the same in all runs, and what it is in each, in their order."""
+    """What is not the same in all runs."""
 
     name: str
+    """A check, or outcome, reason, test time or path, a hash of where the vehicle was."""
     values: tuple[str, ...]
+    """The value of each run, in their order."""
 
     def in_words(self) -> str:
         """Each value with its runs, counted from 1; the last of many are left out."""
@@ -39,11 +41,14 @@ class Difference:
 
 @dataclass(frozen=True)
 class Repeated:
-    """The ``runs`` of a ``test`` in lockstep by their slugs, and what differs among them."""
+    """The runs of a test in lockstep."""
 
     test: str
+    """The slug of the test."""
     runs: tuple[str, ...]
+    """The slugs of its runs."""
     differing: tuple[Difference, ...] = ()
+    """What is not the same in all runs; empty where all are the same."""
 
     def lines(self) -> Iterator[str]:
         """What to print of it."""

@@ -1,22 +1,19 @@
 """``results.json``: the outcomes of a run, when, where and of what it was, and how to repeat it.
 
-``schemas/results.schema.json`` describes it. A report that a command line names, by its folder or its
-``results.json``, is untrusted.
+``scripts/make-schema`` makes ``schemas/results.schema.json`` of the classes. A report that a command line names, by its
+folder or its ``results.json``, is untrusted.
 """
 
 import dataclasses
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from types import GenericAlias
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
 import msgspec
 
-from dodo_dsl import package_data
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.outcome import NotRun, Outcome
@@ -25,19 +22,20 @@ from dodo_dsl.spec.matrix import SLUG
 from dodo_dsl.spec.model import is_goal
 
 COMMIT = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
+_DATE = r"^\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}\+00:00$"
 _SHOWN = 12
 
 
 @dataclass(frozen=True)
 class Repository:
-    """A git repository at a commit; ``what`` is in it, the application or the tests.
-
-    ``changed`` means that it had changes or files that were in no commit.
-    """
+    """A git repository at a commit."""
 
     what: str
-    commit: str
+    """What is in it: the application, the tests, or both."""
+    commit: Annotated[str, msgspec.Meta(pattern=f"^({COMMIT.pattern})$")]
+    """Commit that was checked out."""
     changed: bool
+    """Whether it had changes or files that were in no commit."""
 
     def in_words(self) -> str:
         return f"{self.what} at commit {self.commit[:_SHOWN]}" + (" with uncommitted changes" if self.changed else "")
@@ -45,13 +43,18 @@ class Repository:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """``date`` is ISO 8601 in UTC, ``dodo`` the version, ``command`` without what may be secret."""
+    """When, where and of what a run was, and how to repeat it."""
 
-    date: str
+    date: Annotated[str, msgspec.Meta(pattern=_DATE)]
+    """When it began, in UTC (ISO 8601)."""
     host: str
+    """Name of the machine."""
     dodo: str
+    """Version of DoDo."""
     command: str
+    """What repeats it, without options that may carry secrets."""
     repositories: tuple[Repository, ...] = ()
+    """The git repositories of application and tests."""
 
     def in_words(self) -> str:
         """All but the command."""
@@ -64,7 +67,6 @@ class RunRecord:
 FILE_NAME = "results.json"
 VERSION = 1
 _MAX_PROBLEM_TEXT = 200
-_MOST_PROBLEMS, _MOST_COUNTED = 3, 1000
 _MOST_DIGITS = 300
 
 
@@ -74,11 +76,27 @@ class ResultsError(ValueError):
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What results say besides the outcomes: of which runs they are, the tests that never began, and repetitions."""
+    """What results say besides the outcomes."""
 
     runs: tuple[RunRecord, ...] = ()
+    """The runs that the outcomes are of: one, or several in a joined report."""
     not_run: tuple[NotRun, ...] = ()
+    """Tests of the run that never began, because it was interrupted or a test before them did not pass (--fail-fast);
+    they have no outcome."""
     repeated: tuple[Repeated, ...] = ()
+    """Tests in lockstep that ran more than once (--repeat), and whether all runs gave the same."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results(Circumstances):
+    """Outcomes of a run, as written to results.json."""
+
+    dodo: Literal["results"]
+    """Type of the file."""
+    version: Literal[1]
+    """Version of the format."""
+    tests: tuple[Outcome, ...]
+    """One outcome per executed instance."""
 
 
 NO_CIRCUMSTANCES = Circumstances()
@@ -103,9 +121,9 @@ class GivenReport:
 
 
 def to_json(outcomes: Sequence[Outcome], circumstances: Circumstances = NO_CIRCUMSTANCES) -> str:
-    tests = [_rounded(test) for test in msgspec.to_builtins(outcomes)]
+    tests = [_rounded(dataclasses.asdict(outcome)) for outcome in outcomes]
     head = {"dodo": "results", "version": VERSION}
-    besides = {key: value for key, value in msgspec.to_builtins(circumstances).items() if value}
+    besides = {key: value for key, value in dataclasses.asdict(circumstances).items() if value}
     return json.dumps({**head, **besides, "tests": tests}, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -142,26 +160,27 @@ def _rounded(value: Any, name: str = "") -> Any:
 
 
 def load(path: Path) -> list[Outcome]:
-    """The outcomes of a ``results.json`` that its schema accepts; raises ResultsError."""
+    """The outcomes of a ``results.json`` that is valid; raises ResultsError."""
     return list(read_results(path).outcomes)
 
 
 def read_results(path: Path) -> GivenReport:
-    """A ``results.json`` that its schema accepts; raises ResultsError."""
+    """A ``results.json`` that is valid; raises ResultsError."""
     try:
         document = json.loads(regular_file.text(path), parse_int=_whole)
         if document["dodo"] != "results" or document["version"] != VERSION:
             raise ResultsError(f"{path}: not results of version {VERSION}")
-        _validate(document)
-        outcomes = msgspec.convert(document["tests"], tuple[Outcome, ...])
-        if not all(is_goal(goal) for outcome in outcomes for goal in outcome.goals):
+        found = msgspec.convert(document, Results)
+        _check_keys(document, dataclasses.asdict(found), "$")
+        json.dumps(document, ensure_ascii=False).encode()  # raises for strings that UTF-8 cannot encode
+        if not all(is_goal(goal) for outcome in found.tests for goal in outcome.goals):
             raise ResultsError(f"{path}: a goal whose numbers make no score")
-        return GivenReport(path, outcomes, msgspec.convert(document, Circumstances))
+        return GivenReport(path, found.tests, Circumstances(found.runs, found.not_run, found.repeated))
     except FileNotFoundError as error:
         raise ResultsError(f"there is no {path}") from error
     except OSError as error:
         raise ResultsError(f"{path} cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError, msgspec.ValidationError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ResultsError(f"{path}: not results of DoDo ({error})") from error
 
 
@@ -170,69 +189,18 @@ def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) < _MOST_DIGITS else float(digits)
 
 
-def _validate(document: Any) -> None:
-    """Raises ValueError with the places of the first problems, or for strings that UTF-8 cannot encode."""
-    schema = json.loads((package_data.schemas() / "results.schema.json").read_text(encoding="utf-8"))
-    try:
-        msgspec.convert(document, _checked(schema, schema["$defs"]))
-    except msgspec.ValidationError:
-        if problems := _problems(document, schema):
-            raise ValueError(problems) from None
-    json.dumps(document, ensure_ascii=False).encode()
-
-
-_BOUNDS = {
-    "number": {"minimum": "ge", "maximum": "le", "exclusiveMinimum": "gt"},
-    "string": {"pattern": "pattern", "maxLength": "max_length"},
-    "object": {"maxProperties": "max_length"},
-}
-_PLAIN = {"number": float, "integer": int, "string": str, "boolean": bool, "null": None}
-
-
-def _checked(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Any:
-    """What msgspec takes only if the schema does, for files with thousands of tests: jsonschema takes their time."""
-    if "$ref" in schema:
-        return _checked(defs[schema["$ref"].removeprefix("#/$defs/")], defs)
-    if "type" not in schema:
-        return Literal[tuple(schema.get("enum") or [schema["const"]])]
-    kind = schema["type"]
-    if isinstance(kind, list):
-        return Union[tuple(_checked({**schema, "type": each}, defs) for each in kind)]  # noqa: UP007  (computed)
-    if kind == "array":
-        return list[_checked(schema["items"], defs)]  # type: ignore[misc]
-    if "properties" in schema and kind == "object":
-        parts = {name: _checked(each, defs) for name, each in schema["properties"].items()}
-        optional = parts.keys() - set(schema.get("required", ()))
-        fields = [(name, each, None) if name in optional else (name, each) for name, each in parts.items()]
-        return msgspec.defstruct("Part", fields, forbid_unknown_fields=True, kw_only=True)
-    bounds = _BOUNDS.get("number" if kind == "integer" else kind, {})
-    found = {name: schema[key] for key, name in bounds.items() if key in schema}
-    if kind != "object":
-        return Annotated[_PLAIN[kind], msgspec.Meta(**found)] if found else _PLAIN[kind]
-    names = _checked({"type": "string", **schema["propertyNames"]}, defs)
-    return Annotated[GenericAlias(dict, (names, _checked(schema["additionalProperties"], defs))), msgspec.Meta(**found)]
-
-
-def _problems(document: Any, schema: Mapping[str, Any]) -> str:
-    """The first problems, those of the whole before those of its parts, and how many more; empty without one."""
-    from jsonschema import Draft202012Validator
-
-    found = list(islice(Draft202012Validator(schema).iter_errors(document), _MOST_COUNTED))
-    first = sorted(found, key=lambda problem: len(problem.absolute_path))[:_MOST_PROBLEMS]
-    more = len(found) - len(first)
-    counted = [f"and {'at least ' if len(found) == _MOST_COUNTED else ''}{more} more"] if more else []
-    return "; ".join([*map(_sentence, first), *counted])
-
-
-def _sentence(problem: Any) -> str:
-    """What is wrong, with its place, and the key that a key of no meaning may be."""
-    if problem.validator != "additionalProperties":
-        return f"{problem.json_path}: {problem.message[:_MAX_PROBLEM_TEXT]}"
-    known = problem.schema["properties"]
-    name = next(key for key in problem.instance if key not in known)
-    hint = did_you_mean(name, known.keys() - problem.instance.keys())
-    told = f"; {hint}" if hint.startswith("did") else ""
-    return f"{problem.json_path}: unknown key '{name[:_MAX_PROBLEM_TEXT]}'{told}"
+def _check_keys(value: Any, known: Any, place: str) -> None:
+    """Raises ValueError for a key of a document that no class has: it is not among what was ``known`` of it."""
+    if isinstance(value, dict):
+        for key, below in value.items():
+            if key not in known:
+                hint = did_you_mean(key, known.keys() - value.keys())
+                said = f"{place}: unknown key '{key[:_MAX_PROBLEM_TEXT]}'"
+                raise ValueError(f"{said}; {hint}" if hint.startswith("did") else said)
+            _check_keys(below, known[key], f"{place}.{key}")
+    elif isinstance(value, list):
+        for number, (below, of_known) in enumerate(zip(value, known, strict=True)):
+            _check_keys(below, of_known, f"{place}[{number}]")
 
 
 MOST_SLUG = 240

@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 from dodo_dsl.opendlv.address import Address
-from dodo_dsl.outcome import Response
+from dodo_dsl.outcome import Check, Response, Verdict
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
 
@@ -25,10 +25,10 @@ class VerdictEvent:
     service: str
     passed: bool
     reason: str
-    checks: tuple[dict[str, Any], ...]
+    checks: tuple[Check, ...]
     evidence: Mapping[str, float | str | None] = field(default_factory=dict)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> Verdict:
         """The verdict in ``results.json``."""
         outcome = "passed" if self.passed else "failed"
         return {

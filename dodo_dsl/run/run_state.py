@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dodo_dsl.check.senders import told_in_words
-from dodo_dsl.outcome import ON_EMULATED, MachineLoad, Outcome, Response, Result, ServiceUse
+from dodo_dsl.outcome import ON_EMULATED, EndedService, MachineLoad, Outcome, Response, Result, ServiceUse
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
@@ -373,7 +373,7 @@ class RunState:
             paused_s=max(self.paused.values(), default=0.0),
         )
 
-    def _service_rows(self) -> list[dict[str, Any]]:
+    def _service_rows(self) -> list[EndedService]:
         uses = {s.name: s.uses for s in self.plan.services}
         return [
             {"name": name, "layer": layer, "uses": uses.get(name), "exit_code": self.exits.get(name)}

@@ -121,14 +121,9 @@ def _bounded(parameter: Parameter, scalar: Scalar, number: Decimal) -> Value:
             text = f" is {scalar.text}, expected a multiple of {parameter.multiple_of}"
             raise ValueProblem(parameter, scalar, "out-of-range", text, f"write for example {int(number) - 1}")
         return Value(quantity.decimal_text(number))
-    unit = f" {parameter.unit}" if parameter.unit not in ("", quantity.SHARE) else ""
-    if low is not None and high is not None:
-        expected = f"{low:g} to {high:g}{unit}"
-    else:
-        expected = f"at least {low:g}{unit}" if low is not None else f"at most {high:g}{unit}"
     is_percent = parameter.unit == quantity.SHARE and high == 1 and 1 < number <= 100 and "%" not in scalar.text
     hint = f"write '{scalar.text} %'" if is_percent else ""
-    raise ValueProblem(parameter, scalar, "out-of-range", f" is {scalar.text}, expected {expected}", hint)
+    raise ValueProblem(parameter, scalar, "out-of-range", f" is {scalar.text}, expected {parameter.bounds}", hint)
 
 
 def _text(parameter: Parameter, node: Node, _: Path) -> Value:
@@ -320,13 +315,12 @@ def resolved(
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
         entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
-        is_of_test = parameter.driving or parameter.within_timeout
-        same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
-        if not holds(parameter.when, texts):
-            arguments[name] = known if known and same and known.value is None else Argument(parameter, entry)
-            continue
-        is_known = known is not None and same and not (parameter.when and known.value is None)
-        found = known if known is not None and is_known else argument(spec, use, parameter, rig)
+        has_effect, is_of_test = holds(parameter.when, texts), parameter.driving or parameter.within_timeout
+        is_same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
+        if known and is_same and not (parameter.when and has_effect is (known.value is None)):
+            found = known
+        else:
+            found = argument(spec, use, parameter, rig) if has_effect else Argument(parameter, entry)
         arguments[name] = found
         if found.value is not None:
             texts[name] = found.value.text

@@ -11,17 +11,15 @@ import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
-from dodo_dsl.spec.quantity import convert
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.slips import mended
-from dodo_dsl.spec.validation import schema_of_keys, valid_part
+from dodo_dsl.spec.validation import schema_of_keys, valid_part, values
 
 MANIFEST = "service.yml"
 _TAKEN = ("services", "dodo_dsl")
@@ -147,7 +145,8 @@ class _Reading:
         about = self.node.entries.get("application")
         value = self.node.get("application")
         named = value.get("files") if isinstance(value, Mapping) else value
-        application, registry = self._files(named), self._folders("registry", _NOT_YET)
+        application, services = self._files(named), self._folders("services")
+        registry = tuple(self._folders("registry", _NOT_YET))
         shipped = package_data.registry()
         missing = (path_of(self.root, item.text) for item in _texts(self.node.get("registry")) if item.text != SHIPPED)
         found = Deployment(
@@ -155,7 +154,7 @@ class _Reading:
             file=path,
             registry=registry or (shipped,),
             absent=tuple(p for p in missing if p and not p.exists() and p.is_relative_to(self.root.resolve())),
-            services=self._folders("services"),
+            services=tuple(services),
             messages=self._files(self.node.get("messages")),
             application=application,
             declarations=Declarations.of(about, application),
@@ -168,24 +167,25 @@ class _Reading:
             paths=self._paths(),
             outside=raw.get("outside", False),
             rigs=rigs,
-            sandbox=_sandbox(raw.get("sandbox", {})),
+            sandbox=_sandbox(self.node.get("sandbox")),
         )
         self._check_messages(found.messages)
-        self._check_services()
+        self._check_services(services)
         return found
 
     def _tell(self, span: Span, rule: str, message: str, hint: str = "", severity: Severity = "error") -> None:
         self.problems.append(Diagnostic(span, rule, message, hint, severity))
 
-    def _folders(self, key: str, hint: str = _FROM_HERE) -> tuple[Path, ...]:
-        folders = []
+    def _folders(self, key: str, hint: str = _FROM_HERE) -> dict[Path, Scalar]:
+        """Those that there are, and where they are named."""
+        folders = {}
         for item in _texts(self.node.get(key)):
             folder = package_data.registry() if item.text == SHIPPED else path_of(self.root, item.text)
             if folder is None or not folder.is_dir():
                 self._tell(item.span, "missing-file", f"there is no folder '{item.text}'", hint)
             else:
-                folders.append(folder)
-        return tuple(folders)
+                folders[folder] = item
+        return folders
 
     def _files(self, node: Node | None) -> tuple[Path, ...]:
         files = []
@@ -223,12 +223,9 @@ class _Reading:
                 span, text = Span(place["file"], int(place["line"] or 1), int(place["column"] or 1)), place["text"]
             self._tell(span, "wrong-messages", text)
 
-    def _check_services(self) -> None:
+    def _check_services(self, folders: dict[Path, Scalar]) -> None:
         """Folders that are a service themselves, that hold none, and that DoDo's packages hide."""
-        for item in _texts(self.node.get("services")):
-            folder = path_of(self.root, item.text)
-            if folder is None or not folder.is_dir():
-                continue
+        for folder, item in folders.items():
             if (folder / MANIFEST).is_file():
                 hint = "name the folder above it, which holds a folder for each service"
                 self._tell(item.span, "service-folder", f"'{item.text}' is the folder of one service", hint)
@@ -289,11 +286,7 @@ class _Reading:
         return network
 
 
-def _sandbox(raw: dict[str, Any]) -> SandboxLimits:
-    values = {key.replace("-", "_"): value for key, value in raw.items() if key != "read"}
-    for key in ("memory", "file_size", "copies"):
-        if key in values:
-            values[key] = int(convert(values[key], "B"))
-    if "cpus" in values:
-        values["cpus"] = float(values["cpus"])
-    return SandboxLimits(reads=tuple(raw.get("read", ())), **values)
+def _sandbox(node: Node | None) -> SandboxLimits:
+    raw = values(node, schema_of_keys("deployment")["properties"]["sandbox"]) if node else {}
+    reads, cpus = tuple(raw.pop("read", ())), raw.pop("cpus", None)
+    return SandboxLimits(reads=reads, cpus=cpus, **{key.replace("-", "_"): int(value) for key, value in raw.items()})

@@ -10,18 +10,16 @@ import stat
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.source import Mapping, parse, plain
-from dodo_dsl.spec import quantity
+from dodo_dsl.source import Mapping, parse
 from dodo_dsl.spec.rig import LIMIT_UNITS
-from dodo_dsl.spec.validation import validate
+from dodo_dsl.spec.validation import schema_of_keys, validate, values
 
 FILE = Path("/etc/dodo/rigs.yml")
 UNITS = {**LIMIT_UNITS, "yaw": "deg"}
 """Of the limits; an operator reads degrees."""
-DENSITIES = {"x": "steps/m", "y": "steps/m", "yaw": "steps/deg"}
-"""The units of an axis' steps."""
 
 
 class MachineError(OSError):
@@ -78,9 +76,9 @@ def _read(path: Path, _changed: int) -> Machine:
     problems = [*found, *(validate(node, "machine") if node is not None else ())]
     if problems or not isinstance(node, Mapping):
         raise MachineError(None, *_first(problems, path))
-    raw = plain(node)
+    raw = values(node, schema_of_keys("machine"))
     places = {key: Path(raw[key]) if key in raw else None for key in ("leases", "quarantine")}
-    return Machine(tuple(_rig(path, name, rig) for name, rig in (raw.get("rigs") or {}).items()), **places)
+    return Machine(tuple(_rig(name, rig) for name, rig in raw.get("rigs", {}).items()), **places)
 
 
 def _first(problems: Sequence[Diagnostic], path: Path) -> tuple[str, str]:
@@ -92,25 +90,8 @@ def _first(problems: Sequence[Diagnostic], path: Path) -> tuple[str, str]:
     return f"{first.message}{hint}", f"{path}:{first.span.line}:{first.span.column}"
 
 
-def _rig(path: Path, name: str, raw: dict[str, object]) -> PermittedRig:
-    written = raw.get("limits") or {}
-    assert isinstance(written, dict)
-    try:
-        limits = {key: float(quantity.convert(value, UNITS[key])) for key, value in written.items()}
-        constants = {flag: float(quantity.convert(*value)) for flag, value in _constants(raw).items()}
-    except quantity.QuantityError as error:
-        raise MachineError(None, f"rig '{name}': {error}", str(path)) from None
-    devices, repositories = raw["devices"], raw.get("repositories") or []
-    assert isinstance(devices, list) and isinstance(repositories, list)
-    return PermittedRig(name, tuple(devices), tuple(map(Path, repositories)), limits, constants)
-
-
-def _constants(raw: dict[str, object]) -> dict[str, tuple[str, str]]:
-    """Quantities of the axes as written, and their units, by the gantry's flags."""
-    axes = raw.get("axes") or {}
-    assert isinstance(axes, dict)
-    return {
-        f"{what}-{axis}": (text, DENSITIES[axis] if what == "steps" else "steps")
-        for axis, about in axes.items()
-        for what, text in (about or {}).items()
-    }
+def _rig(name: str, raw: dict[str, Any]) -> PermittedRig:
+    axes = raw.get("axes", {}).items()
+    constants = {f"{what}-{axis}": number for axis, about in axes for what, number in about.items()}
+    repositories = tuple(map(Path, raw.get("repositories", ())))
+    return PermittedRig(name, tuple(raw["devices"]), repositories, raw.get("limits", {}), constants)

@@ -14,6 +14,7 @@ from typing import Any
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
 from dodo_dsl.source import Mapping, Node, Reader, Scalar, Sequence, plain, read, walk
+from dodo_dsl.spec.quantity import SHARE
 from dodo_dsl.spec.validation import validate
 
 RULE = "wrong-manifest"
@@ -168,6 +169,15 @@ class Parameter:
     driving: bool = False
     deprecated: str = ""
 
+    @property
+    def bounds(self) -> str:
+        """The numbers that it may have, as ``0.1 to 1000 Hz`` or ``at least 1``; empty for any."""
+        low, high, unit = self.minimum, self.maximum, f" {self.unit}" if self.unit not in ("", SHARE) else ""
+        if low is not None and high is not None:
+            return f"{low:.10g} to {high:.10g}{unit}"
+        ends = (("at least", low), ("at most", high))
+        return next((f"{word} {end:.10g}{unit}" for word, end in ends if end is not None), "")
+
 
 @dataclass(frozen=True)
 class Ports:
@@ -194,7 +204,7 @@ class Manifest:
 
     A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
     by patterns of their names, empty if it does not declare them. ``messages`` are those that it has whatever its
-    parameters are, ``cases`` the others.
+    parameters are, ``cases`` the others. DoDo adds an ``automatic`` one to tests itself.
     """
 
     folder: Path
@@ -211,6 +221,7 @@ class Manifest:
     one_of: tuple[tuple[str, ...], ...] = ()
     checks: dict[str, str] = field(default_factory=dict)
     cases: tuple[Case, ...] = ()
+    automatic: bool = False
 
     def messages_with(self, texts: Map[str, str]) -> Ports:
         """The messages that it has where its parameters have these values, as texts."""
@@ -235,8 +246,7 @@ def _read(name: str, raw: dict[str, Any]) -> Parameter:
     return Parameter(name, **{"help": "", **values, "when": _when(raw.get("when", {}))})
 
 
-def _ports(raw: dict[str, Any] | None) -> Ports:
-    raw = raw or {}
+def _ports(raw: dict[str, Any]) -> Ports:
     return Ports(tuple(raw.get("in", ())), tuple(raw.get("out", ())))
 
 
@@ -252,24 +262,18 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
     if node is None or has_errors(found):
         return None, found
     raw = plain(node)
-    parameters = {name: _read(name, each) for name, each in (raw.get("parameters") or {}).items()}
-    manifest = Manifest(
-        folder=path.parent,
-        name=raw["name"],
-        layers=tuple(raw["layers"]),
-        image=raw["image"],
-        process=tuple(raw["process"]),
-        description=raw["description"],
-        parameters=parameters,
-        messages=_ports(raw.get("messages")),
-        memory=_ports(raw.get("memory")),
-        devices=tuple(raw.get("devices") or ()),
-        example=tuple(raw["example"]) if "example" in raw else None,
-        one_of=tuple(tuple(names) for names in raw.get("one-of", ())),
-        checks=raw.get("checks") or {},
-        cases=tuple(Case(_when(case["when"]), _ports(case)) for case in (raw.get("messages") or {}).get("cases", ())),
-    )
-    return manifest, found
+    messages, memory = raw.pop("messages", {}), _ports(raw.pop("memory", {}))
+    parameters = {name: _read(name, about) for name, about in raw.pop("parameters", {}).items()}
+    cases = tuple(Case(_when(case["when"]), _ports(case)) for case in messages.get("cases", ()))
+    facts = {key.replace("-", "_"): _fixed(value) for key, value in raw.items()}
+    return Manifest(
+        path.parent, **facts, parameters=parameters, messages=_ports(messages), memory=memory, cases=cases
+    ), found
+
+
+def _fixed(value: Any) -> Any:
+    """With tuples for lists."""
+    return tuple(map(_fixed, value)) if isinstance(value, list) else value
 
 
 @functools.cache

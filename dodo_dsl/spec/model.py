@@ -8,13 +8,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Entry, Mapping, Node, Scalar
-from dodo_dsl.spec import quantity, vary
+from dodo_dsl.spec import vary
 from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.registry import Location
+from dodo_dsl.spec.validation import schema_of_keys, values
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,9 @@ class ResourceLimits:
     max_processor_share: float | None = None
 
 
-_RESOURCES = {
-    "max-memory": ("max_memory_mb", "MB"),
-    "max-memory-growth": ("max_memory_growth", "MB/min"),
-    "max-processor-time": ("max_processor_time_s", "s"),
-    "max-processor-share": ("max_processor_share", quantity.SHARE),
-}
+_RESOURCES = ("max-memory", "max-memory-growth", "max-processor-time", "max-processor-share")
+_PLAIN = ("name", "level", "kind", "clock", "rig", "isolation", "pose", "seed")
+_VALUES = (*_PLAIN, "description", "timeout", "record", "response", "resources")
 
 
 LAYERS = ("environment", "action", "evaluation")
@@ -136,34 +133,23 @@ class Spec:
 
 def spec_of(location: Location, node: Mapping, choice: Choice, spans: dict[str, Span], is_whole: bool) -> Spec:
     """An instance from its values, which are valid and have no placeholders any more."""
-
-    def text(key: str, default: Any = None) -> Any:
-        value = node.get(key)
-        return value.text if isinstance(value, Scalar) else default
-
-    record, response, seed = node.get("record"), node.get("response"), node.get("seed")
-    frames, limits = _part(record, "frames"), node.get("resources")
-    word = frames.text if isinstance(frames, Scalar) else ON_FAILURE
-    rate = _part(record, "rate") if word in FRAMES else frames
+    known = schema_of_keys("dodo")["properties"]
+    raw = {key: values(entry.value, known[key]) for key, entry in node.entries.items() if key in _VALUES}
+    record, response, resources = (raw.get(key, {}) for key in ("record", "response", "resources"))
+    frames = record.get("frames", ON_FAILURE)
+    is_rate = frames not in FRAMES
     return Spec(
         location,
-        name=text("name"),
-        description=" ".join(text("description", "").split()) or None,
-        level=text("level"),
-        kind=text("kind"),
-        timeout_s=_number(node.get("timeout"), "s"),
-        clock=text("clock", "realtime"),
-        rig=text("rig"),
-        isolation=text("isolation"),
-        pose=text("pose", "declared"),
-        seed=int(str(seed.value)) if isinstance(seed, Scalar) else 0,
-        frames=word if word in FRAMES else ALWAYS,
-        frames_hz=_number(rate, "Hz"),
-        record_limit_mb=_number(_part(record, "limit"), "MB"),
-        max_response_s=_number(_part(response, "max"), "s"),
-        response_over=_number(_part(response, "over"), quantity.SHARE) or 0.0,
-        copies_times=_part(response, "sample-times") is not None,
-        resources=_resources(limits) if limits else None,
+        **{key: raw[key] for key in _PLAIN if key in raw},
+        description=" ".join(raw.get("description", "").split()) or None,
+        timeout_s=raw.get("timeout"),
+        frames=ALWAYS if is_rate else frames,
+        frames_hz=frames if is_rate else record.get("rate"),
+        record_limit_mb=record.get("limit"),
+        max_response_s=response.get("max"),
+        response_over=response.get("over", 0.0),
+        copies_times="sample-times" in response,
+        resources=ResourceLimits(*map(resources.get, _RESOURCES)) if "resources" in raw else None,
         uses=tuple(_uses(node)),
         variables=_entries(_part(node.get("application"), "env")),
         goals=_entries(node.get("goals")),
@@ -171,14 +157,6 @@ def spec_of(location: Location, node: Mapping, choice: Choice, spans: dict[str, 
         spans=spans,
         is_whole=is_whole,
     )
-
-
-def _resources(node: Node) -> ResourceLimits:
-    return ResourceLimits(**{name: _number(_part(node, key), unit) for key, (name, unit) in _RESOURCES.items()})
-
-
-def _number(node: Node | None, unit: str) -> float | None:
-    return float(quantity.convert(node.text, unit)) if isinstance(node, Scalar) else None
 
 
 def _part(node: Node | None, key: str) -> Node | None:
@@ -197,14 +175,21 @@ def _uses(node: Mapping) -> Iterator[Use]:
                 yield Use(layer, name, entry.key, uses, _entries(_part(entry.value, "with")))
 
 
+_MOST_WEIGHT = 1000
+
+
 @dataclass(frozen=True)
 class Goal:
     """A check that scores 0 at ``zero``, 1 at ``one``, both in its unit, and linearly between; never beyond."""
 
     check: str
+    """Name of the check whose value is scored."""
     zero: float
+    """Value that scores 0, in the check's unit."""
     one: float
+    """Value that scores 1, in the check's unit."""
     weight: float = 1.0
+    """Weight of the goal among those of its test: above 0, at most 1000."""
 
     def score(self, value: float | None) -> float:
         """Of a value, 0 to 1; a check without a value scores 0."""
@@ -218,4 +203,4 @@ def is_goal(goal: Goal) -> bool:
     numbers = (goal.zero, goal.one, goal.weight)
     if not all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):
         return False
-    return goal.weight > 0 and goal.zero != goal.one
+    return 0 < goal.weight <= _MOST_WEIGHT and goal.zero != goal.one

@@ -1,6 +1,5 @@
 """Rigs: the hardware that a deployment has, and emulated ones."""
 
-import contextlib
 import functools
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,16 +116,14 @@ class Rig:
 
     @functools.cached_property
     def _memory(self) -> Entry | None:
-        """All limits in one entry; one that is not a quantity is left out, because its own flag has the problem."""
+        """All limits in one entry."""
         entry = self.node.entries.get("limits")
         if entry is None or not isinstance(entry.value, Mapping) or self.is_emulated:
             return None
         words = []
         for name, unit in LIMIT_UNITS.items():
-            limit = entry.value.get(name)
-            with contextlib.suppress(quantity.QuantityError):
-                if isinstance(limit, Scalar):
-                    words.append(f"{name}={quantity.decimal_text(quantity.convert(limit.text, unit))}")
+            if isinstance(limit := entry.value.get(name), Scalar):
+                words.append(f"{name}={quantity.decimal_text(quantity.convert(limit.text, unit))}")
         text = ",".join(words)
         return Entry(entry.key, Scalar(entry.value.span, text, text)) if words else None
 

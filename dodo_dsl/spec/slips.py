@@ -131,32 +131,38 @@ def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> No
     home, reported = "", ""
     for key, entry in written.items():
         above = entries.get(home)
-        if above and _is_stray(key, entry, above, schema, _of(schema, home)):
+        if above and _is_stray(key, entry, above, schema, schema_at(schema, home)):
             own = _children(above.value)
             if reported != home:
                 deep = next((e.key.column for e in own.values() if e.key.line > above.key.line), entry.key.column + 2)
-                message = f"'{key}' stands beside '{home}'; indent it by {deep - 1} spaces"
+                message = f"'{key}' stands beside '{home}'; {_place(deep)}"
                 found.append(Diagnostic(entry.key, "unknown-key", message, f"it belongs to '{home}'"))
             entries[home] = Entry(above.key, Mapping(above.value.span, {**own, key: entry}, above.value.tag))
             reported = home
         else:
             entries[key], home = entry, key
-    below = {key: Entry(entry.key, _indented(entry.value, _of(schema, key), found)) for key, entry in entries.items()}
+    below = {
+        key: Entry(entry.key, _indented(entry.value, schema_at(schema, key), found)) for key, entry in entries.items()
+    }
     return Mapping(node.span, below, node.tag)
+
+
+def _place(column: int) -> str:
+    return f"indent it by {column - 1} spaces" if column > 1 else "begin it in the first column"
 
 
 def _raised(node: Mapping, schema: dict[str, Any], found: list[Diagnostic]) -> Iterator[tuple[str, Entry]]:
     """The entries, and those of this mapping's own keys that stand in one of them, which has no such key."""
     known = schema.get("properties", {})
     for key, entry in node.entries.items():
-        home = _of(schema, key)
+        home = schema_at(schema, key)
         deep = {}
         for name, inner in _children(entry.value).items():
             is_known = name in known and known[name].get("type") == "object"
             is_free = is_known and name not in node.entries and inner.key.line > entry.key.line
             if is_free and isinstance(inner.value, Mapping) and not _takes(home, name, inner.value):
                 deep[name] = inner
-                message = f"'{name}' stands below '{key}'; indent it by {entry.key.column - 1} spaces"
+                message = f"'{name}' stands below '{key}'; {_place(entry.key.column)}"
                 found.append(Diagnostic(inner.key, "unknown-key", message, f"it belongs beside '{key}'"))
         if deep:
             rest = {name: inner for name, inner in _children(entry.value).items() if name not in deep}
@@ -177,7 +183,7 @@ def _takes(schema: dict[str, Any], key: str, value: Node) -> bool:
     return more is not False and not inner.keys().isdisjoint(_children(value))
 
 
-def _of(schema: dict[str, Any], key: str) -> dict[str, Any]:
+def schema_at(schema: dict[str, Any], key: str) -> dict[str, Any]:
     """The schema of the value at a key."""
     found = schema.get("properties", {}).get(key) or schema.get("additionalProperties")
     return found if isinstance(found, dict) else {}

@@ -18,10 +18,10 @@ import yaml
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, shown_path
-from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, resolve
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.registry import SUFFIX, as_file
-from dodo_dsl.spec.slips import boolean_meant, meant, repaired, unknown_key
+from dodo_dsl.spec.slips import boolean_meant, meant, repaired, schema_at, unknown_key
 
 OF_COMPOSE = "application"
 REPORTED = "\0"
@@ -41,7 +41,6 @@ _TYPE_NAMES = {
     "null": "no value",
 }
 _MOST_READ = 200
-_DEFS = "#/$defs/"
 
 Path = tuple[str | int, ...]
 
@@ -61,20 +60,35 @@ def schema_of(name: str) -> dict[str, Any]:
 
 @functools.cache
 def schema_of_keys(name: str) -> dict[str, Any]:
-    """The same without references within it."""
-    schema = schema_of(name)
-
-    def inlined(part: Any) -> Any:
-        if isinstance(part, list):
-            return [inlined(each) for each in part]
-        if not isinstance(part, dict):
-            return part
-        reference = str(part.get("$ref", ""))
-        base = inlined(schema["$defs"][reference.removeprefix(_DEFS)]) if reference.startswith(_DEFS) else {}
-        return {**base, **{key: inlined(value) for key, value in part.items() if key != "$ref"}}
-
-    found: dict[str, Any] = inlined({key: value for key, value in schema.items() if key != "$defs"})
+    """The same without references."""
+    found: dict[str, Any] = _inlined(schema_of(name), schema_of(name))
+    del found["$defs"]
     return found
+
+
+def _inlined(part: Any, root: dict[str, Any]) -> Any:
+    if isinstance(part, list):
+        return [_inlined(each, root) for each in part]
+    if not isinstance(part, dict):
+        return part
+    base = _inlined(*_target(part["$ref"], root)) if isinstance(part.get("$ref"), str) else {}
+    return {**base, **{key: _inlined(value, root) for key, value in part.items() if key != "$ref"}}
+
+
+def _target(reference: str, root: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """What a reference means, and the file in which that stands."""
+    file, _, pointer = reference.partition("#/")
+    root = _by_address(file) if file else root
+    return functools.reduce(lambda below, key: below[key], pointer.split("/"), root), root
+
+
+def values(node: Node, schema: dict[str, Any]) -> Any:
+    """A valid node as ``plain`` has it, with quantities as numbers in their units; the schema has no references."""
+    if isinstance(node, Mapping):
+        return {key: values(entry.value, schema_at(schema, key)) for key, entry in node.entries.items()}
+    if isinstance(node, Scalar) and UNIT in schema and node.text not in schema.get(WORDS, ()):
+        return float(quantity.convert(node.text, schema[UNIT]))
+    return plain(node)
 
 
 def _exact(part: dict[str, Any]) -> dict[str, Any]:
@@ -121,6 +135,7 @@ def _validator(schema: dict[str, Any]) -> Any:
     )
 
 
+@functools.cache
 def _by_address(address: str) -> dict[str, Any]:
     """The schema that a reference means: ``application.schema.json``."""
     text = (package_data.schemas() / address.rpartition("/")[2]).read_text(encoding="utf-8")
@@ -143,7 +158,7 @@ class Violation:
     def __init__(self, error: Any, root: Node, name: str) -> None:
         *steps, self.keyword = error.evaluation_path
         self.path: Path = tuple(error.instance_path)
-        self.schema = _part(schema_of(name), steps)
+        self.schema = _part(_root_of(steps, name), steps)
         self.wanted = error.kind.property if self.keyword == "required" else self.schema[self.keyword]
         is_of_key = error.kind.name == "propertyNames"
         self.instance: Any = error.kind.error.instance if is_of_key else error.instance
@@ -193,14 +208,23 @@ def _violations(document: object, root: Node, name: str) -> list[Violation]:
     return [v for v in found if v.of_key or typed.get(v.path, v) is v]
 
 
+def _root_of(steps: list[str], name: str) -> dict[str, Any]:
+    """The schema in which a path begins: of keywords of our own it is that in the file where they stand."""
+    schema = schema_of(name)
+    if steps[:1] != ["$defs"] or steps[1] in schema["$defs"]:
+        return schema
+    roots = (_by_address(f"{other}.schema.json") for other in ("deployment", OF_COMPOSE))
+    return next(root for root in roots if steps[1] in root["$defs"])
+
+
 def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
+    """What these steps lead to; a reference to what it means and what stands beside it."""
     root, part = schema, schema
     for step in steps:
-        part = part[step]  # type: ignore[index]
+        beside, part = part, part[step]  # type: ignore[index]
         if step == "$ref":
-            file, _, pointer = str(part).partition("#/")
-            root = _by_address(file) if file else root
-            part = functools.reduce(lambda below, key: below[key], pointer.split("/"), root)
+            part, root = _target(str(part), root)
+            part = part | {key: value for key, value in beside.items() if key != "$ref"}
     return part
 
 

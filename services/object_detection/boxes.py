@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.assets import truth_file
-from dodo_dsl.opendlv.assets.truth_file import Frames, TruthFileError, plain
+from dodo_dsl.opendlv.assets.truth_file import Frames, plain
 
 Scores = NDArray[np.float64]
 
@@ -198,9 +198,6 @@ class DetectedFrame:
     answered: float | None = None
 
 
-__all__ = ["Truth", "TruthFileError", "load_truth"]
-
-
 @dataclass(frozen=True)
 class Truth:
     """The true boxes of each picture; ``frames`` says how a frame finds its picture."""
@@ -222,7 +219,7 @@ class Truth:
 
 
 def load_truth(path: Path, frames: Frames) -> Truth:
-    """The truth in a file; raises TruthFileError."""
+    """The truth in a file; raises InputError."""
     found = truth_file.read(path, frames)
     pictures = {key: tuple(LabelledBox(label, Box(*area)) for label, area in boxes) for key, boxes in found.items()}
     return Truth(frames, pictures)

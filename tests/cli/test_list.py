@@ -51,7 +51,7 @@ def test_shipped_tests_that_need_more_are_no_problem(tmp_path: Path, monkeypatch
 def test_a_parameter_that_another_service_gives_is_not_just_required() -> None:
     code, out, _ = dodo("list", "--services", "collision")
     assert code == 0
-    assert "  fovy: number, default 48.8 deg; 1 to 170\n" in dodo("list", "--services", "virtual-camera")[1]
+    assert "  fovy: number, default 48.8 deg; 1 to 170 deg\n" in dodo("list", "--services", "virtual-camera")[1]
     assert "  map-path: path, required unless another service of the test provides it\n" in out
     assert "  message: message, required\n" in dodo("list", "--services", "continuous-signal")[1]
 

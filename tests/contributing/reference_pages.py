@@ -140,6 +140,10 @@ def schema(name: str) -> Schema:
 
 def resolved(node: Schema, file: str) -> tuple[Schema, str]:
     """A node behind its ``$ref``, with its own description, and the file in which it stands."""
+    if "anyOf" in node:
+        first, where = resolved(node["anyOf"][0], file)
+        types = {"type": [first["type"], *(other["type"] for other in node["anyOf"][1:])]}
+        return {**first, **types, **{key: value for key, value in node.items() if key != "anyOf"}}, where
     if "$ref" not in node:
         return node, file
     place, _, path = node["$ref"].partition("#")

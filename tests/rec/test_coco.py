@@ -85,7 +85,7 @@ OTHERS = truth_text([Mark("yellow", 0, 4, 6, 3)], "", 7, 7)
         (OTHERS.replace('"iscrowd": 0', '"iscrowd": 1'), (), "annotations[0]: iscrowd is set"),
         (OTHERS.replace('"image_id": 1', '"image_id": 2'), (), "annotations[0].image_id: no entry has the id 2"),
         (OTHERS.replace('"categories": [', '"categories": [{"id": 2, "name": "x"},'), (), "two have the same id"),
-        ('{"images": []}', (), "expected an object with a list 'categories'"),
+        ('{"images": []}', (), "'categories' is missing"),
         (truth_text([], "", 7, 7), ("--labels", "3"), "--truth and --labels exclude each other"),
         (truth_text([], "", 7, 7), (), "no boxes, expected at least one"),
     ],

@@ -1,6 +1,5 @@
 """``results.json`` is read only when it is one."""
 
-import contextlib
 import json
 import math
 import re
@@ -11,17 +10,16 @@ from typing import Any
 from xml.etree import ElementTree
 
 import jsonschema
-import msgspec
 import pytest
 from junitparser import TestSuite
 
-from dodo_dsl import package_data
 from dodo_dsl.outcome import MachineLoad, NotRun, Response, ServiceUse, Wait
 from dodo_dsl.report import results
 from dodo_dsl.report.comparison import compare
 from dodo_dsl.report.report_folder import forget, write_report, write_summaries
 from dodo_dsl.report.results import GivenReport, Repository, RunRecord
 from dodo_dsl.spec.model import Goal
+from tests.contributing import results_schema
 from tests.report.test_report_folder import OUTCOME
 
 
@@ -216,45 +214,15 @@ def test_an_almost_known_key_of_results_is_told(tmp_path: Path) -> None:
         results.read_results(tmp_path / "results.json")
 
 
-@pytest.mark.parametrize(
-    ("tests", "said"),
-    [
-        ([0, 1, 2], "($.tests[0]: 0 is not of type 'object'; $.tests[1]: 1 is not of type 'object'; "
-         "$.tests[2]: 2 is not of type 'object')"),
-        ([{"slug": 1, "more": 1}, *[0] * 400_000],
-         "($.tests[0]: unknown key 'more'; $.tests[0]: 'name' is a required property; "
-         "$.tests[0]: 'level' is a required property; and at least 997 more)"),
-        ({str(n): n for n in range(100_000)}, "is not of type 'array'"),
-    ],
-)  # fmt: skip
-def test_the_first_problems_are_told_and_how_many_more(tmp_path: Path, tests: object, said: str) -> None:
+@pytest.mark.parametrize("tests", [[0] * 400_000, {str(n): n for n in range(100_000)}], ids=["list", "mapping"])
+def test_the_first_problem_is_told_in_a_sentence(tmp_path: Path, tests: object) -> None:
     (tmp_path / "results.json").write_text(json.dumps({"dodo": "results", "version": 1, "tests": tests}))
-    with pytest.raises(results.ResultsError) as caught:
+    with pytest.raises(results.ResultsError, match=r"not results of DoDo \(Expected .* at `\$\.tests") as caught:
         results.read_results(tmp_path / "results.json")
-    assert said in str(caught.value) or str(caught.value).startswith(
-        f"{tmp_path}/results.json: not results of DoDo ($.t"
-    )
     assert len(str(caught.value)) < 1000
 
 
-@pytest.mark.thorough
-def test_what_is_taken_without_the_schema_is_what_it_accepts(tmp_path: Path) -> None:
-    """Each value of a whole file by each of other kinds, and without each key."""
-    schema = json.loads((package_data.schemas() / "results.schema.json").read_text())
-    shape, validator = results._checked(schema, schema["$defs"]), jsonschema.Draft202012Validator(schema)
+def test_the_schema_is_what_the_classes_say() -> None:
+    assert results_schema.FILE.read_text() == results_schema.text(), "run `make schema`"
     document = json.loads(results.to_json([WHOLE], results.Circumstances((RUN,), (NOT_RUN,))))
-    taken = 0
-    for _, inner in list(objects(document)):
-        for key, value in list(inner.items()):
-            for other in (None, True, -1, 0.5, 1001, "A", "x" * 300, [], {}, ["x"], [1], {"x": [1]}):
-                inner[key] = other
-                with contextlib.suppress(msgspec.ValidationError):
-                    msgspec.convert(document, shape)
-                    taken += 1
-                    assert validator.is_valid(document), (key, other)
-            del inner[key]
-            with contextlib.suppress(msgspec.ValidationError):
-                msgspec.convert(document, shape)
-                assert validator.is_valid(document), key
-            inner[key] = value
-    assert taken > 100
+    jsonschema.validate(document, json.loads(results_schema.text()))

@@ -12,6 +12,10 @@ SLIPS: dict[str, tuple[dict[int, str | None], str]] = {
         },
         "14:13 yaml-syntax",
     ),
+    "alias-bare": (
+        {11: "  vehicle: &rate", 12: "    uses: dynamic-model", 15: "  pose:\n    *rate\n    with: {freq: 100 Hz}"},
+        "16:5 yaml-syntax",
+    ),
     "alias-star-behind": ({20: "      goal: *finish*"}, "20:13 yaml-syntax"),
     "block-above-brace-too-many": (
         {
@@ -82,7 +86,8 @@ SLIPS: dict[str, tuple[dict[int, str | None], str]] = {
     "colon-no-blank-brace": ({13: "    with:{freq: 100 Hz}", 14: None}, "13:5 unknown-key"),
     "colon-no-blank-flow": ({15: "  pose: {uses:integrator, with: {freq: 100 Hz}}"}, "15:10 unknown-key"),
     "colon-no-blank": ({4: "level:sil"}, "4:6 yaml-syntax"),
-    "colon-semicolon": ({4: "level; sil"}, "4:1 yaml-syntax"),
+    "colon-full-width": ({4: "level\uff1a sil"}, "4:6 yaml-syntax"),
+    "colon-semicolon": ({4: "level; sil"}, "4:6 yaml-syntax"),
     "comment-no-blank": ({4: "level: sil#simulated"}, "4:8 wrong-value"),
     "crlf-tab": ({18: "\tuses: collision"}, "18:1 yaml-tab"),
     "dash-for-key": ({4: "- level: sil"}, "4:1 yaml-syntax"),

@@ -62,34 +62,10 @@ def test_spans_keep_their_files(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("path", "problem"),
-    [
-        ("none.dodo.yml", ("extends-file", "there is no file 'none.dodo.yml' to extend")),
-        ("folder", ("extends-file", "'folder' is a folder, expected a test's file")),
-        ("list.dodo.yml", ("extends-file", "'list.dodo.yml' does not contain a test")),
-        ("empty.dodo.yml", ("missing-key", "the file is empty, expected a test")),
-        ("../up.dodo.yml", ("path-escape", "'../up.dodo.yml' leaves the registry")),
-        ("own.dodo.yml", ("extends-cycle", "the test extends itself: own.dodo.yml extends own.dodo.yml")),
-        ('"a\\0b"', ("extends-file", "'a\0b' is not a path")),
-    ],
-)
-def test_what_cannot_be_extended(path: str, problem: tuple[str, str], tmp_path: Path) -> None:
-    (tmp_path / "folder").mkdir()
-    _, problems = resolved(tmp_path, f"extends: {path}\n", list="[a]\n", empty="")
-    assert problems == [problem]
-
-
 def test_a_long_chain(tmp_path: Path) -> None:
     chain = {f"t{n}": f"extends: t{n + 1}.dodo.yml\n" for n in range(MAX_CHAIN + 1)}
     _, problems = resolved(tmp_path, "extends: t0.dodo.yml\n", **chain)
     assert problems == [("extends-cycle", f"the chain of extended tests is longer than {MAX_CHAIN}")]
-
-
-def test_a_key_that_cannot_be_removed(tmp_path: Path) -> None:
-    _, ((rule, message),) = resolved(tmp_path, "extends: base.dodo.yml\nmatrx:\n")
-    assert rule == "extends-nothing"
-    assert message.startswith("'matrx' is empty, which would remove it, but ")
 
 
 @pytest.mark.parametrize(

@@ -59,14 +59,6 @@ def test_other_values_under_another_name(tmp_path: Path) -> None:
     assert found.slug == "example--run-7"
 
 
-def test_ends_outside_parameters_are_checked_where_they_are_written(tmp_path: Path) -> None:
-    _, problems = loaded(tmp_path, TEXT.replace("2 min", "2").replace("[60 s", "[60 h"))
-    assert {(d.rule, d.span.column, d.message) for d in problems} == {
-        ("out-of-range", 73, "'timeout' is 60 h, expected 0.1 s to 24 h"),
-        ("wrong-unit", 85, "'timeout': '2' has no unit, expected a time in s"),
-    }
-
-
 def test_a_test_without_ranges_has_no_corners(tmp_path: Path) -> None:
     ((spec,), _) = loaded(tmp_path, "seed: 3\n")
     assert (spec.corners, spec.ranges, spec.template) == ((), (), None)

@@ -37,16 +37,6 @@ def test_a_manifest(tmp_path: Path) -> None:
     assert manifest.example == ("--wait=1",)
 
 
-def test_manifests_with_problems(tmp_path: Path) -> None:
-    assert [p.message for p in load_manifest(write(tmp_path, "empty", ""))[1]] == [
-        "the file is empty, expected a service's manifest"
-    ]
-    manifest, problems = load_manifest(write(tmp_path, "keys", OWN.format(name="own") + "other: 1\n"))
-    assert (manifest, [p.rule for p in problems]) == (None, ["unknown-key"])
-    manifest, problems = load_manifest(write(tmp_path, "wrong", OWN.format(name="own").replace("[a.B]", "['a.B/{x}']")))
-    assert (manifest, [p.rule for p in problems]) == (None, ["wrong-manifest"])
-
-
 CASES = """
 name: own
 layers: [action]
@@ -74,18 +64,6 @@ def test_messages_and_parameters_depend_on_other_parameters(tmp_path: Path) -> N
     assert manifest.messages_with({"kind": "b", "fast": "false"}) == Ports(("a.Always",))
     assert manifest.all_messages.outputs == ("b.Out",)
     assert in_words(manifest.parameters["size"].when) == "with kind: b and fast: true"
-
-
-def test_what_depends_on_unknown_parameters(tmp_path: Path) -> None:
-    text = CASES.replace("{kind: [b], fast: [true]}", "{kin: [b]}").replace(
-        "default: false", "default: false, driving: true"
-    )
-    manifest, problems = load_manifest(write(tmp_path, "own", text))
-    assert manifest is None
-    assert sorted(problem.message for problem in problems) == [
-        "'driving' is for parameters of type list, but 'fast' is of type boolean",
-        *["'when' names the unknown parameter 'kin'"] * 2,
-    ]
 
 
 def test_own_manifests_beside_the_shipped_ones(tmp_path: Path) -> None:

@@ -91,30 +91,6 @@ def test_a_problem_in_a_parameter_is_left_to_the_rules(tmp_path: Path) -> None:
     assert loaded(tmp_path, text)[1].count("duplicate-key") == 1
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "rules", "whole"),
-    [
-        ("timeout: 60 s", "timeout: 0 s", ["out-of-range"], True),
-        ("action:", "actoin:", ["unknown-key"], False),
-        ("{uses: integrator}", "3", ["wrong-type"], False),
-        ("{uses: integrator}", "{}", ["missing-key"], False),
-        ("level: sil", "extends: none.dodo.yml", ["extends-file"], False),
-        ("level: sil", "extends: [a]", ["wrong-type"], False),
-        ("level: sil", "note: x", ["unknown-key", "missing-key"], True),
-    ],
-)
-def test_specs_with_problems(old: str, new: str, rules: list[str], whole: bool, tmp_path: Path) -> None:
-    (spec,), problems = loaded(tmp_path, examples.SPEC.replace(old, new, 1))
-    assert sorted(problems) == sorted(rules)
-    assert spec.is_whole is whole
-
-
-@pytest.mark.parametrize(("text", "rule"), [("", "missing-key"), ("- a\n", "wrong-type"), ("a: [", "yaml-syntax")])
-def test_what_is_no_spec(text: str, rule: str, tmp_path: Path) -> None:
-    (spec,), problems = loaded(tmp_path, text)
-    assert (spec.title, problems) == ("example", [rule])
-
-
 def test_a_description_is_one_line(tmp_path: Path) -> None:
     text = examples.SPEC.replace("description: Drive to", "description: >\n  Drive\n\n  to")
     (spec,), problems = loaded(tmp_path, text)

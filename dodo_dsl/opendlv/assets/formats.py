@@ -26,7 +26,7 @@ Format = Callable[[Path, Settings, Ids], Iterator[InputError]]
 
 RECORDING = ".rec"
 PICTURES = (".png", ".jpg", ".jpeg")
-_BOXES = "annotations"
+_BOXES = "$.annotations"
 _IMAGE, _IMAGE_NAME = 1055, "pictures"
 _POINTER = b"version https://git-lfs"
 _QUOTED = re.compile(r"'([^']+)'")
@@ -105,7 +105,7 @@ def _truth(path: Path, settings: Settings, _ids: Ids) -> Iterator[InputError]:
     frames: truth_file.Frames = settings["truth-frames"]  # type: ignore[assignment]
     try:
         pictures = truth_file.read(path, frames)
-    except truth_file.TruthFileError as error:
+    except InputError as error:
         if error.where != _BOXES:  # reported by the rule on empty files
             yield error
         return

@@ -202,7 +202,7 @@ class Node:
 
     file: Path
     place: str
-    value: object
+    value: Any
 
     @classmethod
     def load(cls, file: Path) -> Self:
@@ -244,7 +244,7 @@ class Node:
         values = [] if node is None else node.value
         if node is not None and not isinstance(values, list):
             node.fail("a list")
-        for index, value in enumerate(values):  # type: ignore[arg-type, var-annotated]
+        for index, value in enumerate(values):
             yield Node(self.file, f"{self.place}.{key}[{index}]", value)
 
     def text(self) -> str:

@@ -201,7 +201,7 @@ def _wall(file: Path, text: str, line: int) -> list[float]:
         wall = [float(word) for word in text.split(",")]
     except ValueError:
         wall = []
-    if len(wall) != NUMBERS or not all(abs(value) <= MAX_NUMBER for value in wall):
+    if len(wall) != 4 or not all(abs(value) <= MAX_NUMBER for value in wall):
         raise MapError(file, f"expected {_WALL}, found '{text.strip()[:60]}'", line=line, hint="as -2,0,2,0;")
     return wall
 
@@ -359,8 +359,6 @@ def _entries(root: Node, key: str, read: Callable[[Node], Entry | None], report:
 
 
 Line = tuple[tuple[float, float], tuple[float, float]]
-NUMBERS = 4
-FARTHEST = 1e300
 MAX_LINES = 10_000
 """Of all obstacles of a map, to each of which evaluators measure the distance."""
 
@@ -424,30 +422,18 @@ def require_few_lines(root: Node) -> None:
 
 
 def _named_lines(entry: Node, default: str) -> tuple[str, list[Line]]:
-    value = entry.value
-    if not isinstance(value, dict):
-        raise MapError(entry.file, "expected an object with lines", entry.place)
-    name = value.get("name", default)
-    if not isinstance(name, str) or not name.strip():
-        raise MapError(entry.file, "expected a text that is not empty", f"{entry.place}.name")
-    if name != name.strip():
-        what = f"the name '{name}' has blanks around it, with which a test does not find it"
-        raise MapError(entry.file, what, f"{entry.place}.name", hint=f'write "{name.strip()}"')
-    lines, place = value.get("lines"), f"{entry.place}.lines"
-    if not isinstance(lines, list) or not lines:
-        raise MapError(entry.file, "expected a list of lines [x1, y1, x2, y2]", place)
-    if not isinstance(lines[0], list):
-        return name, [_line(Node(entry.file, place, lines))]
-    return name, [_line(Node(entry.file, f"{place}[{index}]", line)) for index, line in enumerate(lines)]
+    name = entry.member("name")
+    text = name.text() if name else default
+    if name and text != text.strip():
+        hint = f'write "{text.strip()}"' if text.strip() else ""
+        name.fail("a name without blanks around it, as a test finds it", hint)
+    lines = entry.required("lines")
+    if not isinstance(lines.value, list) or not lines.value:
+        lines.fail("a list of lines [x1, y1, x2, y2]")
+    rows = [lines] if not isinstance(lines.value[0], list) else entry.items("lines")
+    return text, [_line(row) for row in rows]
 
 
 def _line(node: Node) -> Line:
-    numbers = node.value if isinstance(node.value, list) else []
-    if len(numbers) != NUMBERS or not all(_is_number(value) for value in numbers):
-        raise MapError(node.file, "expected four numbers [x1, y1, x2, y2] in metres", node.place)
-    x1, y1, x2, y2 = (float(value) for value in numbers)
+    x1, y1, x2, y2 = node.numbers("x1 y1 x2 y2")
     return (x1, y1), (x2, y2)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < FARTHEST

@@ -15,6 +15,7 @@ from dodo_dsl.outcome import (
     PROCESSOR_TIME,
     SAMPLE_TIMES,
     SLOW_ANSWERS,
+    Check,
     MachineLoad,
     Response,
     ServiceUse,
@@ -109,7 +110,7 @@ class JudgedFigures:
     """What follows from what was measured of the application."""
 
     findings: tuple[Finding, ...] = ()
-    checks: tuple[dict[str, Any], ...] = ()
+    checks: tuple[Check, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -254,7 +255,7 @@ def _measures(use: ServiceUse, limits: ResourceLimits) -> Iterator[_Measure]:
     )
 
 
-def _check(use: ServiceUse, measure: _Measure, ok: bool) -> dict[str, Any]:
+def _check(use: ServiceUse, measure: _Measure, ok: bool) -> Check:
     name, value = f"{measure.check}-{use.service}", round(measure.value or 0.0, 3)
     return with_margin({"name": name, "value": value, "limit": {"max": measure.limit}, "unit": measure.unit, "ok": ok})
 

@@ -129,7 +129,7 @@ DESK = ("desk", "--picture", "desk.png")
             (*DESK, "--boxes", "tests/truths/static-rig.json"),
             "a frame of 640 x 480 pixels, expected one of 320 x 240",
         ),
-        ((*DESK, "--boxes", "desk.png"), "desk.png: cannot be read as COCO JSON"),
+        ((*DESK, "--boxes", "desk.png"), "desk.png: byte 0 is not UTF-8 text"),
         (("desk", *BOX, "--picture", "none.png"), "none.png: cannot be read: No such file"),
         (("desk", *BOX, "--picture", "dodo.yml"), "dodo.yml: not a readable image"),
         (("desk", *BOX, "-o", "desk-2.txt"), "expected a file that ends in .json"),

@@ -111,15 +111,6 @@ def test_a_model_at_the_frame_of_another_is_told(told: Callable[[str, Any], list
     )  # fmt: skip
 
 
-def test_the_other_keys_of_a_truth_are_told_together(told: Callable[[str, Any], list[InputError]]) -> None:
-    """Those near one that is read are told by themselves."""
-    annotation = TRUTH["annotations"][0]
-    annotations = [{**annotation, "id": n, "attributes": {"occluded": n}, "isCrowd": 0} for n in range(50)]
-    misspelt, others = told("truth", {**TRUTH, "tool": "x", "annotations": annotations})
-    assert (misspelt.where, misspelt.hint) == ("annotations[0].isCrowd", "did you mean 'iscrowd'?")
-    assert others.what == "tool: nothing reads 'tool', 'attributes' of annotations"
-
-
 def test_a_column_that_is_almost_the_field_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,value,groundSteerng\n0,1,2\n1,1,2\n")
     given = dict.fromkeys(formats.SETTINGS["target"], "") | {"field": "groundSteering"}

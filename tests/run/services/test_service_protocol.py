@@ -97,63 +97,45 @@ def test_a_verdict_may_carry_the_data_of_its_decision() -> None:
     assert event.as_json() == {"evaluator": "track", "outcome": "passed", "reason": "done", "evidence": evidence}
 
 
+def checked(**changes: object) -> bytes:
+    return line(checks=[{**CHECK, **changes}])
+
+
 MALFORMED = {
-    "evidence list": (line(evidence=[1]), "its evidence is not an object of at most 20 values"),
-    "much evidence": (
-        line(evidence={f"a{n}": n for n in range(21)}),
-        "its evidence is not an object of at most 20 values",
-    ),
-    "evidence key": (line(evidence={"No": 1}), 'its evidence has a key "No", expected lower-case words with hyphens'),
-    "long evidence key": (
-        line(evidence={"a" * 41: 1}),
-        f'its evidence has a key "{"a" * 41}", expected lower-case words with hyphens',
-    ),
-    "evidence object": (
-        line(evidence={"x": {}}),
-        "'x' of its evidence is neither a finite number nor a short string nor null",
-    ),
-    "evidence true": (
-        line(evidence={"x": True}),
-        "'x' of its evidence is neither a finite number nor a short string nor null",
-    ),
-    "infinite evidence": (
-        line(evidence={"x": float("inf")}),
-        "'x' of its evidence is neither a finite number nor a short string nor null",
-    ),
-    "long evidence": (
-        line(evidence={"x": "a" * 201}),
-        "'x' of its evidence is neither a finite number nor a short string nor null",
-    ),
-    "no evidence": (line(evidence=None), "its evidence is not an object of at most 20 values"),
-    "no value": (line(checks=[{k: v for k, v in CHECK.items() if k != "value"}]), "check 'time' has no key 'value'"),
-    "no unit": (line(checks=[{k: v for k, v in CHECK.items() if k != "unit"}]), "check 'time' has no key 'unit'"),
-    "no limit": (line(checks=[{k: v for k, v in CHECK.items() if k != "limit"}]), "check 'time' has no key 'limit'"),
-    "no name": (line(checks=[{"value": 1}]), "a check has no name"),
-    "no checks": (line(checks=None), "its checks are not a list"),
-    "unknown key": (line(checks=[{**CHECK, "more": 1}]), "check 'time' has an unknown key 'more'"),
-    "infinite": (line(checks=[{**CHECK, "value": float("inf")}]), "the value of check 'time' is not a finite number"),
-    "huge": (line(checks=[{**CHECK, "value": int("1" * 400)}]), "the value of check 'time' is not a finite number"),
-    "unit": (line(checks=[{**CHECK, "unit": 3}]), "the unit of check 'time' is not a string"),
-    "ok": (line(checks=[{**CHECK, "ok": 1}]), "check 'time': 'ok' is neither true nor false"),
-    "exclusive": (line(checks=[{**CHECK, "exclusive": 1}]), "check 'time': 'exclusive' is neither true nor false"),
-    "limit": (
-        line(checks=[{**CHECK, "limit": {"most": 1}}]),
-        "the limit of check 'time' is not an object of numbers 'min' and 'max'",
-    ),
-    "surrogate": (line(reason="\ud800"), "its reason is not a string of 1 to 2000 characters of UTF-8"),
-    "empty reason": (line(reason=""), "its reason is not a string of 1 to 2000 characters of UTF-8"),
-    "long reason": (line(reason="x" * 5000), "its reason is not a string of 1 to 2000 characters of UTF-8"),
-    "outcome": (line(outcome="maybe"), 'its outcome is "maybe", expected passed or failed'),
-    "deep": (b'{"dodo": "verdict", "checks": ' + b"[" * 30_000, "its JSON cannot be read"),
-    "unfinished": (line()[:-5], "its JSON cannot be read"),
+    "evidence list": line(evidence=[1]),
+    "much evidence": line(evidence={f"a{n}": n for n in range(21)}),
+    "evidence key": line(evidence={"No": 1}),
+    "long evidence key": line(evidence={"a" * 41: 1}),
+    "evidence object": line(evidence={"x": {}}),
+    "evidence true": line(evidence={"x": True}),
+    "infinite evidence": line(evidence={"x": float("inf")}),
+    "no number": line(evidence={"x": float("nan")}),
+    "long evidence": line(evidence={"x": "a" * 201}),
+    "no evidence": line(evidence=None),
+    **{f"no {key}": line(checks=[{k: v for k, v in CHECK.items() if k != key}]) for key in CHECK},
+    "no checks": line(checks=None),
+    "unknown key": checked(more=1),
+    "infinite": checked(value=float("inf")),
+    "huge": checked(value=int("1" * 400)),
+    "unit": checked(unit=3),
+    "ok": checked(ok=1),
+    "exclusive": checked(exclusive=1),
+    "limit": checked(limit={"most": 1}),
+    "limit that is none": checked(limit={"max": None}),
+    "surrogate": line(reason="\ud800"),
+    "empty reason": line(reason=""),
+    "long reason": line(reason="x" * 5000),
+    "outcome": line(outcome="maybe"),
+    "deep": b'{"dodo": "verdict", "checks": ' + b"[" * 30_000,
+    "unfinished": line()[:-5],
 }
 
 
 @pytest.mark.parametrize("case", MALFORMED)
 def test_other_verdicts_are_malformed(case: str) -> None:
-    text, problem = MALFORMED[case]
-    assert read_line("track", True, text) == Malformed("track", problem)
-    assert read_line("camera", False, text) is None
+    found = read_line("track", True, MALFORMED[case])
+    assert isinstance(found, Malformed) and 0 < len(found.problem) < 200
+    assert read_line("camera", False, MALFORMED[case]) is None
 
 
 RESPONSE = {

@@ -137,7 +137,7 @@ def test_a_silent_application_fails_when_the_time_is_over(truth: Path) -> None:
 
 def test_a_truth_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, "{}")
-    assert refusal("object_detection", f"--truth={path}", *LIMITS) == f"{path}: expected an object with a list 'images'"
+    assert refusal("object_detection", f"--truth={path}", *LIMITS) == f"{path}: $: 'images' is missing"
 
 
 def test_help_names_the_equations() -> None:

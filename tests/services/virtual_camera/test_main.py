@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.opendlv.message_set import MessageSet
@@ -91,13 +90,3 @@ def test_libcluon_gets_the_pictures_of_the_frames_it_sends(start, cid):
 def test_flags_that_cannot_be_met(cid, flags, message):
     names = [f"--name.{kind}=dodo-test-{os.getpid()}-{cid}.{kind}" for kind in ("argb", "i420")]
     assert re.search(message, refusal("virtual_camera", *names, *flags))
-
-
-def test_the_readme_explains_each_flag_and_its_example_has_known_ones():
-    readme = (FOLDER / "README.md").read_text()
-    parameters = yaml.safe_load((FOLDER / "service.yml").read_text())["parameters"]
-    for name in parameters:
-        assert f"`--{name}`" in readme
-    (example,) = (line for line in readme.splitlines() if line.strip().startswith("python -m services.virtual_camera"))
-    used = re.findall(r"--([a-z][a-z0-9.-]*)=", example)
-    assert {"cid", "map-path"} <= set(used) <= {"cid", *parameters}

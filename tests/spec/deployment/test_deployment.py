@@ -3,8 +3,6 @@
 import ipaddress
 from pathlib import Path
 
-import pytest
-
 from dodo_dsl import package_data
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 
@@ -75,54 +73,3 @@ def test_everything(tmp_path: Path) -> None:
     assert emulated is not None
     assert emulated.is_emulated
     assert deployment.rig("other") is None
-
-
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("registry: [none]", ("missing-file", "there is no folder 'none'")),
-        ("application: none", ("missing-file", "there is no file 'none'")),
-        (
-            "cids: 254-1",
-            (
-                "out-of-range",
-                "'254-1' is not a range of CIDs, expected numbers from 1 to 254, the lower one first",
-            ),
-        ),
-        ("subnets: 10.0.0.1/16", ("wrong-value", "not an IPv4 network: 10.0.0.1/16 has host bits set")),
-        ("subnets: 10.0.0.0/30", ("out-of-range", "'10.0.0.0/30' is too small, every test needs a /28")),
-        (
-            "rigs: {emulated: {kind: static, cid: 120}}",
-            ("rig-name", "the name 'emulated' is reserved for the built-in rig"),
-        ),
-        (
-            "rigs: {a: {kind: static, cid: 120}, b: {kind: static, cid: 120}}",
-            ("rig-cid", "CID 120 is taken by rig 'a', expected one that only this rig has"),
-        ),
-        (
-            "rigs: {a: {kind: static, emulated: maybe}}",
-            ("wrong-type", "'emulated' is 'maybe', expected true or false"),
-        ),
-        ("rigs: {a: {kind: static, emulated: false}}", ("missing-key", "'a' has no key 'cid'")),
-        (
-            "rigs: {a: {kind: static, cid: 112}}",
-            ("rig-cid", "CID 112 is taken by real cars, expected one that only this rig has"),
-        ),
-    ],
-)
-def test_what_is_refused(text: str, problem: tuple[str, str], tmp_path: Path) -> None:
-    assert loaded(tmp_path, f"{text}\n")[1] == [problem]
-
-
-def test_messages_that_cannot_be_read(tmp_path: Path) -> None:
-    (tmp_path / "my.odvd").write_text("message my.Own [id = 3000] {\n float x }")
-    _, ((rule, message),) = loaded(tmp_path, "messages: [my.odvd]\n")
-    assert rule == "wrong-messages"
-    assert message
-
-
-def test_an_empty_file(tmp_path: Path) -> None:
-    (tmp_path / "dodo.yml").touch()
-    deployment, (problem,) = load_deployment(tmp_path / "dodo.yml")
-    assert problem.message == "the file is empty, expected at least 'dodo: 1'"
-    assert deployment.registry == (package_data.registry(),)

@@ -8,6 +8,7 @@ import pytest
 
 from dodo_dsl import package_data
 from dodo_dsl.source import Scalar
+from dodo_dsl.spec import machine
 from dodo_dsl.spec.rig import (
     CIRCLE,
     EMULATED,
@@ -59,7 +60,7 @@ def test_a_rig_that_turns_without_end_alone_gives_its_kind_to_the_gantry() -> No
 
 
 def test_its_limits_are_one_text_for_its_memory() -> None:
-    rig = Rig("kiwi", "dynamic", 121, mapping("limits: {speed: 40 cm/s, x: 150 cm, yaw: 90 deg, y: many}\n"))
+    rig = Rig("kiwi", "dynamic", 121, mapping("limits: {speed: 40 cm/s, x: 150 cm, yaw: 90 deg}\n"))
     entry = rig.entry(MEMORY)
     assert entry is not None and isinstance(entry.value, Scalar) and entry is rig.entry(MEMORY)
     assert entry.value.text == "x=1.5,yaw=1.5707963267949,speed=0.4"
@@ -68,8 +69,9 @@ def test_its_limits_are_one_text_for_its_memory() -> None:
 
 def test_limits_have_the_names_and_units_of_the_schema_and_of_the_rigs_memory() -> None:
     schema = json.loads((package_data.schemas() / "deployment.schema.json").read_text())
-    limits = schema["$defs"]["rig"]["properties"]["limits"]["properties"]
-    assert {name: about["x-unit"] for name, about in limits.items()} == LIMIT_UNITS == UNITS
+    limits = schema["$defs"]["limits"]["properties"]
+    assert {name: about["x-unit"] for name, about in limits.items()} == {**LIMIT_UNITS, "yaw": "deg"} == machine.UNITS
+    assert LIMIT_UNITS == UNITS
     assert list(LIMIT_UNITS) == list(LIMITS)
 
 

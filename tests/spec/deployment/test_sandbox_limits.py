@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import pytest
-
 from dodo_dsl.spec.deployment import load_deployment
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -24,19 +22,3 @@ def test_all_that_can_be_said(tmp_path: Path) -> None:
     text += "copies: 5 GB, copied-files: 9}\n"
     limits = SandboxLimits(4 * 10**9, 20, 100, 1_500_000, ("~/models", "/srv"), 2.5, 5 * 10**9, 9)
     assert deployed(tmp_path, text) == (limits, [])
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("memory: 4", "'4' has no unit, expected a size in B"),
-        ("memory: 4 s", "'4 s' is a time, expected a size in B"),
-        ("processes: 1", "1"),
-        ("cpus: 0", "0"),
-        ("reads: [x]", "reads"),
-    ],
-)
-def test_what_is_wrong_is_named(tmp_path: Path, text: str, told: str) -> None:
-    limits, (problem,) = deployed(tmp_path, f"sandbox:\n  {text}\n")
-    assert problem.startswith("3: ") and told in problem
-    assert limits == SandboxLimits()

@@ -1,6 +1,5 @@
 """Hostile files: problems are reported, nothing runs, and nothing is written elsewhere."""
 
-import json
 import os
 import shutil
 import signal
@@ -14,7 +13,6 @@ from tests.emit.readers import ROOT, run
 
 GOOD = yaml.safe_load((ROOT / "tests_registry/sil-closed-straight/sil-closed-straight.dodo.yml").read_text())
 DEPLOYMENT = {"dodo": 1, "registry": ["tests"], "application": "app.yml"}
-METACHARACTERS = "$(touch pwned) `touch pwned` {{ 7 * 7 }} {% raw %} ${HOME} ; touch pwned & | > pwned '\" %s"
 PATIENCE_S = 60
 
 
@@ -78,19 +76,6 @@ def test_the_fixture_compiles(folder: Path) -> None:
     assert compiled(folder) == (0, "1 test compiled into generated\n")
 
 
-def test_ten_megabytes(folder: Path) -> None:
-    write(folder, "dodo: 1\nname: t\ndescription: '" + "x" * (10 << 20) + "'\n")
-    refused(folder, "too-large")
-
-
-@pytest.mark.thorough
-def test_thousands_of_mistakes(folder: Path) -> None:
-    write(folder, "dodo: 1\nname: t\n" + "".join(f"key-{i}: {{}}\n" for i in range(3000)))
-    code, said = compiled(folder)
-    assert code == 2
-    assert said.count("[unknown-key]") >= 1
-
-
 @pytest.mark.parametrize("name", ["tests/t/t.dodo.yml", "app.yml", "dodo.yml", "tests/maps/straight/map.json"])
 def test_a_pipe_that_nobody_writes(folder: Path, name: str) -> None:
     (folder / name).unlink()
@@ -102,14 +87,9 @@ def test_a_pipe_that_nobody_writes(folder: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("spec", "rule"),
     [
-        ({"extends": "../../../secret.dodo.yml"}, "path-escape"),
-        ({"extends": "/etc/passwd"}, "path-escape"),
         ({"extends": "link.dodo.yml"}, "path-escape"),
         ({"environment": {"camera": {"uses": "virtual-camera", "with": {"map-path": "../../../"}}}}, "path-escape"),
         ({"environment": {"camera": {"uses": "virtual-camera", "with": {"map-path": "up"}}}}, "path-escape"),
-        ({"name": "../../t"}, "wrong-value"),
-        ({"name": "--output"}, "wrong-value"),
-        ({"environment": {"../camera": {"uses": "virtual-camera"}}}, "wrong-value"),
         ({"environment": {"camera": {"uses": "../virtual_camera"}}}, "unknown-service"),
         ({"seed": "!!python/object/apply:os.system ['touch pwned']"}, "wrong-type"),
     ],
@@ -119,30 +99,3 @@ def test_paths_and_names_that_lead_away(folder: Path, spec: dict[str, object], r
     (folder / "tests" / "t" / "up").symlink_to(folder.parent)
     write(folder, {**GOOD, "name": "t", **spec})
     refused(folder, rule)
-
-
-def test_python_objects(folder: Path) -> None:
-    write(folder, yaml.safe_dump({**GOOD, "name": "t"}) + "seed: !!python/object/apply:os.system ['touch pwned']\n")
-    refused(folder, "yaml-tag")
-
-
-def test_metacharacters_stay_what_they_are(folder: Path) -> None:
-    spec = json.loads(json.dumps({**GOOD, "name": "t", "description": METACHARACTERS}))
-    write(folder, spec)
-    assert compiled(folder)[0] == 0
-    assert json.loads((folder / "generated" / "t" / "test.json").read_text())["description"] == METACHARACTERS
-    for path in (folder / "generated").glob("**/*.yml"):
-        yaml.safe_load(path.read_text())
-
-
-def test_a_bomb_of_aliases(folder: Path) -> None:
-    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
-    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)]
-    write(folder, "\n".join(lines))
-    refused(folder, "too-large")
-
-
-def test_a_matrix_that_explodes(folder: Path) -> None:
-    matrix = {f"d{i}": list(range(50)) for i in range(8)}
-    write(folder, {**GOOD, "name": "t", "matrix": matrix})
-    refused(folder, "matrix-size")

@@ -1,8 +1,6 @@
 """Specs of any content: the compiler reports problems, in few words and always the same."""
 
 import copy
-import itertools
-import json
 import os
 from pathlib import Path
 
@@ -69,20 +67,6 @@ def test_hostile_specs_are_refused(folder: Path, case: str) -> None:
     assert refused(folder, SPECS[case])
 
 
-KEYS = st.sampled_from(["dodo", "name", "level", "extends", "matrix", "with", "uses", "action", "camera", "<<", "a b"])
-SCALARS = st.sampled_from(
-    ["1", "sil", "hil", "60 s", "~", "*a", "&a x", "!!set", "|", "'", '"', "${matrix.a}", "../x", "\t"]
-)
-LINES = st.builds(lambda n, k, v: "  " * n + f"{k}: {v}\n", st.integers(0, 4), KEYS, SCALARS | st.text(max_size=8))
-
-
-@pytest.mark.slow
-@quick
-@given(lines=st.lists(LINES, max_size=12))
-def test_lines_like_yaml(folder: Path, lines: list[str]) -> None:
-    refused(folder, "".join(lines).encode("utf-8", "replace").decode())
-
-
 @pytest.mark.slow
 @quick
 @given(data=st.data())
@@ -98,12 +82,6 @@ def test_mutations_of_a_good_spec(folder: Path, data: st.DataObject) -> None:
         spec = spec[:begin] + put + spec[end:]
     refused(folder, spec)
     assert examples.compiled(folder) == examples.compiled(folder)
-
-
-@pytest.mark.slow
-def test_keys_with_values_of_other_keys(folder: Path) -> None:
-    for one, other in itertools.permutations(GOOD, 2):
-        refused(folder, json.dumps({**GOOD, one: GOOD[other]}))
 
 
 ODD = st.recursive(

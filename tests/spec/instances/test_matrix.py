@@ -1,11 +1,10 @@
 """Choices of a matrix, and their placeholders."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.matrix import MAX_INSTANCES, PLACEHOLDERS, SLUG, choices, substitute
+from dodo_dsl.spec.matrix import SLUG, choices, substitute
 from tests.source.nodes import mapping
 
 
@@ -21,41 +20,12 @@ def test_every_choice_in_order() -> None:
     assert found[-1].slug == "--light-bright-sun--speed-2-5-m-s"
 
 
-@pytest.mark.parametrize("text", ["a: 1", "matrix: 3", "matrix: {}", "matrix: {a: []}"])
-def test_one_empty_choice_without_values(text: str) -> None:
-    (choice,), _ = choices(mapping(text))
-    assert (choice.label, choice.slug) == ("", "")
-
-
 @given(st.lists(st.text(st.characters(codec="ascii", categories=["L", "N", "P"]), min_size=1, max_size=8), min_size=1))
 def test_names_of_folders_are_unique_or_reported(values: list[str]) -> None:
     items = ", ".join('"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"' for value in values)
     found, wrong = choices(mapping(f"matrix: {{a: [{items}]}}"))
     slugs = [choice.slug for choice in found]
     assert wrong or (len(set(slugs)) == len(slugs) and all(SLUG.fullmatch(f"t{slug}") for slug in slugs))
-
-
-@pytest.mark.parametrize(
-    ("text", "rules"),
-    [
-        ("{yaw: [+1 deg, -1 deg, '!']}", ["matrix-value", "matrix-value"]),
-        (f"{{a: {list(range(20))}, b: {list(range(20))}, c: {list(range(6))}}}", ["matrix-size"]),
-        (f"{{a: [{'x' * 180}]}}", ["matrix-size"]),
-    ],
-)
-def test_values_that_cannot_name_instances(text: str, rules: list[str]) -> None:
-    found, wrong = choices(mapping(f"matrix: {text}"))
-    assert [problem.rule for problem in wrong] == rules
-    assert len(found) <= MAX_INSTANCES
-
-
-def test_placeholders_and_their_problems() -> None:
-    node = mapping(
-        "matrix: {a: [1], b: [2]}\nx: ${matrix.a}\ny: ['at ${matrix.c}', '${ matrix.a }', '${matrix}', '${HOME}']\n"
-    )
-    assert PLACEHOLDERS.names(node) == {"a", "c"}
-    assert [problem.span.column for problem in PLACEHOLDERS.unknown(node, "matrix-unknown")] == [5, 23, 40]
-    assert [problem.span.column for problem in PLACEHOLDERS.idle(node, "matrix-unused")] == [18]
 
 
 def test_substitution() -> None:

@@ -31,11 +31,6 @@ def test_ranges_in_order() -> None:
     assert light.number(light.nominal.text) == 1
 
 
-@pytest.mark.parametrize("text", ["a: 1", "vary: 3", "vary: {}", "vary: {a: 3}", "vary: {a: {nominal: [1]}}"])
-def test_what_the_schema_reports_is_no_range(text: str) -> None:
-    assert read(mapping(text))[0] == ()
-
-
 def test_every_end_is_in_a_corner_and_the_rest_is_nominal() -> None:
     found = [{name: value.text for name, value in corner.items()} for corner in corners(ranges())]
     assert found == [
@@ -48,28 +43,6 @@ def test_every_end_is_in_a_corner_and_the_rest_is_nominal() -> None:
         "start": "0 cm",
         "map": "b",
     }
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("{from: 2, to: 1, nominal: 1}", "vary-range 2,"),
-        ("{from: 1, to: 2, nominal: 3}", "vary-range 3}"),
-        ("{from: 1 m, to: 2 m, nominal: 99 cm}", "vary-range 99"),
-        ("{from: 1 m, to: 2, nominal: 1 m}", "wrong-unit 2,"),
-        ("{from: 1, to: 2 m, nominal: 1}", "wrong-unit 2 m"),
-        ("{from: .inf, to: 2, nominal: 1}", "vary-range .inf"),
-        ("{among: [x, y], nominal: z}", "vary-range z"),
-        ("{among: [x, x], nominal: x}", "vary-range x], "),
-        ("{from: 1, nominal: 1}", "missing-key a:"),
-        ("{among: [x, y]}", "missing-key a:"),
-        ("{from: 1, to: 2, among: [1], nominal: 1}", "vary-range a:"),
-    ],
-)
-def test_problems_of_a_range(text: str, expected: str) -> None:
-    line = f"vary: {{a: {text}}}"
-    _, (problem,) = read(mapping(line))
-    assert f"{problem.rule} {line[problem.span.column - 1 :]}".startswith(expected)
 
 
 def test_a_range_with_a_problem_keeps_its_nominal_value() -> None:
