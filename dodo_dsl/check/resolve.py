@@ -17,6 +17,7 @@ from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, message, wire
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
 from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
+from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService, resolved
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
@@ -179,6 +180,11 @@ class ResolvedTest:
     def is_complete(self) -> bool:
         """Whether every service of the spec has a manifest."""
         return len(self.services) == len(self.spec.uses)
+
+    @functools.cached_property
+    def variables(self) -> dict[str, str]:
+        """What the spec gives variables of the application, where it is a text."""
+        return {name: e.value.text for name, e in self.spec.variables.items() if isinstance(e.value, Scalar)}
 
 
 def isolation(spec: Spec, rig: Rig | None) -> str:
