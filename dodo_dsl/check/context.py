@@ -37,7 +37,7 @@ class RuleContext:
 
     @property
     def services(self) -> tuple[ResolvedService, ...]:
-        """The services whose manifest is known; ``unknown-service`` reports the others."""
+        """Those that are known in their layers; ``unknown-service`` and ``wrong-layer`` report the others."""
         return self.test.services
 
     @property

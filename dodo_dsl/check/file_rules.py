@@ -27,8 +27,6 @@ _TEXT = (".json", ".csv", ".obj", ".txt", ".yml", ".yaml")
 
 def check_files(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
-        if service.use.layer not in service.manifest.layers:
-            continue
         for argument in service.arguments.values():
             yield from file_problems(context, service, argument)
 
@@ -296,9 +294,8 @@ def pictures(path: Path, sender: int, most: int) -> int:
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
-        if service.use.layer in service.manifest.layers:
-            yield from _limits(service)
-            yield from _files(service)
+        yield from _limits(service)
+        yield from _files(service)
 
 
 def _limits(service: ResolvedService) -> Iterator[Diagnostic]:

@@ -60,7 +60,7 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | No
 
 
 def _units(test: ResolvedTest) -> dict[str, str]:
-    """Those of all checks by name, also of evaluators in a wrong layer."""
+    """Those of all checks by name."""
     found = dict(_OF_THE_TEST)
     for service in test.services:
         found.update(service.manifest.checks)

@@ -165,7 +165,8 @@ def known_messages(own: tuple[Path, ...]) -> Mapping[str, odvd.Definition]:
 
 @dataclass(frozen=True)
 class ResolvedTest:
-    """One instance with its rig, the services whose manifests are known, and its wiring with the application.
+    """One instance with its rig, the services whose manifests are known and in whose layer they may be, and its wiring
+    with the application.
 
     ``left_out`` are messages that services which play recordings leave out, because they are the application's.
     """
@@ -178,7 +179,7 @@ class ResolvedTest:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every service of the spec has a manifest."""
+        """Whether every service of the spec has a manifest, and is in a layer that this names."""
         return len(self.services) == len(self.spec.uses)
 
     @functools.cached_property
@@ -207,7 +208,7 @@ def resolve(
         services = tuple(
             resolved(spec, use, manifest, rig, _arguments(previous, use.layer, use.name))
             for use in spec.uses
-            if (manifest := manifests.get(use.uses.text)) is not None
+            if (manifest := manifests.get(use.uses.text)) is not None and use.layer in manifest.layers
         )
         services = tuple(_at_camera_rate(each, services) for each in services)
         services, wiring = _driven(services, wire(services, declared), declared)
