@@ -195,7 +195,7 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
     known = lockstep.rates(services)
     has_rate = not player and known.keys() & lockstep.cameras_of(context.wiring)
     period = 1 / lockstep.step_hz(context.wiring, known) if has_rate else 0.0
-    for service in services if spec.is_whole and context.test.is_complete else ():
+    for service in services if context.test.is_complete else ():
         found: list[Unmet] = []
         for name, argument in service.arguments.items():
             is_default = argument.parameter.within_timeout and not argument.entry and argument.text

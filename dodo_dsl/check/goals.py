@@ -38,7 +38,7 @@ def resolved_goals(test: ResolvedTest) -> ResolvedGoals:
 def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | None:
     """A goal or its problem; None if a key is not valid, or a service that is not known may have the check."""
     unit, written = _unit(test, name), plain(entry.value)
-    if unit is None and test.is_complete and test.spec.is_whole:
+    if unit is None and test.is_complete:
         hint = did_you_mean(name, _units(test))
         return Diagnostic(entry.key, "unknown-check", f"no evaluator of the test has a check '{name}'", hint)
     if unit is None or not {"better", "zero", "one"} <= written.keys():

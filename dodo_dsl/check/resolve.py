@@ -179,8 +179,8 @@ class ResolvedTest:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every service of the spec has a manifest, and is in a layer that this names."""
-        return len(self.services) == len(self.spec.uses)
+        """Whether every service of the spec could be read, has a manifest, and is in a layer that this names."""
+        return self.spec.is_whole and len(self.services) == len(self.spec.uses)
 
     @functools.cached_property
     def variables(self) -> dict[str, str]:

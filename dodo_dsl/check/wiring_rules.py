@@ -24,7 +24,7 @@ SENSORS = "opendlv.proxy."
 
 
 def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
-    if not context.spec.is_whole or not context.test.is_complete:
+    if not context.test.is_complete:
         return  # unknown services and wrong layers come first
     wiring = context.wiring
     known = {*context.messages, ANYTHING}
@@ -150,7 +150,7 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
     """A service that reads one memory of the test may make others, and so may services that share one."""
     ends = [end for end in context.wiring.produced if end.port.kind == "memory"]
     made = {end.port.name for end in ends}
-    if not made or context.application is None or not context.spec.is_whole or not context.test.is_complete:
+    if not made or context.application is None or not context.test.is_complete:
         return
     services = with_variables(context.application, context.test.variables).services.values()
     asked = {service.name: _asked(service) for service in services}
@@ -176,7 +176,7 @@ def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterat
 
 def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
     """Frames whose bytes the application would take for others, or refuse."""
-    if context.application is None or not context.spec.is_whole or not context.test.is_complete:
+    if context.application is None or not context.test.is_complete:
         return
     for asked in pictures_of(with_variables(context.application, context.test.variables)):
         for service in context.services:
