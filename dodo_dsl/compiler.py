@@ -12,9 +12,8 @@ from dodo_dsl.application.read import read_application
 from dodo_dsl.application.unseen import unseen_problems
 from dodo_dsl.check import check
 from dodo_dsl.check import problems as check_problems
-from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.problems import Problems
-from dodo_dsl.check.resolve import ResolvedTest, resolve
+from dodo_dsl.check.resolve import ResolvedTest, known_ids, resolve
 from dodo_dsl.check.suite_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
@@ -113,7 +112,7 @@ def load(
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
-    own = check_problems.problems(deployment.services, reader, known_messages(deployment.messages))
+    own = check_problems.problems(deployment.services, reader, known_ids(deployment.messages))
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
     once = functools.lru_cache(maxsize=_MOST_READ)(reader)
     loaded = {} if services_only else {location.path: load_spec(location, once) for location in locations}
