@@ -28,7 +28,6 @@ RULES: tuple[Rule, ...] = (
     service_rules.check_own_messages,
     file_rules.check_references,
     file_rules.check_files,
-    needed_files.check_needed_files,
     file_rules.check_starts,
     file_rules.check_limits,
     file_rules.check_input,
