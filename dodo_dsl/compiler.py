@@ -12,9 +12,8 @@ from dodo_dsl.application.read import read_application
 from dodo_dsl.application.unseen import unseen_problems
 from dodo_dsl.check import check
 from dodo_dsl.check import problems as check_problems
-from dodo_dsl.check.context import known_messages
 from dodo_dsl.check.problems import Problems
-from dodo_dsl.check.resolve import ResolvedTest, resolve
+from dodo_dsl.check.resolve import ResolvedTest, known_ids, resolve
 from dodo_dsl.check.suite_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
@@ -28,7 +27,7 @@ from dodo_dsl.spec.rig import PORT
 from dodo_dsl.spec.vary import Values
 
 if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it takes as long as the rest
-    from dodo_dsl.emit.pipeline import Pipeline, SearchJobs
+    from dodo_dsl.emit.pipeline import Pipeline
     from dodo_dsl.emit.pipeline_jobs import JobOptions
     from dodo_dsl.emit.render import File
     from dodo_dsl.plan.build import Compiled
@@ -113,7 +112,7 @@ def load(
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
-    own = check_problems.problems(deployment.services, reader, known_messages(deployment.messages))
+    own = check_problems.problems(deployment.services, reader, known_ids(deployment.messages))
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
     once = functools.lru_cache(maxsize=_MOST_READ)(reader)
     loaded = {} if services_only else {location.path: load_spec(location, once) for location in locations}
@@ -212,15 +211,10 @@ def _registries_above(paths: Sequence[Path], reader: Reader) -> list[Path]:
     return [folder for file in files if file for folder in load_deployment(file, reader)[0].registry]
 
 
-def plan(
-    checked: Checked,
-    out: Path,
-    searches: Sequence["SearchJobs"] = (),
-    options: "JobOptions | None" = None,
-) -> Compilation:
+def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Compilation:
     """The Plans of tests without errors, for the output folder ``out``; raises NoApplication without one.
 
-    The pipeline has the jobs of ``searches``, too, and ``options`` hold for all its jobs.
+    ``options`` hold for all jobs of the pipeline.
     """
     from dodo_dsl.emit.output_folder import pipeline_folder
     from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_problems
@@ -235,7 +229,7 @@ def plan(
     compiled = build(
         checked.tests, checked.manifests, deployment, application, out.resolve(), settings, options.from_repository
     )
-    jobs = pipeline(compiled.suite, pipeline_folder(out), searches, options)
+    jobs = pipeline(compiled.suite, pipeline_folder(out), options)
     child = render_pipeline(jobs)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}

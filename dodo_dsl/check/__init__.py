@@ -1,6 +1,6 @@
 """The rules: each is a module with one concern, in one explicit list."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +28,6 @@ RULES: tuple[Rule, ...] = (
     service_rules.check_own_messages,
     file_rules.check_references,
     file_rules.check_files,
-    needed_files.check_needed_files,
     file_rules.check_starts,
     file_rules.check_limits,
     file_rules.check_input,
@@ -48,9 +47,10 @@ def check(
     application: ApplicationSource | None = None,
     corners: Iterable[ResolvedTest] = (),
 ) -> dict[Path, list[Diagnostic]]:
-    """All problems of all instances, by spec.
+    """All problems of all instances, by spec, each once and with all instances that have it.
 
-    ``corners`` are instances at the ends of their ranges, whose problems are added to those of the others.
+    ``corners`` are instances at the ends of their ranges, whose problems are added to those of the others, each with
+    the first that has it.
     """
     everything = tuple(tests)
     by_name: dict[str, dict[Path, Spec]] = {}
@@ -58,19 +58,18 @@ def check(
         by_name.setdefault(test.spec.name or "", {}).setdefault(test.spec.path, test.spec)
     named = {name: list(specs.values()) for name, specs in by_name.items()}
 
-    def by_path(tests: Iterable[ResolvedTest]) -> dict[Path, list[tuple[Spec, list[Diagnostic]]]]:
-        groups: dict[Path, list[tuple[Spec, list[Diagnostic]]]] = {}
-        for test in tests:
-            context = RuleContext(test, manifests, named, deployment, application)
-            found = [diagnostic for rule in RULES for diagnostic in rule(context)]
-            groups.setdefault(test.spec.path, []).append((test.spec, found))
-        return groups
+    def problems(test: ResolvedTest) -> dict[Diagnostic, None]:
+        context = RuleContext(test, manifests, named, deployment, application)
+        return dict.fromkeys(diagnostic for rule in RULES for diagnostic in rule(context))
 
-    at_ends = by_path(corners)
-    return {
-        path: [*_with_instances(group), *_of_corners(at_ends.get(path, ()), {d for _, found in group for d in found})]
-        for path, group in by_path(everything).items()
-    }
+    having: dict[Path, dict[Diagnostic, list[str]]] = {test.spec.path: {} for test in everything}
+    for test in everything:
+        for diagnostic in problems(test):
+            having[test.spec.path].setdefault(diagnostic, []).append(test.spec.title)
+    for corner in corners:
+        for diagnostic in problems(corner):
+            having[corner.spec.path].setdefault(diagnostic, [corner.spec.title])
+    return {path: [replace(d, tests=tuple(titles)) for d, titles in found.items()] for path, found in having.items()}
 
 
 def forget_files() -> None:
@@ -86,23 +85,3 @@ def forget_files() -> None:
     )
     for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
         cache.cache_clear()
-
-
-def _with_instances(group: Sequence[tuple[Spec, list[Diagnostic]]]) -> Iterator[Diagnostic]:
-    """The problems of a file's instances, each once and with all instances that have it."""
-    having: dict[Diagnostic, dict[str, None]] = {}
-    for spec, found in group:
-        for diagnostic in found:
-            having.setdefault(diagnostic, {})[spec.title] = None
-    for diagnostic, titles in having.items():
-        yield replace(diagnostic, tests=tuple(titles))
-
-
-def _of_corners(group: Sequence[tuple[Spec, list[Diagnostic]]], known: set[Diagnostic]) -> Iterator[Diagnostic]:
-    """The problems that are not ``known``, each once."""
-    seen = set(known)
-    for spec, found in group:
-        for diagnostic in found:
-            if diagnostic not in seen:
-                seen.add(diagnostic)
-                yield replace(diagnostic, tests=(spec.title,))

@@ -1,8 +1,7 @@
 """The input of a rule, and its signature."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from dodo_dsl.application.model import ApplicationSource
@@ -37,7 +36,7 @@ class RuleContext:
 
     @property
     def services(self) -> tuple[ResolvedService, ...]:
-        """The services whose manifest is known; ``unknown-service`` reports the others."""
+        """Those that are known in their layers; ``unknown-service`` and ``wrong-layer`` report the others."""
         return self.test.services
 
     @property
@@ -45,14 +44,9 @@ class RuleContext:
         return self.test.wiring
 
     @property
-    def messages(self) -> frozenset[str]:
-        """The full names of all messages: OpenDLV's, DoDo's and the deployment's."""
-        return known_messages(self.deployment.messages)
-
-
-def known_messages(own: tuple[Path, ...]) -> frozenset[str]:
-    """The names of the standard messages and of those in a deployment's files, as far as these can be read."""
-    return frozenset(known_ids(own))
+    def messages(self) -> Collection[str]:
+        """The full names of all messages: OpenDLV's, DoDo's and the deployment's, as far as these can be read."""
+        return known_ids(self.deployment.messages)
 
 
 class Rule(Protocol):

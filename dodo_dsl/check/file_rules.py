@@ -10,6 +10,7 @@ from typing import Any
 
 from dodo_dsl.check import lockstep
 from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.needed_files import needed
 from dodo_dsl.check.resolve import IMAGE, known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.opendlv import regular_file
@@ -26,11 +27,26 @@ _TEXT = (".json", ".csv", ".obj", ".txt", ".yml", ".yaml")
 
 
 def check_files(context: RuleContext) -> Iterator[Diagnostic]:
+    """What files hold; ``path-escape``: what a test needs is not too much, and no link out of the registry."""
     for service in context.services:
-        if service.use.layer not in service.manifest.layers:
-            continue
         for argument in service.arguments.values():
             yield from file_problems(context, service, argument)
+            if argument.entry and argument.value and argument.value.path:
+                found = needed(argument.parameter, argument.value.path, context.spec.location.root)
+                if isinstance(found, str):
+                    yield Diagnostic(argument.entry.key, "path-escape", found)
+                yield from _empty(argument, argument.value.path, argument.entry.value.span)
+
+
+def _empty(argument: Argument, file: Path, span: Span) -> Iterator[Diagnostic]:
+    shown = f"{file.parent.name}/{file.name}"
+    for key in argument.parameter.not_empty:
+        try:
+            if not entries(file, key):
+                yield Diagnostic(span, "empty-file", f"{shown} has no {key}, so there is nothing to judge by")
+        except ValueError as error:
+            if not argument.parameter.format:  # which is reported with the file
+                yield Diagnostic(span, RULE, f"{shown}: {error}")
 
 
 def is_own(diagnostic: Diagnostic) -> bool:
@@ -197,7 +213,7 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
     known = lockstep.rates(services)
     has_rate = not player and known.keys() & lockstep.cameras_of(context.wiring)
     period = 1 / lockstep.step_hz(context.wiring, known) if has_rate else 0.0
-    for service in services if spec.is_whole and context.test.is_complete else ():
+    for service in services if context.test.is_complete else ():
         found: list[Unmet] = []
         for name, argument in service.arguments.items():
             is_default = argument.parameter.within_timeout and not argument.entry and argument.text
@@ -296,28 +312,10 @@ def pictures(path: Path, sender: int, most: int) -> int:
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
-        if service.use.layer in service.manifest.layers:
-            yield from _limits(service)
-            yield from _files(service)
-
-
-def _limits(service: ResolvedService) -> Iterator[Diagnostic]:
-    for names in service.manifest.one_of:
-        if not any(name in service.use.parameters or service.texts.get(name) for name in names):
-            message, hint = f"'{service.use.name}' has nothing to judge by", f"write one or more of {', '.join(names)}"
-            yield Diagnostic(service.use.span, "no-limit", message, f"{hint} under 'with'")
-
-
-def _files(service: ResolvedService) -> Iterator[Diagnostic]:
-    for argument in service.arguments.values():
-        entry, file = argument.entry, argument.value.path if argument.value else None
-        for key in argument.parameter.not_empty if entry and file else ():
-            assert entry and file
-            shown = f"{file.parent.name}/{file.name}"
-            try:
-                if not entries(file, key):
-                    message = f"{shown} has no {key}, so there is nothing to judge by"
-                    yield Diagnostic(entry.value.span, "empty-file", message)
-            except ValueError as error:
-                if not argument.parameter.format:  # which is reported with the file
-                    yield Diagnostic(entry.value.span, "wrong-file", f"{shown}: {error}")
+        for names in service.manifest.one_of:
+            if not any(name in service.use.parameters or service.texts.get(name) for name in names):
+                message, hint = (
+                    f"'{service.use.name}' has nothing to judge by",
+                    f"write one or more of {', '.join(names)}",
+                )
+                yield Diagnostic(service.use.span, "no-limit", message, f"{hint} under 'with'")

@@ -1,15 +1,13 @@
 """The goals of a test in the units of its checks."""
 
 from dataclasses import dataclass
-from decimal import Decimal
 from fnmatch import fnmatchcase
 
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Scalar, plain
-from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import Goal
-from dodo_dsl.spec.quantity import SHARE, QuantityError, convert, written_unit
+from dodo_dsl.spec.quantity import SHARE, QuantityError, convert
 
 _OF_THE_TEST = {
     "slow-answers": "",
@@ -40,10 +38,10 @@ def resolved_goals(test: ResolvedTest) -> ResolvedGoals:
 def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | None:
     """A goal or its problem; None if a key is not valid, or a service that is not known may have the check."""
     unit, written = _unit(test, name), plain(entry.value)
-    if unit is None and _is_known(test):
+    if unit is None and test.is_complete:
         hint = did_you_mean(name, _units(test))
         return Diagnostic(entry.key, "unknown-check", f"no evaluator of the test has a check '{name}'", hint)
-    if not {"better", "zero", "one"} <= written.keys() or (unit is None and not _undeclared(test)):
+    if unit is None or not {"better", "zero", "one"} <= written.keys():
         return None
     scalars = {k: e.value for k, e in entry.value.entries.items()} if isinstance(entry.value, Mapping) else {}
     values = {}
@@ -51,7 +49,7 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | No
         scalar = scalars[key]
         assert isinstance(scalar, Scalar)
         try:
-            values[key] = float(_number(scalar.text) if unit is None else convert(scalar.text, unit or SHARE))
+            values[key] = float(convert(scalar.text, unit or SHARE))
         except QuantityError as error:
             return Diagnostic(scalar.span, "wrong-unit", f"'{key}': {error}", error.hint)
     better = written["better"]
@@ -61,31 +59,11 @@ def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | No
     return Goal(name, **values, weight=float(written.get("weight", 1)))
 
 
-def _number(text: str) -> Decimal:
-    """A number of an evaluator that does not declare its units."""
-    if written_unit(text) != "":
-        hint = "write a bare number, or add 'checks' to the manifest"
-        raise QuantityError(f"'{text}' is not a number, and its evaluator's manifest does not declare a unit", hint)
-    return Decimal(text)
-
-
-def _judges(test: ResolvedTest) -> list[Manifest]:
-    """The manifests of evaluators, and of services in a wrong layer, where they may be some."""
-    return [s.manifest for s in test.services if s.use.layer == "evaluation" or s.use.layer not in s.manifest.layers]
-
-
-def _undeclared(test: ResolvedTest) -> bool:
-    return not all(manifest.checks for manifest in _judges(test))
-
-
-def _is_known(test: ResolvedTest) -> bool:
-    return not _undeclared(test) and test.is_complete and test.spec.is_whole
-
-
 def _units(test: ResolvedTest) -> dict[str, str]:
+    """Those of all checks by name."""
     found = dict(_OF_THE_TEST)
-    for manifest in _judges(test):
-        found.update(manifest.checks)
+    for service in test.services:
+        found.update(service.manifest.checks)
     return found
 
 

@@ -1,28 +1,13 @@
-"""The files that a test needs, which are copied beside its compiled form.
-
-``path-escape``: none of them is a link out of the registry, and they are not too many.
-"""
+"""The files that a test needs, which are copied beside its compiled form."""
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-from dodo_dsl.check.context import RuleContext
-from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.manifest import Parameter
 
 MAX_FILES = 5_000
 MAX_BYTES = 2 << 30
-
-
-def check_needed_files(context: RuleContext) -> Iterator[Diagnostic]:
-    root = context.spec.location.root
-    for service in context.services:
-        for argument in service.arguments.values():
-            if argument.entry and argument.value and argument.value.path:
-                found = needed(argument.parameter, argument.value.path, root)
-                if isinstance(found, str):
-                    yield Diagnostic(argument.entry.key, "path-escape", found)
 
 
 def needed(parameter: Parameter, path: Path, root: Path) -> Mapping[str, Path] | str:

@@ -42,44 +42,31 @@ class Problems:
         return replace(self, of_services=tuple(kept))
 
     def of(self, specs: Iterable[Spec]) -> tuple[Diagnostic, ...]:
-        """What these instances have, sorted by position, each once and with the tests that it depends on."""
+        """What these instances have, sorted by position, each once.
+
+        It names the tests that have it: none if its position shows whose it is, or if it is of a file.
+        """
         instances: dict[Path, list[Spec]] = {}
         for spec in specs:
             instances.setdefault(spec.path, []).append(spec)
-        by_rules = {path: list(_of(own, self.by_rules.get(path, ()))) for path, own in instances.items()}
-        read = itertools.chain.from_iterable(own for path, own in self.as_read.items() if path in instances)
-        ruled = dict.fromkeys(itertools.chain.from_iterable(by_rules.values()))
-        having = _having(instances, by_rules)
-        found = ordered([*self.common, *self.of_services, *read, *ruled])
-        return tuple(replace(d, tests=having.get(d, ())) for d in found)
-
-
-def _of(instances: Sequence[Spec], found: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
-    """The problems that some of a file's instances have, or that they have at an end of their ranges."""
-    titles = {one.title for spec in instances for one in (spec, *spec.corners)}
-    for problem in found:
-        if tests := tuple(title for title in problem.tests if title in titles):
-            yield replace(problem, tests=tests)
-
-
-def _having(
-    instances: Mapping[Path, Sequence[Spec]], by_rules: Mapping[Path, Sequence[Diagnostic]]
-) -> Mapping[Diagnostic, tuple[str, ...]]:
-    """The tests named with each problem: none if its position shows whose it is, or if it is of a file."""
-    names: dict[Diagnostic, list[str]] = {}
-    at_home = set[Diagnostic]()
-    for path, found in by_rules.items():
-        own = instances[path]
-        titles = {spec.title for spec in own}
-        name = own[0].name or own[0].location.stem
-        ends = {end.span for spec in own for one in spec.ranges for end in one.ends}
-        for problem in found:
-            is_of_all = titles <= set(problem.tests)
-            is_told = (problem.span.file == str(path) and is_of_all) or problem.span in ends
-            if is_told or file_rules.is_own(problem):
-                at_home.add(problem)
-            names.setdefault(problem, []).extend([name] if is_of_all else problem.tests)
-    return {problem: tuple(dict.fromkeys(those)) for problem, those in names.items() if problem not in at_home}
+        names: dict[Diagnostic, dict[str, None]] = {}
+        at_home = set[Diagnostic]()
+        for path, own in instances.items():
+            titles, ends = {spec.title for spec in own}, {e.span for s in own for one in s.ranges for e in one.ends}
+            every = titles | {corner.title for spec in own for corner in spec.corners}
+            for problem in self.by_rules.get(path, ()):
+                having = [title for title in problem.tests if title in every]
+                if not having:
+                    continue
+                is_of_all = titles <= set(having)
+                shown = [own[0].name or own[0].location.stem] if is_of_all else having
+                names.setdefault(problem, {}).update(dict.fromkeys(shown))
+                is_told = (problem.span.file == str(path) and is_of_all) or problem.span in ends
+                if is_told or file_rules.is_own(problem):
+                    at_home.add(problem)
+        read = itertools.chain.from_iterable(found for path, found in self.as_read.items() if path in instances)
+        everything = ordered([*self.common, *self.of_services, *read, *names])
+        return tuple(replace(d, tests=() if d in at_home else tuple(names.get(d, ()))) for d in everything)
 
 
 _NAME = re.compile(r"[\w.]+")

@@ -17,6 +17,7 @@ from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, message, wire
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
 from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
+from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService, resolved
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
@@ -164,7 +165,8 @@ def known_messages(own: tuple[Path, ...]) -> Mapping[str, odvd.Definition]:
 
 @dataclass(frozen=True)
 class ResolvedTest:
-    """One instance with its rig, the services whose manifests are known, and its wiring with the application.
+    """One instance with its rig, the services whose manifests are known and in whose layer they may be, and its wiring
+    with the application.
 
     ``left_out`` are messages that services which play recordings leave out, because they are the application's.
     """
@@ -177,8 +179,13 @@ class ResolvedTest:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every service of the spec has a manifest."""
-        return len(self.services) == len(self.spec.uses)
+        """Whether every service of the spec could be read, has a manifest, and is in a layer that this names."""
+        return self.spec.is_whole and len(self.services) == len(self.spec.uses)
+
+    @functools.cached_property
+    def variables(self) -> dict[str, str]:
+        """What the spec gives variables of the application, where it is a text."""
+        return {name: e.value.text for name, e in self.spec.variables.items() if isinstance(e.value, Scalar)}
 
 
 def isolation(spec: Spec, rig: Rig | None) -> str:
@@ -201,7 +208,7 @@ def resolve(
         services = tuple(
             resolved(spec, use, manifest, rig, _arguments(previous, use.layer, use.name))
             for use in spec.uses
-            if (manifest := manifests.get(use.uses.text)) is not None
+            if (manifest := manifests.get(use.uses.text)) is not None and use.layer in manifest.layers
         )
         services = tuple(_at_camera_rate(each, services) for each in services)
         services, wiring = _driven(services, wire(services, declared), declared)

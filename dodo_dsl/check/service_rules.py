@@ -46,9 +46,9 @@ def _is_broken(context: RuleContext, name: str) -> bool:
 
 
 def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
-    for service in context.services:
-        use, manifest = service.use, service.manifest
-        if use.layer not in manifest.layers:
+    for use in context.spec.uses:
+        manifest = context.manifests.get(use.uses.text)
+        if manifest and use.layer not in manifest.layers:
             message = f"service '{manifest.name}' does not fit layer {use.layer}"
             hint = f"move it to {' or '.join(manifest.layers)}"
             yield Diagnostic(use.uses.span, "wrong-layer", message, hint)
@@ -56,8 +56,6 @@ def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
-        if service.use.layer not in service.manifest.layers:
-            continue  # another service may be meant
         yield from _written(service)
         yield from _from_elsewhere(service)
         yield from _missing(context, service)

@@ -1,19 +1,15 @@
 """Rules on all tests together, whatever else is wrong with some of them.
 
 ``out-of-cids``: no two tests on the host's network share a CID. ``out-of-range``: the deployment's network has room for
-a test. ``application-file``: the engine takes the names of volumes.
+a test.
 """
 
 from collections.abc import Iterator, Sequence
 
-from dodo_dsl import source
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check.resolve import ResolvedTest, isolation
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.spec.deployment import Deployment
-
-_LONGEST = 242
-"""Characters of the names of a test and a volume together: with the project's, they name a folder of the engine."""
 
 
 def check_suite(
@@ -31,13 +27,6 @@ def check_suite(
         message = f"a test has {most} containers and so needs a /{length}, but 'subnets' is {deployment.subnets}"
         hint = "give 'subnets' in dodo.yml more, such as 10.213.0.0/16"
         yield Diagnostic(file or needed[most].spec.span("name"), "out-of-range", message, hint)
-    volumes = application.rest.get("volumes") if application else None
-    slug = max((test.spec.slug for test in tests), key=len, default="")
-    for name, entry in volumes.entries.items() if isinstance(volumes, source.Mapping) else ():
-        if len(slug) + len(name) > _LONGEST:
-            message = f"the name of the volume '{name}' is too long for the engine together with that of '{slug}'"
-            hint = f"shorten one of them: they may have {_LONGEST} characters together"
-            yield Diagnostic(entry.key, "application-file", message, hint)
 
 
 def reserved_cid(test: ResolvedTest, application: ApplicationSource | None) -> int | None:

@@ -24,8 +24,7 @@ SENSORS = "opendlv.proxy."
 
 
 def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
-    fits = all(service.use.layer in service.manifest.layers for service in context.services)
-    if not context.spec.is_whole or not context.test.is_complete or not fits:
+    if not context.test.is_complete:
         return  # unknown services and wrong layers come first
     wiring = context.wiring
     known = {*context.messages, ANYTHING}
@@ -151,10 +150,9 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
     """A service that reads one memory of the test may make others, and so may services that share one."""
     ends = [end for end in context.wiring.produced if end.port.kind == "memory"]
     made = {end.port.name for end in ends}
-    if not made or context.application is None or not context.spec.is_whole or not context.test.is_complete:
+    if not made or context.application is None or not context.test.is_complete:
         return
-    set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
-    services = with_variables(context.application, set_here).services.values()
+    services = with_variables(context.application, context.test.variables).services.values()
     asked = {service.name: _asked(service) for service in services}
     players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
     shown = {end.port.name for end in ends if end.service not in players}
@@ -178,10 +176,9 @@ def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterat
 
 def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
     """Frames whose bytes the application would take for others, or refuse."""
-    if context.application is None or not context.spec.is_whole or not context.test.is_complete:
+    if context.application is None or not context.test.is_complete:
         return
-    set_here = {name: e.value.text for name, e in context.spec.variables.items() if isinstance(e.value, Scalar)}
-    for asked in pictures_of(with_variables(context.application, set_here)):
+    for asked in pictures_of(with_variables(context.application, context.test.variables)):
         for service in context.services:
             keys = {service.texts.get(key, "").removeprefix("/"): key for key in service.arguments if key in _NAMES}
             if names := [name for name in asked.formats if name and name in keys]:
@@ -284,9 +281,7 @@ def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnosti
 
 def _required(context: RuleContext, application: ApplicationSource) -> Iterator[Diagnostic]:
     in_containers = any(s.node.get("x-dodo-process") is None for s in application.services.values())
-    given = {
-        name: entry.value.text for name, entry in context.spec.variables.items() if isinstance(entry.value, Scalar)
-    }
+    given = context.test.variables
     maybe = {**dict.fromkeys((*CID_VARIABLES, *application.access.passed), "?"), **application.known}
     for service, key, part in application.demanding:
         is_rig = context.rig is not None and not context.rig.is_emulated

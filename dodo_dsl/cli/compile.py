@@ -14,7 +14,6 @@ from dodo_dsl import atomic, package_data
 from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError
-from dodo_dsl.cli.numbers import positive
 from dodo_dsl.compiler import Checked, plan
 from dodo_dsl.diagnostics import (
     Diagnostic,
@@ -29,7 +28,6 @@ from dodo_dsl.diagnostics import (
     shown_path,
 )
 from dodo_dsl.emit.output_folder import add_images, differences, stale_folders, write
-from dodo_dsl.emit.pipeline import SearchJobs
 from dodo_dsl.terminal import printable
 
 Fixes = dict[Span, Fix]
@@ -84,14 +82,12 @@ EXAMPLES = """examples:
   dodo compile --check                     problems of all tests; writes nothing
   dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
   dodo compile --check --format gitlab     the same as a code quality report
-  dodo compile --search sil-my-drive --workers 4   the pipeline also searches this test, in four jobs
   dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
   dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
   dodo compile --files repository          its jobs take recordings from their checkout, and not from an artifact
 """
 
 
-_WORKERS = 4
 _SHORT_DIFF = 30  # lines that are shown without --diff
 _MOST_NAMES = 8
 _MOST_PASSES = 5
@@ -116,10 +112,6 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="format of diagnostics (default: text); with gitlab the text goes to stderr")  # fmt: skip
     parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
                         help="with --jobs: results or report with the tests' times; repeatable")  # fmt: skip
-    parser.add_argument("--search", action="append", default=[], metavar="TEST",
-                        help="add jobs that together search TEST; repeatable")  # fmt: skip
-    parser.add_argument("--workers", type=positive, metavar="N",
-                        help=f"with --search: jobs of each search (default: {_WORKERS})")  # fmt: skip
     pipeline_options.add(parser)
     selection.add_application(parser)
 
@@ -131,8 +123,6 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         raise UsageError("--images are for what is written: call dodo compile without --check")
     if options.times and not options.jobs:
         raise UsageError("--times are for --jobs")
-    if options.workers and not options.search:
-        raise UsageError("--workers are jobs of a search: name its test with --search")
     checked = selection.select(options.path, (), options.application)
     if options.fix:
         checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
@@ -181,8 +171,7 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
     sound = checked.sound()
     if sound.specs:
-        searches = _searches(options) if checked.ok else ()
-        made = plan(sound, options.output, searches, pipeline_options.job_options(options))
+        made = plan(sound, options.output, pipeline_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
             stale = differences(made.compiled, made.pipeline, options.output)
@@ -227,7 +216,7 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
     if not checked.ok:
         _show(checked.diagnostics, options.format, stdout, stderr)
         return Exit.USAGE
-    made = plan(checked, options.output, _searches(options), jobs)
+    made = plan(checked, options.output, jobs)
     diagnostics = ordered([*checked.diagnostics, *made.problems])
     _show(diagnostics, options.format, stdout, stderr)
     if has_errors(diagnostics):
@@ -247,14 +236,6 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
 
         (stdout if options.format == "text" else stderr).write(packing_text(made.compiled.suite, made.jobs))
     return Exit.OK
-
-
-def _searches(options: argparse.Namespace) -> tuple[SearchJobs, ...]:
-    if not options.search:
-        return ()
-    from dodo_dsl.cli.search_session import search_jobs
-
-    return search_jobs(options.search, options.workers or _WORKERS, options.application)
 
 
 def _count(number: int, what: str = "test") -> str:

@@ -1,4 +1,4 @@
-"""A session of ``dodo search`` or ``dodo tune`` with live progress, and the jobs of ``dodo compile --search``."""
+"""A session of ``dodo search`` or ``dodo tune`` with live progress."""
 
 import argparse
 import time
@@ -16,8 +16,7 @@ from dodo_dsl.cli.forecast import expectation
 from dodo_dsl.cli.loading import Loading, loading
 from dodo_dsl.cli.progress import about, count
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
-from dodo_dsl.diagnostics import format_text, has_errors, ordered, told_once
-from dodo_dsl.emit.pipeline import SearchJobs
+from dodo_dsl.diagnostics import has_errors, ordered, told_once
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.run.backends import Processes
 from dodo_dsl.run.rigs.session import RigSession
@@ -26,7 +25,7 @@ from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.search.drives import DriveHost, DriveLimits, Drives, KeptBackends, end_like_interrupt
 from dodo_dsl.search.store import Drive, Store
-from dodo_dsl.search.study import Study, refuse_search
+from dodo_dsl.search.study import Study
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.terminal import printable, unescaped
@@ -189,23 +188,3 @@ def _status(stream: TextIO) -> Any:
     status = Status("starting", console=Console(file=unescaped(stream)))
     status.start()
     return status
-
-
-MOST_WORKERS = 200
-"""GitLab's limit of ``parallel``."""
-
-
-def search_jobs(words: Sequence[str], workers: int, application: Sequence[Path]) -> tuple[SearchJobs, ...]:
-    """The jobs that search, for each test once; raises UsageError for a word that names no test to search."""
-    if workers > MOST_WORKERS:
-        raise UsageError(f"--workers {workers} is more than the {MOST_WORKERS} jobs that GitLab runs in parallel")
-    files = tuple(path.as_posix() for path in application)
-    found: dict[str, SearchJobs] = {}
-    for word in words:
-        checked = selection.select([word], (), application, Settings("lockstep", keeps_virtual=True))
-        if has_errors(checked.diagnostics):
-            raise UsageError(f"'{word}' cannot be searched:\n{format_text(ordered(checked.diagnostics))}")
-        refuse_search(word, checked.tests)
-        slug = checked.tests[0].spec.slug
-        found.setdefault(slug, SearchJobs(word, slug, workers, files))
-    return tuple(found.values())

@@ -88,7 +88,7 @@ def _update(wanted: _Entries) -> None:
     for path, entry in wanted.items():
         if _is_written(path, entry):
             continue
-        if path.is_symlink() or isinstance(entry, _Link):
+        if isinstance(entry, _Link) or (isinstance(entry, Path) and path.is_symlink()):
             path.unlink(missing_ok=True)
         if isinstance(entry, _Link):
             path.parent.mkdir(parents=True, exist_ok=True)

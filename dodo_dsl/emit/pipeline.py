@@ -1,7 +1,6 @@
 """The child pipeline: one job per instance or per batch, and GitLab's limits for it."""
 
 import math
-import shlex
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,28 +30,6 @@ _ARTIFACT_HINT = (
     "'dodo rec cut'; where GitLab's administrator allows more, give its limit with --artifact-limit"
 )
 
-_SEARCH_OPTIONS = '--study "$CI_PIPELINE_ID" --report dodo-search $DODO_SEARCH_OPTIONS'
-
-
-@dataclass(frozen=True)
-class SearchJobs:
-    """A test that ``workers`` jobs search together, and the compose files of its application, as a job names them."""
-
-    test: str
-    slug: str
-    workers: int
-    application: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """No test's name has a space."""
-        return f"search {self.slug}"
-
-    @property
-    def script(self) -> str:
-        files = "".join(f" --application {shlex.quote(file)}" for file in self.application)
-        return f'dodo search {shlex.quote(self.test)}{files} --storage "$DODO_SEARCH_STORAGE" {_SEARCH_OPTIONS}'
-
 
 @dataclass(frozen=True)
 class Pipeline:
@@ -62,28 +39,23 @@ class Pipeline:
     gate: bool
     variables: dict[str, str]
     jobs: tuple[PipelineJob, ...]
-    searches: tuple[SearchJobs, ...] = ()
     options: JobOptions = NO_OPTIONS
 
 
-def pipeline(
-    suite: Suite, folder: str, searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
-) -> Pipeline:
+def pipeline(suite: Suite, folder: str, options: JobOptions = NO_OPTIONS) -> Pipeline:
     """The jobs of a suite; ``folder`` is the output folder's name, as the parent's artifact has it."""
     levels = {plan.level for plan in suite.plans}
     gate = _gated(suite)
     stages = [stage for stage in LEVELS if stage in levels]
     if gate:
         stages.insert(stages.index("hil"), "gate")
-    if searches:
-        stages.append("search")
     if not stages:
         stages.append("test")  # GitLab refuses a pipeline without a job
     jobs = tuple(_job(plans, gate, folder, options) for plans in pooled(suite.plans))
     if options.most_jobs:
         timeouts = {plan.slug: plan.timeout_s for plan in by_test(suite.plans)}
         jobs = packed(jobs, options.most_jobs, {**timeouts, **options.seconds})
-    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, tuple(searches), options)
+    return Pipeline(tuple(stages), gate, _variables(suite, options), jobs, options)
 
 
 def _variables(suite: Suite, options: JobOptions) -> dict[str, str]:
@@ -133,7 +105,7 @@ def pipeline_problems(suite: Suite, child: Pipeline, text: str) -> Iterator[Diag
     Sources: https://docs.gitlab.com/administration/cicd/limits/ and
     https://docs.gitlab.com/user/gitlab_com/#cicd
     """
-    jobs = len(child.jobs) + child.gate + sum(search.workers + 1 for search in child.searches)
+    jobs = len(child.jobs) + child.gate
     size = len(text.encode())
     hint = "pack them into fewer with --jobs, compile fewer tests into one pipeline, or a smaller 'matrix'"
     if size > MAX_BYTES:

@@ -23,7 +23,6 @@ from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.application import plan_application
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.test_files import FileCopy, FilesError, standing_once
-from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, ResolvedService, default_value
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
@@ -170,6 +169,8 @@ class _Builder:
         for key, span in spec.spans.items():
             if key not in LAYERS:
                 self._place(key, span)
+        for name, entry in spec.variables.items():
+            self._place(f"application.env.{name}", entry.key)
         isolated = isolation(spec, rig)
         setting = Setting(
             self.cid,
@@ -179,7 +180,7 @@ class _Builder:
             hil=rig is not None and not rig.is_emulated,
             privileged_allowed=rig is not None and rig.privileged,
             limits=self.shared.limits,
-            given=self._variables(),
+            given=tuple(self.test.variables.items()),
             time_seed=spec.seed if spec.clock == VIRTUAL else None,
         )
         messages = self._messages()
@@ -222,12 +223,6 @@ class _Builder:
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)
         return Pooled(test.title, test.slug)
-
-    def _variables(self) -> tuple[tuple[str, str], ...]:
-        """Variables that the test sets for its application."""
-        for name, entry in self.spec.variables.items():
-            self._place(f"application.env.{name}", entry.key)
-        return tuple((name, e.value.text) for name, e in self.spec.variables.items() if isinstance(e.value, Scalar))
 
     def _messages(self) -> tuple[str, ...]:
         """The deployment's messages, copied next to the test for its services to read."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.check.lockstep import answers, driving
-from dodo_dsl.check.resolve import resolve
+from dodo_dsl.check.resolve import known_ids, resolve
 from tests.check.contexts import checked, resolved
 
 MATRIX = """\
@@ -84,3 +84,12 @@ action: {vehicle: {uses: dynamic-model, with: {drive: "${matrix.drive}"}}, pose:
     texts = [service.texts for test in tests for service in test.services if service.use.name == "vehicle"]
     assert [("track" in each, "steering-offset" in each) for each in texts] == [(False, True), (True, False)]
     assert [len(answers(test.wiring)) for test in tests] == [2, 2]
+
+
+def test_messages_of_files_that_can_be_read(tmp_path: Path) -> None:
+    good, bad = tmp_path / "good.odvd", tmp_path / "bad.odvd"
+    good.write_text("message my.Own [id = 3000] { float x [id = 1]; }")
+    bad.write_text("message")
+    standard = known_ids(())
+    assert "opendlv.proxy.GroundSteeringRequest" in standard
+    assert known_ids((good, bad)).items() - standard.items() == {("my.Own", 3000)}

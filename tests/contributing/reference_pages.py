@@ -69,10 +69,9 @@ SETTINGS = {
 }
 PIPELINES = {
     "DODO_API_TOKEN": "token by which `dodo report --gitlab` fetches the reports of child pipelines",
-    "DODO_COMPILE_OPTIONS": "further options of `dodo compile`, such as `--search sil-my-drive` in a schedule",
+    "DODO_COMPILE_OPTIONS": "further options of `dodo compile`, such as `--jobs 4`",
     "DODO_REGISTRY": "the registry to log in to before tests pull images; empty for none",
     "DODO_RUN_OPTIONS": "options of `dodo run` in every test, in place of the input `run-options`",
-    "DODO_SEARCH_OPTIONS": "further options of `dodo search`",
     "DODO_SEARCH_STORAGE": "address of the PostgreSQL database of searches; its password is `PGPASSWORD`",
     "DODO_TAG": "the tag of runners, if the input `tags` names none; default `sil`",
 }

@@ -12,9 +12,8 @@ import pytest
 import yaml
 
 from dodo_dsl import compiler, source
-from dodo_dsl.emit.pipeline import CHILD, SearchJobs, pipeline
-from dodo_dsl.emit.render import _templates, render_pipeline, render_plan
-from dodo_dsl.plan.model import Suite
+from dodo_dsl.emit.pipeline import CHILD
+from dodo_dsl.emit.render import _templates, render_plan
 from tests.emit.readers import ROOT, tree
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -23,8 +22,6 @@ WHOLE = ("sil-closed-straight", "hil-dynamic")
 PLAN = "sil-closed-straight/plan.yml"
 """Its plan in few lines."""
 SUMMARY = "summary.yml"
-SEARCH = "search.gitlab-ci.yml"
-"""A child pipeline that also searches its test."""
 _DECIDED = ("level", "kind", "clock", "isolation", "timeout_s", "cid", "subnet", "tag", "rig", "lockstep", "truth")
 
 
@@ -43,9 +40,6 @@ def test_goldens(update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     files[CHILD] = made.pipeline.text
     summaries = {slug: _summary({Path(file.path).name: file.text for file in test}) for slug, test in written.items()}
     files[SUMMARY] = yaml.safe_dump(summaries, sort_keys=False, width=150)
-    searched = made.compiled.suite.plans[-1]
-    search = SearchJobs(searched.name, searched.slug, 4, ("docker-compose.yml",))
-    files[SEARCH] = render_pipeline(pipeline(Suite((searched,)), "generated", [search])).text
     if update_goldens:
         shutil.rmtree(GOLDEN, ignore_errors=True)
         for path, text in files.items():

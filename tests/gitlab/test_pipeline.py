@@ -2,7 +2,7 @@
 
 import os
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import yaml
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.emit import pipeline as emitted
 from dodo_dsl.emit import render
-from dodo_dsl.emit.pipeline import SearchJobs, artifact_problems, pipeline_problems
+from dodo_dsl.emit.pipeline import artifact_problems, pipeline_problems
 from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, JobOptions
 from dodo_dsl.emit.render import File
 from dodo_dsl.plan.build import Compiled
@@ -24,20 +24,16 @@ from tests.emit.readers import pipeline
 OnRig = Callable[[str, str], Plan]
 
 
-def render_pipeline(
-    suite: Suite, folder: str, searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
-) -> File:
-    return render.render_pipeline(emitted.pipeline(suite, folder, searches, options))
+def render_pipeline(suite: Suite, folder: str, options: JobOptions = NO_OPTIONS) -> File:
+    return render.render_pipeline(emitted.pipeline(suite, folder, options))
 
 
 def child(*plans: Plan, gates: bool = True, folder: str = "generated") -> dict[str, Any]:
     return pipeline(render_pipeline(Suite(plans, gates), folder).text)
 
 
-def problems(
-    *plans: Plan, text: str = "", searches: Sequence[SearchJobs] = (), options: JobOptions = NO_OPTIONS
-) -> list[Diagnostic]:
-    made = emitted.pipeline(Suite(plans), "generated", searches, options)
+def problems(*plans: Plan, text: str = "", options: JobOptions = NO_OPTIONS) -> list[Diagnostic]:
+    made = emitted.pipeline(Suite(plans), "generated", options)
     return list(pipeline_problems(Suite(plans), made, text or render.render_pipeline(made).text))
 
 
@@ -58,41 +54,6 @@ def test_hil_waits_for_a_gate_behind_all_others(plan: Plan, on_rig: OnRig) -> No
     assert "needs" not in made["gate"], "a job without needs waits for all stages before its own"
     assert made["hil"]["needs"][1:] == ["gate"]
     assert made["dil"]["needs"][1:] == []
-
-
-def searching(plan: Plan, *searches: SearchJobs) -> str:
-    return render_pipeline(Suite((plan,)), "generated", searches).text
-
-
-@pytest.mark.thorough
-def test_workers_search_together_and_another_job_reports(
-    plan: Plan, tmp_path: Path, accepted: Callable[..., None]
-) -> None:
-    text = searching(plan, SearchJobs("my drive", "my-drive", 4, ("a b.yml",)), SearchJobs("other", "other", 1))
-    (tmp_path / "child.yml").write_text(text)
-    accepted(tmp_path / "child.yml")
-    made = pipeline(text)
-    workers, report = made["search my-drive"], made["search my-drive report"]
-    assert (made["stages"], workers["stage"]) == (["sil", "search"], "search")
-    assert (workers["parallel"], workers["needs"], workers["allow_failure"]) == (4, [], {"exit_codes": [1]})
-    assert workers["script"] == [
-        "dodo search 'my drive' --application 'a b.yml' --storage \"$DODO_SEARCH_STORAGE\" "
-        '--study "$CI_PIPELINE_ID" --report dodo-search $DODO_SEARCH_OPTIONS'
-    ]
-    assert report["script"] == [f"{workers['script'][0]} --finish"]
-    assert report["needs"] == [{"job": "search my-drive", "artifacts": True}]
-    assert report["rules"] == [{"when": "always"}], "also when no worker came to the end"
-    assert workers["artifacts"] == report["artifacts"] == {
-        "when": "always", "expire_in": "4 weeks", "paths": ["dodo-search/"]
-    }  # fmt: skip
-    assert "parallel" not in made["search other"]
-
-
-def test_jobs_of_searches_count(plan: Plan) -> None:
-    plans = [replace(plan, slug=f"test-{n}") for n in range(480)]
-    assert problems(*plans) == []
-    (problem,) = problems(*plans, searches=[SearchJobs("x", "x", 20)])
-    assert "has 501 jobs" in problem.message
 
 
 def test_without_gates_or_others_hil_waits_for_nothing(plan: Plan, on_rig: OnRig) -> None:
@@ -135,11 +96,11 @@ def test_any_rig_of_a_pool_is_one_job_that_locks_none_of_them(
     words = "--compiled out/hil--rig-kiwi-1 --compiled out/hil--rig-kiwi-2"
     assert made["hil"]["script"] == [f"dodo run {words} --report dodo-report $DODO_RUN_OPTIONS"]
     assert made["hil-2"]["tags"] == ["hil-dynamic", "kiwi-1", "cellar"]
-    packed = pipeline(render_pipeline(suite, "out", (), JobOptions(most_jobs=1)).text)
+    packed = pipeline(render_pipeline(suite, "out", JobOptions(most_jobs=1)).text)
     assert [name for name in packed if "script" in packed[name]] == ["hil", "hil-2"], "pools of other rigs do not mix"
     again = replace(second, slug="hil-3--rig-kiwi-2", pool=Pooled("hil-3", "hil-3"))
     both = Suite((first, second, replace(first, slug="hil-3--rig-kiwi-1", pool=again.pool), again))
-    packed = pipeline(render_pipeline(both, "out", (), JobOptions(most_jobs=1)).text)
+    packed = pipeline(render_pipeline(both, "out", JobOptions(most_jobs=1)).text)
     assert packed["rig kiwi-1 or kiwi-2"]["script"][0].endswith(" --jobs 1")
 
 
@@ -160,20 +121,17 @@ def test_tests_of_images_log_in_to_the_registry(plan: Plan) -> None:
 def test_all_jobs_but_those_on_rigs_run_as_the_parent_wants(
     plan: Plan, on_rig: OnRig, tmp_path: Path, accepted: Callable[..., None]
 ) -> None:
-    suite, searches = (
-        Suite((plan, on_rig("hil-model", "emulated"), on_rig("hil-real", "kiwi"))),
-        [SearchJobs("a", "a", 2)],
-    )
+    suite = Suite((plan, on_rig("hil-model", "emulated"), on_rig("hil-real", "kiwi")))
     options = JobOptions((), 'dodo: "1"', "--isolation host")
-    text = render_pipeline(suite, "generated", searches, options).text
+    text = render_pipeline(suite, "generated", options).text
     (tmp_path / "child.yml").write_text(text)
     accepted(tmp_path / "child.yml")
     made = pipeline(text)
     assert made["variables"] == {"DODO_RUN_OPTIONS": "--isolation host"}
     assert (made["hil-real"]["tags"], "image" in made["hil-real"]) == (["hil-dynamic"], False)
-    for name in (plan.slug, "hil-model", "gate", "search a", "search a report"):
+    for name in (plan.slug, "hil-model", "gate"):
         assert (made[name]["image"], "tags" in made[name]) == ('dodo: "1"', False), name
-    tagged = pipeline(render_pipeline(suite, "generated", searches, JobOptions(("big", "a, b"))).text)
+    tagged = pipeline(render_pipeline(suite, "generated", JobOptions(("big", "a, b"))).text)
     assert tagged["gate"]["tags"] == tagged["hil-model"]["tags"] == ["big", "a, b"]
     assert "image" not in tagged["gate"] and "variables" not in tagged
 
@@ -182,7 +140,7 @@ def test_what_jobs_of_tests_have_in_common_stands_once(plan: Plan, on_rig: OnRig
     """But for what a job on a rig could not do without, as it inherits all that it does not replace."""
     options = JobOptions(("big",), "image", services=("docker:dind",), before_script="begin")
     suite = Suite((plan, on_rig("hil-real", "kiwi")))
-    made = yaml.safe_load(render_pipeline(suite, "generated", (), options).text)
+    made = yaml.safe_load(render_pipeline(suite, "generated", options).text)
     own, for_all = {"extends", "stage", "timeout", "script"}, {"rules", "needs", "interruptible", "artifacts"}
     assert made[plan.slug].keys() == own
     assert made[".dodo-test"].keys() == for_all | {"tags", "image", "services", "before_script"}
@@ -196,7 +154,7 @@ def test_services_and_first_commands_are_for_all_jobs_but_those_on_rigs(
 ) -> None:
     options = JobOptions(services=("docker:dind", {"name": "redis"}), before_script="a\nb", artifacts_access="none")
     suite = Suite((plan, on_rig("hil-model", "emulated"), on_rig("hil-real", "kiwi")))
-    text = render_pipeline(suite, "generated", [SearchJobs("a", "a", 2)], options).text
+    text = render_pipeline(suite, "generated", options).text
     (tmp_path / "child.yml").write_text(text)
     accepted(tmp_path / "child.yml")
     made = pipeline(text)
@@ -204,14 +162,11 @@ def test_services_and_first_commands_are_for_all_jobs_but_those_on_rigs(
         assert made[name]["services"] == ["docker:dind", {"name": "redis"}]
         login = made["default"]["before_script"]
         assert made[name]["before_script"] == ["a\nb", *login], "the engine that they wait for logs in"
-    for name in ("search a", "search a report"):
-        assert (made[name]["services"], made[name]["before_script"]) == (["docker:dind", {"name": "redis"}], ["a\nb"])
     assert not {"services", "before_script"} & made["hil-real"].keys() and len(made["hil-real"]["script"]) == 1
     assert "services" not in made["gate"] and made["gate"]["before_script"] == [], "whatever a parent forwards"
     assert {job["artifacts"]["access"] for job in made.values() if "artifacts" in job} == {"none"}
-    plain = render_pipeline(suite, "generated", [SearchJobs("a", "a", 2)]).text
+    plain = render_pipeline(suite, "generated").text
     assert "services" not in plain and "access" not in plain
-    assert pipeline(plain)["search a"]["before_script"] == [], "no login: it pulls nothing"
 
 
 @pytest.mark.thorough
@@ -228,7 +183,7 @@ def test_images_that_were_built_are_what_is_tested(plan: Plan) -> None:
     """A variable DODO_RUN_OPTIONS of a project replaces the options of the parent, and not this one."""
 
     def child(*given: Any) -> Any:
-        return pipeline(render_pipeline(Suite((plan,)), "out", (), JobOptions(("sil",), "", *given)).text)
+        return pipeline(render_pipeline(Suite((plan,)), "out", JobOptions(("sil",), "", *given)).text)
 
     assert "variables" not in child() and "--backend" not in child()[plan.slug]["script"][0]
     made = child("-v", ("DODO_IMAGE_STEERING=steering:1",))
@@ -263,7 +218,7 @@ def test_packed_tests_share_jobs(plan: Plan, on_rig: OnRig, tmp_path: Path, acce
     plans = [replace(plan, slug=f"sil-{n}") for n in range(5)] + [replace(plan, slug="dil-0", level="dil")]
     rigs = [on_rig("hil-a", "kiwi"), on_rig("hil-b", "kiwi"), on_rig("hil-c", "other"), on_rig("hil-d", "emulated")]
     suite, options = Suite((*plans, *rigs)), JobOptions(most_jobs=2)
-    text = render_pipeline(suite, "generated", (), options).text
+    text = render_pipeline(suite, "generated", options).text
     (tmp_path / "child.yml").write_text(text)
     accepted(tmp_path / "child.yml")
     made = pipeline(text)
@@ -356,7 +311,7 @@ def test_an_artifact_over_the_limit_is_a_warning_that_names_the_largest_files(pl
 def test_jobs_with_files_of_the_repository_check_it_out(
     plan: Plan, tmp_path: Path, accepted: Callable[..., None]
 ) -> None:
-    file = render_pipeline(Suite((plan,)), "generated", (), JobOptions(from_repository=True))
+    file = render_pipeline(Suite((plan,)), "generated", JobOptions(from_repository=True))
     job = pipeline(file.text)[plan.slug]
     assert job["variables"] == {"GIT_STRATEGY": "fetch", "GIT_LFS_SKIP_SMUDGE": "0"}
     assert "variables" not in child(plan)[plan.slug]
@@ -365,6 +320,6 @@ def test_jobs_with_files_of_the_repository_check_it_out(
 
 
 def test_artifacts_of_the_child_expire(plan: Plan) -> None:
-    made = pipeline(render_pipeline(Suite((plan,)), "generated", [SearchJobs("x", "x", 2)]).text)
+    made = pipeline(render_pipeline(Suite((plan,)), "generated").text)
     kept = [job["artifacts"] for job in made.values() if "artifacts" in job]
-    assert len(kept) == 3 and all(artifacts["expire_in"] for artifacts in kept)
+    assert len(kept) == 1 and all(artifacts["expire_in"] for artifacts in kept)

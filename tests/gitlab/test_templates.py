@@ -206,7 +206,7 @@ def test_inputs_that_cannot_be_meant_are_refused(name: str, value: str) -> None:
 def test_inputs_that_can_be_meant_are_taken() -> None:
     config = included(
         APPLICATION,
-        compile_options="--search 'sil-*' --workers 4",
+        compile_options="--jobs 4 'sil-*'",
         platforms="linux/amd64,linux/arm/v7",
         image="$CI_REGISTRY_IMAGE/dodo@sha256:12",
         deployment="$CI_PROJECT_NAMESPACE/deployment",
@@ -482,7 +482,6 @@ def test_the_page_s_variables_are_those_of_the_templates() -> None:
         "DODO_IMAGE_LANE_FINDER",
         "DODO_API_TOKEN",
         "DODO_SEARCH_STORAGE",
-        "DODO_SEARCH_OPTIONS",
         "DODO_RUN_OPTIONS",
         "DODO_REGISTRY",
     }:
