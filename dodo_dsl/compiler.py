@@ -1,6 +1,7 @@
 """The compiler from end to end: from paths to checked tests, and on to Plans."""
 
 import functools
+import itertools
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,10 +11,9 @@ from dodo_dsl import package_data
 from dodo_dsl.application.model import Access, ApplicationSource
 from dodo_dsl.application.read import read_application
 from dodo_dsl.application.unseen import unseen_problems
-from dodo_dsl.check import check
-from dodo_dsl.check import problems as check_problems
-from dodo_dsl.check.problems import Problems
+from dodo_dsl.check import check, file_rules
 from dodo_dsl.check.resolve import ResolvedTest, known_ids, resolve
+from dodo_dsl.check.service_rules import unknown_messages
 from dodo_dsl.check.suite_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
@@ -37,6 +37,56 @@ UNSATISFIED = ("no-producer", "no-sample", "true-pose")
 RUN, SAMPLE = "run", "sample"
 """What announces the number of a test at values of its ranges; the report groups samples by the second."""
 _MOST_READ = 256  # files that are kept for the tests that extend them
+_OF_ALL = "name-taken"
+"""A service that has the name of another is not known, so that no test uses it."""
+
+
+@dataclass(frozen=True)
+class Problems:
+    """Everything that was found: with the deployment and its application, its services, each spec as it was read.
+
+    ``by_rules`` are those of each spec's instances, which the ``tests`` of a problem name, all of them.
+    """
+
+    common: tuple[Diagnostic, ...] = ()
+    of_services: tuple[Diagnostic, ...] = ()
+    as_read: Mapping[Path, Sequence[Diagnostic]] = field(default_factory=dict)
+    by_rules: Mapping[Path, Sequence[Diagnostic]] = field(default_factory=dict)
+
+    def without_unused(self, tests: Sequence[ResolvedTest]) -> "Problems":
+        """The same without those of services that no test uses; all stay where a test uses one that cannot be read."""
+        if not all(test.is_complete for test in tests):
+            return self
+        used = {service.manifest.folder.resolve() for test in tests for service in test.services}
+        kept = (d for d in self.of_services if d.rule == _OF_ALL or Path(d.span.file).resolve().parent in used)
+        return replace(self, of_services=tuple(kept))
+
+    def of(self, specs: Iterable[Spec]) -> tuple[Diagnostic, ...]:
+        """What these instances have, sorted by position, each once.
+
+        It names the tests that have it: none if its position shows whose it is, or if it is of a file.
+        """
+        instances: dict[Path, list[Spec]] = {}
+        for spec in specs:
+            instances.setdefault(spec.path, []).append(spec)
+        names: dict[Diagnostic, dict[str, None]] = {}
+        at_home = set[Diagnostic]()
+        for path, own in instances.items():
+            titles, ends = {spec.title for spec in own}, {e.span for s in own for one in s.ranges for e in one.ends}
+            every = titles | {corner.title for spec in own for corner in spec.corners}
+            for problem in self.by_rules.get(path, ()):
+                having = [title for title in problem.tests if title in every]
+                if not having:
+                    continue
+                is_of_all = titles <= set(having)
+                shown = [own[0].name or own[0].location.stem] if is_of_all else having
+                names.setdefault(problem, {}).update(dict.fromkeys(shown))
+                is_told = (problem.span.file == str(path) and is_of_all) or problem.span in ends
+                if is_told or file_rules.is_own(problem):
+                    at_home.add(problem)
+        read = itertools.chain.from_iterable(found for path, found in self.as_read.items() if path in instances)
+        everything = ordered([*self.common, *self.of_services, *read, *names])
+        return tuple(replace(d, tests=() if d in at_home else tuple(names.get(d, ()))) for d in everything)
 
 
 @dataclass(frozen=True)
@@ -112,7 +162,7 @@ def load(
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
-    own = check_problems.problems(deployment.services, reader, known_ids(deployment.messages))
+    own = unknown_messages(deployment.services, reader, known_ids(deployment.messages))
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
     once = functools.lru_cache(maxsize=_MOST_READ)(reader)
     loaded = {} if services_only else {location.path: load_spec(location, once) for location in locations}
@@ -216,8 +266,7 @@ def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Co
 
     ``options`` hold for all jobs of the pipeline.
     """
-    from dodo_dsl.emit.output_folder import pipeline_folder
-    from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_problems
+    from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_folder, pipeline_problems
     from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS
     from dodo_dsl.emit.render import render_pipeline
     from dodo_dsl.plan.build import build

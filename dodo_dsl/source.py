@@ -14,7 +14,6 @@ from typing import Any
 import yaml
 
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest
-from dodo_dsl.slips import Failure, slip
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
@@ -282,6 +281,8 @@ def _unreadable(file: str, text: str, error: Exception, problem: str) -> Diagnos
 
 
 def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
+    from dodo_dsl.slips import Failure, slip
+
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     problem = str(getattr(error, "problem", "") or getattr(error, "reason", "") or error).splitlines()[0]
     if mark is None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
-from dodo_dsl.check import file_rules, needed_files, resolve, service_rules, spec_rules, wiring_rules
+from dodo_dsl.check import file_rules, resolve, service_rules, spec_rules, wiring_rules
 from dodo_dsl.check.context import Rule, RuleContext
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.diagnostics import Diagnostic
@@ -79,7 +79,7 @@ def forget_files() -> None:
         file_rules.problems,
         file_rules.course_of,
         file_rules.fault_of_start,
-        needed_files.files,
+        file_rules.files,
         file_rules.table_span,
         file_rules.pictures,
     )

@@ -10,7 +10,6 @@ from typing import Any
 
 from dodo_dsl.check import lockstep
 from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.needed_files import needed
 from dodo_dsl.check.resolve import IMAGE, known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.opendlv import regular_file
@@ -18,10 +17,13 @@ from dodo_dsl.opendlv.assets import formats, map_file, recording_contents
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
+from dodo_dsl.spec.manifest import Parameter
 from dodo_dsl.spec.registry import SUFFIX
 
 RULE = "wrong-file"
 STATE = "opendlv.sim.KinematicState"
+MAX_FILES = 5_000
+MAX_BYTES = 2 << 30
 _TEXT = (".json", ".csv", ".obj", ".txt", ".yml", ".yaml")
 """Endings of files whose lines can be shown."""
 
@@ -36,6 +38,33 @@ def check_files(context: RuleContext) -> Iterator[Diagnostic]:
                 if isinstance(found, str):
                     yield Diagnostic(argument.entry.key, "path-escape", found)
                 yield from _empty(argument, argument.value.path, argument.entry.value.span)
+
+
+def needed(parameter: Parameter, path: Path, root: Path) -> Mapping[str, Path] | str:
+    """The files that a parameter's path needs."""
+    is_map = parameter.format == "map" and path.suffix == ".json"  # its meshes stand beside it
+    return files(path.parent if is_map else path, root)
+
+
+@functools.lru_cache(maxsize=256)
+def files(path: Path, root: Path) -> Mapping[str, Path] | str:
+    """The real paths of the file, or of all in the folder but hidden ones, by where they lie below ``root``.
+
+    Or what is wrong with them.
+    """
+    root = root.resolve()
+    found: dict[str, Path] = {}
+    size = 0
+    for file in (path,) if path.is_file() else sorted(path.rglob("*")):
+        if not file.is_file() or any(p.startswith(".") or p == "__pycache__" for p in file.relative_to(path).parts):
+            continue
+        found[file.relative_to(root).as_posix()] = real = file.resolve()
+        if not real.is_relative_to(root):
+            return f"'{file.relative_to(root)}' is a symbolic link that leaves the registry"
+        size += real.stat().st_size
+        if len(found) > MAX_FILES or size > MAX_BYTES:
+            return f"'{path.relative_to(root)}' holds more than {MAX_FILES} files or {MAX_BYTES >> 30} GiB"
+    return found
 
 
 def _empty(argument: Argument, file: Path, span: Span) -> Iterator[Diagnostic]:

@@ -1,7 +1,8 @@
 """Rules on the services of a test: their names and layers, parameters, messages and cameras."""
 
+import re
 from collections.abc import Collection, Iterator
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 from dodo_dsl.application.model import PrintedLine
 from dodo_dsl.check import resolve
@@ -9,7 +10,7 @@ from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.senders import is_shipped, told
 from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
 from dodo_dsl.opendlv.address import is_of_the_world
-from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
+from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Reader, Scalar, Sequence, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
 from dodo_dsl.spec.deployment import MANIFEST
 from dodo_dsl.spec.manifest import holds
@@ -239,6 +240,24 @@ def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[D
         hint = did_you_mean(name, known) or "add the files of your own messages under 'messages' in dodo.yml"
         fix = only_fix(name, known)
         yield Diagnostic(span, "unknown-message", f"unknown message '{name[:80]}'", hint, fix=fix)
+
+
+_MESSAGE = re.compile(r"[\w.]+")
+
+
+def unknown_messages(folders: tuple[Path, ...], reader: Reader, known: Collection[str]) -> Iterator[Diagnostic]:
+    """The messages that are not ``known`` in ``<folder>/<service>/service.yml``; a placeholder is for the test to name.
+
+    Loading these files reports whatever else is wrong with them.
+    """
+    for folder in folders:
+        for path in sorted(folder.glob("*/service.yml")):
+            node, _ = reader(path)
+            ports = node.get("messages") if isinstance(node, Mapping) else None
+            for scalar in walk(ports) if ports is not None else ():
+                name = scalar.text.partition("/")[0].removesuffix("?") if isinstance(scalar, Scalar) else ""
+                if _MESSAGE.fullmatch(name):
+                    yield from unknown_message(name, known, scalar.span)
 
 
 _FILE = "file"

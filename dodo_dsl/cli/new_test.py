@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 
 from dodo_dsl import package_data
-from dodo_dsl.check import needed_files
+from dodo_dsl.check import file_rules
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.existing_application import Pictures
 from dodo_dsl.cli.new_files import New, filled, schema_of_specs
@@ -204,7 +204,7 @@ def _files(name: str, instances: Sequence[Spec], manifests: Mapping[str, Manifes
     for path in dict.fromkeys(path for spec in instances for path in _paths(spec, manifests)):
         if (registry / path.relative_to(root)).exists() and not path.relative_to(root).is_relative_to(own):
             continue
-        found = needed_files.files(path, root)
+        found = file_rules.files(path, root)
         if isinstance(found, str):
             raise UsageError(found)
         for target, source in zip(map(Path, found), found.values(), strict=True):

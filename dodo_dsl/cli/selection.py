@@ -3,19 +3,22 @@
 import argparse
 import fnmatch
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import package_data
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.compiler import Checked, load, narrowed, without_unsatisfied
 from dodo_dsl.diagnostics import did_you_mean, format_text, has_errors
-from dodo_dsl.spec import parameters
 from dodo_dsl.spec.deployment import FILE_NAME, SHIPPED, Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.load import Settings
 from dodo_dsl.spec.model import LEVELS, Spec
 from dodo_dsl.spec.registry import SUFFIX, locate
 from dodo_dsl.terminal import printable
+
+_INSTANCES = re.compile(r"(?P<test>[^\[\]]+)\[(?P<pairs>[^=\[\]]+=.*)\]")
+_COMMA = re.compile(r",(?=[^,=]+=)")
 
 
 class NoSuchTest(UsageError):
@@ -50,7 +53,7 @@ def existing_files(paths: Sequence[Path]) -> Sequence[Path]:
 
 
 def _is_path(word: str) -> bool:
-    if parameters.PATTERN.fullmatch(word) and not Path(word).exists():
+    if _INSTANCES.fullmatch(word) and not Path(word).exists():
         return False  # the slash may be in a value
     return "/" in word or word.endswith(SUFFIX) or Path(word).is_dir()
 
@@ -108,21 +111,21 @@ def _is_name(word: str, spec: Spec) -> bool:
 
 def _is_meant(word: str, spec: Spec) -> bool:
     """Whether a word is the name of a test, with parameters or without."""
-    asked = parameters.parse(word)
+    asked = _parse(word)
     return _is_name(word, spec) or (asked is not None and _is_name(asked.test, spec))
 
 
 def _named(word: str, specs: Sequence[Spec], deployment: Deployment) -> list[Spec]:
     if found := [s for s in specs if _is_name(word, s)]:
         return found
-    asked = parameters.parse(word)
+    asked = _parse(word)
     if asked and (tests := [s for s in specs if _matches(s, asked.test)]):
         try:
-            return parameters.instances(asked, tests)
-        except parameters.NoSuchInstance as problem:
+            return _instances_of(asked, tests)
+        except NoSuchTest:
             if found := [s for s in specs if _matches_title(s, word)]:
                 return found
-            raise NoSuchTest(str(problem)) from None
+            raise
     found = [s for s in specs if _matches(s, word) or _matches_title(s, word)]
     if not found:
         hint = _shipped_hint(word, deployment) or did_you_mean(
@@ -155,3 +158,66 @@ def _matches(spec: Spec, pattern: str) -> bool:
 def _matches_title(spec: Spec, pattern: str) -> bool:
     """Whether a pattern fits that of an instance, such as ``name[light=dark]``, whose brackets mean themselves."""
     return fnmatch.fnmatchcase(spec.title, pattern.replace("[", "[[]"))
+
+
+@dataclass(frozen=True)
+class _InstancePattern:
+    """The name or pattern of tests, and values of parameters, one of which an instance has to have."""
+
+    test: str
+    values: Mapping[str, Sequence[str]]
+
+
+def _parse(word: str) -> _InstancePattern | None:
+    """None if a word is anything else."""
+    match = _INSTANCES.fullmatch(word)
+    if match is None:
+        return None
+    values: dict[str, list[str]] = {}
+    for pair in _COMMA.split(match["pairs"]):
+        name, _, value = pair.partition("=")
+        values.setdefault(name.strip(), []).append(value.strip())
+    return _InstancePattern(match["test"], values)
+
+
+def _instances_of(asked: _InstancePattern, specs: Sequence[Spec]) -> list[Spec]:
+    """Those of ``specs``, the instances of one or more tests, with the values; raises NoSuchTest."""
+    for name, values in asked.values.items():
+        has_name = [spec for spec in specs if name in dict(spec.choice.values)]
+        if not has_name:
+            raise NoSuchTest(_without(asked.test, name, specs))
+        for value in values:
+            if not any(_fits(spec, name, value) for spec in has_name):
+                known = dict.fromkeys(dict(spec.choice.values)[name].text for spec in has_name)
+                raise NoSuchTest(f"no instance of '{asked.test}' has {name}={value}" + _hint(value, list(known)))
+    found = [
+        spec
+        for spec in specs
+        if all(any(_fits(spec, name, value) for value in values) for name, values in asked.values.items())
+    ]
+    if not found:
+        said = ", ".join(f"{name}={' or '.join(values)}" for name, values in asked.values.items())
+        raise NoSuchTest(f"no test '{asked.test}' has all of {said}")
+    return found
+
+
+def _fits(spec: Spec, name: str, value: str) -> bool:
+    text = next((chosen.text for known, chosen in spec.choice.values if known == name), None)
+    return text is not None and (text == value or fnmatch.fnmatchcase(text, value))
+
+
+def _without(test: str, name: str, specs: Sequence[Spec]) -> str:
+    if any(one.name == name for spec in specs for one in spec.ranges):
+        return (
+            f"'{name}' of '{test}' is a range of 'vary' and no parameter of its matrix: a run takes the nominal value, "
+            "and dodo search looks at others"
+        )
+    known = list(dict.fromkeys(known for spec in specs for known, _ in spec.choice.values))
+    if not known:
+        return f"'{test}' has no parameters, because it has no matrix"
+    return f"'{test}' has no parameter '{name}'" + _hint(name, known)
+
+
+def _hint(word: str, known: Sequence[str]) -> str:
+    hint = did_you_mean(word, known)
+    return f"; {hint}" if hint else ""

@@ -32,11 +32,6 @@ _Entry = str | Path | _Link
 _Entries = Mapping[Path, _Entry]
 
 
-def pipeline_folder(out: Path) -> str:
-    """The output folder as a pipeline's jobs name it: as it was given, or its last part when that is absolute."""
-    return out.name if out.is_absolute() else out.as_posix()
-
-
 def _of_test(compiled: Compiled, plan: Plan, out: Path) -> dict[Path, _Entry]:
     """Everything in the folder of a test."""
     files = out / plan.slug / FILES

@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
@@ -40,6 +41,11 @@ class Pipeline:
     variables: dict[str, str]
     jobs: tuple[PipelineJob, ...]
     options: JobOptions = NO_OPTIONS
+
+
+def pipeline_folder(out: Path) -> str:
+    """The output folder as a pipeline's jobs name it: as it was given, or its last part when that is absolute."""
+    return out.name if out.is_absolute() else out.as_posix()
 
 
 def pipeline(suite: Suite, folder: str, options: JobOptions = NO_OPTIONS) -> Pipeline:

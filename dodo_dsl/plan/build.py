@@ -11,11 +11,10 @@ from dodo_dsl import package_data
 from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import senders as check_senders
-from dodo_dsl.check.file_rules import MAP
-from dodo_dsl.check.goals import resolved_goals
-from dodo_dsl.check.needed_files import needed
+from dodo_dsl.check.file_rules import MAP, needed
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
+from dodo_dsl.check.spec_rules import resolved_goals
 from dodo_dsl.check.suite_rules import containers
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.plan import added_services, addresses, hidden_paths

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check import needed_files
-from dodo_dsl.check.needed_files import files
+from dodo_dsl.check import file_rules
+from dodo_dsl.check.file_rules import files
 
 
 @pytest.fixture
@@ -29,5 +29,5 @@ def test_a_file_and_a_folder_with_links_within_the_registry(root: Path) -> None:
 
 @pytest.mark.parametrize(("limit", "path"), [("MAX_FILES", "map"), ("MAX_BYTES", "other.csv")])
 def test_too_much(limit: str, path: str, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(needed_files, limit, 1)
+    monkeypatch.setattr(file_rules, limit, 1)
     assert "holds more than" in files(root / path, root)
