@@ -1,7 +1,6 @@
-"""Problems of an application: of each service by itself, and of all of them together.
+"""Problems of an application beside those of its keys, which are judged where its services are made.
 
-A service has names, commands, references, and what cannot be isolated; together they have missing files, cycles of
-dependencies, and no service that takes a CID.
+A service has a name and a program; together they have cycles of dependencies, and buses.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -9,7 +8,6 @@ from graphlib import CycleError, TopologicalSorter
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
-from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.construction import construction_of
 from dodo_dsl.application.interpolation import filled, literal
 from dodo_dsl.application.model import (
@@ -24,13 +22,10 @@ from dodo_dsl.application.model import (
     references,
     words_of,
 )
-from dodo_dsl.application.part import spot
 from dodo_dsl.application.slips import cid_slips, is_cid, missing_program
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, has_errors, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node
-
-_CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 
 _GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
 _LONGEST = 63
@@ -47,8 +42,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     of_stack = stack.parts(application)
     construction = construction_of(application)
     for name, service in application.services.items():
-        own = [*_problems(service, application), *_missing_files(service, application)]
-        own += [*_missing_folder(service, application), *missing_program(service, application.folder)]
+        own = [*_name(service), *missing_program(service, application.folder)]
         begin = len(construction.problems)
         construction.service(service)
         own += construction.problems[begin:]
@@ -62,25 +56,6 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     yield from found
     if not has_errors(found):
         yield from _without_cid(application)
-
-
-def _missing_files(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    for file in service.env_files:
-        if file.required and application.paths.is_own(file.path) and not (application.folder / file.path).is_file():
-            hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
-            yield Diagnostic(file.span, "application-file", f"there is no file '{file.path}'", hint)
-
-
-def _missing_folder(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    """A folder to build from that is not there: a warning, as an image or a variable for it may stand in."""
-    build = service.node.get("build")
-    context = build.get("context") if isinstance(build, source.Mapping) else build
-    folder = literal(context.value) if isinstance(context, source.Scalar) and isinstance(context.value, str) else None
-    if folder is None or context is None or not is_local(folder):
-        return
-    if application.paths.is_own(folder) and not (application.folder / folder).is_dir():
-        hint = "create it, or remove 'build'; paths are relative to this file"
-        yield Diagnostic(context.span, "application-file", f"there is no folder '{folder}'", hint, "warning")
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -174,14 +149,6 @@ def takes_cid(service: ComposeService) -> bool:
     return opendlv_flags.takes_cid(found, {**variables, **dict.fromkeys(service.cid_variables)})
 
 
-def _problems(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    """What is wrong with one service beside its keys: its name, commands, and the services that it names."""
-    yield from _name(service)
-    yield from _commands(service)
-    yield from _references(service, application)
-    yield from _conditions(service)
-
-
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
     """Unknown keys that begin like DoDo's."""
     entries = service.entries if isinstance(service, source.Mapping) else {}
@@ -201,45 +168,5 @@ def _name(service: ComposeService) -> Iterator[Diagnostic]:
         yield _bad(service.span, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
 
 
-def _commands(service: ComposeService) -> Iterator[Diagnostic]:
-    for key in ("entrypoint", "command"):
-        node = service.node.get(key)
-        if isinstance(node, source.Scalar) and isinstance(node.value, str):
-            try:
-                opendlv_flags.split(node.value)
-            except ValueError as error:
-                yield _bad(node.span, f"'{key}' of '{service.name}': {error}")
-
-
-def _references(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    others = application.services
-    named = list(references(plain(service.node), application.containers))
-    for key, name in named:
-        if name not in others and name not in application.dropped:
-            message = f"'{key}' of '{service.name}' names the unknown service '{name}'"
-            taken = [service.name, *(other for of, other in named if of == key)]
-            yield _bad(_of_name(service, key, name), message, did_you_mean(name, others), only_fix(name, others, taken))
-
-
-def _conditions(service: ComposeService) -> Iterator[Diagnostic]:
-    """What compose does not know of ``depends_on``."""
-    needed = service.node.get("depends_on")
-    for entry in needed.entries.values() if isinstance(needed, source.Mapping) else ():
-        word = entry.value.get("condition") if isinstance(entry.value, source.Mapping) else None
-        if isinstance(word, source.Scalar) and isinstance(word.value, str) and word.value not in _CONDITIONS:
-            message = f"'{word.value}' is not a condition of 'depends_on'"
-            yield _bad(word.span, message, f"known: {', '.join(_CONDITIONS)}")
-
-
-def _of_name(service: ComposeService, key: str, name: str) -> Span:
-    """The place of a service's name in the value of a key."""
-    node = service.node.get(key)
-    if isinstance(node, source.Mapping) and name in node.entries:
-        return node.entries[name].key
-    items = node.items if isinstance(node, source.Sequence) else ()
-    fits = (item.span for item in items if isinstance(item, source.Scalar) and name in item.text.split(":"))
-    return next(fits, spot(service.node.entries[key]))
-
-
-def _bad(span: Span, message: str, hint: str = "", fix: Fix | None = None) -> Diagnostic:
-    return Diagnostic(span, "application-file", message, hint, fix=fix)
+def _bad(span: Span, message: str, hint: str = "") -> Diagnostic:
+    return Diagnostic(span, "application-file", message, hint)

@@ -4,7 +4,7 @@ Each key has one function, which gives what the container has for it. All other 
 them; those without which something else would run are refused.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
@@ -26,8 +26,8 @@ from dodo_dsl.application.model import (
 from dodo_dsl.application.mounts import mounts
 from dodo_dsl.application.part import Part, pairs, spot
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean, listed
-from dodo_dsl.source import Node, Scalar
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
+from dodo_dsl.source import Entry, Node, Scalar
 
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
@@ -83,6 +83,24 @@ class Container(Part):
     def raw(self, key: str) -> Node | None:
         return self.service.raw.get(key)
 
+    def other(self, key: str, name: str, span: Span, taken: Collection[str] = ()) -> str:
+        """A service that a key names, if it starts; a problem if there is none."""
+        others = self.project.application.services
+        if name not in others and name not in self.project.application.dropped:
+            message = f"'{key}' of '{self.name}' names the unknown service '{name}'"
+            fix = only_fix(name, others, (self.name, *(taken or [name])))
+            self.bad(span, message, did_you_mean(name, others), fix)
+        return name if name in others else ""
+
+    def joined(self, key: str, kind: str, name: str, span: Span) -> str:
+        """The same for the name of a service or of a container, which has to be one of the application."""
+        containers = self.project.application.containers
+        if kind == "container" and name not in containers:
+            message = f"'{key}' joins the container '{name}', which is not part of the application"
+            self.refuse(span, message, "make it a service of the application")
+            return ""
+        return self.other(key, containers[name] if kind == "container" else name, span)
+
     def number(self, node: Node, most: float, what: str, key: str, measure: Any = limits.number) -> Any:
         """A limit of at most ``most``."""
         value, is_cut = limits.cut(self.literal(node), most, measure)
@@ -91,6 +109,7 @@ class Container(Part):
         return int(value) if float(value).is_integer() else value
 
 
+_CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 _WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"
 
 
@@ -106,9 +125,14 @@ def _as_written(_: Container, node: Node) -> Any:
     return plain(node)
 
 
-def _command(c: Container, key: str) -> Any:
-    node = c.raw(key)
-    value = plain(c.filled(node)) if node is not None else None
+def _command(c: Container, key: str, node: Node) -> Any:
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        try:
+            opendlv_flags.split(node.value)
+        except ValueError as error:
+            c.bad(node.span, f"'{key}' of '{c.name}': {error}")
+    raw = c.raw(key)
+    value = plain(c.filled(raw)) if raw is not None else None
     return with_cid(value, c.project.setting.cid) if value is not None else None
 
 
@@ -133,6 +157,9 @@ def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
     for file in env_files(c.service.node):
         if path := c.path(file.path, file.span):
+            if file.required and not (c.project.application.folder / file.path).is_file():
+                hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
+                c.bad(file.span, f"there is no file '{file.path}'", hint)
             about = {"path": path, **({} if file.required else {"required": False})}
             about |= {"format": "raw"} if file.raw else {}
             made.append(about if len(about) > 1 else path)
@@ -158,14 +185,10 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
     """Another service's namespace; that of a container of the application is its service's."""
     word = c.literal(node) or ""
     kind, name = reference(word)
-    containers, services = c.project.application.containers, c.project.application.services
-    if kind == "container" and name not in containers:
-        message = f"'{key}' joins the container '{name}', which is not part of the application"
-        c.refuse(node.span, message, "make it a service of the application")
-    elif kind:
-        name = containers[name] if kind == "container" else name
-        return f"service:{name}" if name in services else None
-    elif key == "pid" and word == "host":
+    if kind:
+        found = c.joined(key, kind, name, node.span)
+        return f"service:{found}" if found else None
+    if key == "pid" and word == "host":
         c.refuse(node.span, "'pid: host' gives access to the processes of all tests", "remove it")
     elif key == "network_mode" and word == "none":
         return word
@@ -173,16 +196,9 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
 
 
 def _volumes_from(c: Container, node: Node) -> Any:
-    containers, services = c.project.application.containers, c.project.application.services
-    made = []
-    for item in c.items(node):
-        kind, name, options = borrowed(c.literal(item))
-        if kind == "container" and name not in containers:
-            c.refuse(item.span, f"the container '{name}' is not part of the application", "make it a service of it")
-            continue
-        name = containers[name] if kind == "container" else name
-        made += [escaped(f"{name}{options}")] if name in services else []
-    return made or None
+    named = [(item, *borrowed(c.literal(item))) for item in c.items(node)]
+    made = [(c.joined("volumes_from", kind, name, item.span), options) for item, kind, name, options in named]
+    return [escaped(name + options) for name, options in made if name] or None
 
 
 def _networks(c: Container, node: Node) -> Any:
@@ -194,20 +210,29 @@ def _networks(c: Container, node: Node) -> Any:
 
 
 def _links(c: Container, node: Node) -> Any:
-    found = [plain(item) for item in c.items(node)]
-    return [link for link in found if str(link).partition(":")[0] in c.project.application.services] or None
+    found = [(plain(item), item.span) for item in c.items(node)]
+    return [link for link, span in found if c.other("links", str(link).partition(":")[0], span)] or None
 
 
 def _depends_on(c: Container, node: Node) -> Any:
-    about = plain(node)
-    started = {"condition": "service_started"}
-    own = {str(name): dict(started) for name in about} if isinstance(about, list) else about
-    kept = ("condition", "required")  # nothing of a test is restarted
-    return {
-        name: {key: value for key, value in (how or {}).items() if key in kept} or dict(started)
-        for name, how in own.items()
-        if name in c.project.application.services
-    }
+    if not isinstance(node, source.Mapping):
+        node = source.Mapping(node.span, {i.text: Entry(i.span, i) for i in c.items(node) if isinstance(i, Scalar)})
+    made = {}
+    for name, entry in node.entries.items():
+        about = entry.value.entries if isinstance(entry.value, source.Mapping) else {}
+        own = {
+            key: plain(about[key].value) for key in ("condition", "required") if key in about
+        }  # nothing is restarted
+        condition = own.get("condition")
+        if isinstance(condition, str) and condition not in _CONDITIONS:
+            message = f"'{condition}' is not a condition of 'depends_on'"
+            c.bad(about["condition"].value.span, message, f"known: {', '.join(_CONDITIONS)}")
+        if own.get("required") is False:
+            is_there = name in c.project.application.services
+        else:
+            is_there = bool(c.other("depends_on", name, entry.key, node.entries))
+        made.update({name: own or {"condition": _CONDITIONS[0]}} if is_there else {})
+    return made
 
 
 def _sysctls(c: Container, node: Node) -> Any:
@@ -289,13 +314,13 @@ _CARRIED: dict[str, Key] = {
     **limits.LIMITS,
     "build": image.build,
     "cap_add": hardware.capabilities,
-    "command": lambda c, _: _command(c, "command"),
+    "command": lambda c, n: _command(c, "command", n),
     "configs": lambda c, n: _secrets(c, n, "configs"),
     "depends_on": _depends_on,
     "deploy": limits.deploy,
     "device_cgroup_rules": hardware.device_rules,
     "devices": hardware.devices,
-    "entrypoint": lambda c, _: _command(c, "entrypoint"),
+    "entrypoint": lambda c, n: _command(c, "entrypoint", n),
     "env_file": _env_file,
     "environment": lambda c, _: None,
     "gpus": hardware.gpus,

@@ -3,9 +3,10 @@
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_paths import escaped
+from dodo_dsl.application.compose_paths import escaped, is_local
 from dodo_dsl.application.model import environment, image_variable, plain, text
 from dodo_dsl.application.part import pairs
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Node
 
 if TYPE_CHECKING:
@@ -51,6 +52,11 @@ def build(c: "Container", node: Node) -> Any:
     context = c.literal(fields["context"]) if "context" in fields else "."
     if context is not None:
         made = {"context": _context(c, fields.get("context"), context), **made}
+        own = c.project.paths
+        if is_local(context) and own.is_own(context) and not (own.folder / context).is_dir():
+            hint = "create it, or remove 'build'; paths are relative to this file"
+            message = f"there is no folder '{context}'"  # a warning, as an image or a variable for it may stand in
+            c.add(Diagnostic(fields["context"].span, "application-file", message, hint, "warning"))
         if "dockerfile" in fields and (file := c.literal(fields["dockerfile"])):
             if not context.startswith(_REMOTE):
                 c.path(file, fields["dockerfile"].span, base=context)
