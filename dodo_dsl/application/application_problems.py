@@ -146,7 +146,7 @@ def takes_cid(service: ComposeService) -> bool:
     variables = variables_of(service, {}, lambda _: True)
     written = [word for key in COMMANDS for word, _ in words_of(service.raw.get(key, service.node.get(key)))]
     found = [*written, *(value for value in variables.values() if value)]
-    return opendlv_flags.takes_cid(found, {**variables, **dict.fromkeys(service.cid_variables)})
+    return opendlv_flags.takes_cid(found, {**service.file_variables, **variables})
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:

@@ -25,7 +25,7 @@ from dodo_dsl.application.model import (
 )
 from dodo_dsl.application.mounts import mounts
 from dodo_dsl.application.part import Part, pairs, spot
-from dodo_dsl.application.variables import variables_of
+from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
 from dodo_dsl.source import Entry, Node, Scalar
 
@@ -167,12 +167,8 @@ def _env_file(c: Container, node: Node) -> Any:
 
 
 def _own_environment(c: Container) -> None:
-    """Its variables, with the CID wherever one was, also in the place of one that ``env_file`` would set."""
     application, setting = c.project.application, c.project.setting
-    found = variables_of(c.service, c.known, application.is_late, dict(setting.given))
-    made = {k: None if v is None else opendlv_flags.with_cid_text(v, setting.cid) for k, v in found.items()}
-    names = [n for n in opendlv_flags.CID_VARIABLES if n in made or n in c.service.file_variables]
-    made |= dict.fromkeys(names, str(setting.cid))
+    made = variables_with_cid(c.service, c.known, application.is_late, dict(setting.given), setting.cid)
     raw = c.raw("environment")
     names_it = raw is not None and "DISPLAY" in environment(plain(raw))
     if names_it and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):

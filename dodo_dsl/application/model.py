@@ -14,7 +14,7 @@ from dodo_dsl import source
 from dodo_dsl.application.compose_files import Statements, is_late, statements_of
 from dodo_dsl.application.host_paths import HostPaths, repository
 from dodo_dsl.application.interpolation import literal
-from dodo_dsl.application.opendlv_flags import CID_VARIABLES, split
+from dodo_dsl.application.opendlv_flags import split
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -122,11 +122,6 @@ class ComposeService:
     def file_variables(self) -> Mapping[str, str | None]:
         """The variables that its files set; None takes the value from outside."""
         return {name: value for statements in self.statements for name, value in statements}
-
-    @property
-    def cid_variables(self) -> tuple[str, ...]:
-        """The CID variables among those of its files."""
-        return tuple(name for name in CID_VARIABLES if name in self.file_variables)
 
     @property
     def has_display(self) -> bool:

@@ -15,33 +15,17 @@ _FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL
 _IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
 _LITERAL = re.compile(r"--cid=(?P<value>[\w.+-]+)")
 _HIGHEST = 254
-_SHORT = 3
-"""Letters of a flag that others differ from by one, such as ``--pid`` and ``--id``."""
-
 INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 
 
-def meant(word: str, flag: str) -> str:
-    """The flag with its value for a word that is almost it; empty for any other, and for the flag itself.
-
-    Almost is one letter too many, letters in another order or size, and hyphens or blanks; for a long flag also one
-    letter too few or another one.
-    """
+def _meant(word: str) -> str:
+    """The value in a word that is almost ``--cid=``: letters in another order or size, one too many, or blanks."""
     match = _FLAG.fullmatch(word)
-    if match is None or match["flag"] == flag:
+    if match is None or match["flag"] == "--cid":
         return ""
-    name, wanted = match["flag"].replace("-", "").strip(), flag.removeprefix("--")
-    return f"{flag}={match['value'].strip()}" if _is_near(name.lower(), wanted) else ""
-
-
-def _is_near(word: str, wanted: str) -> bool:
-    shorter, least = _shorter(word), _shorter(wanted) if len(wanted) > _SHORT else set()
-    return sorted(word) == sorted(wanted) or wanted in shorter or word in least or not least.isdisjoint(shorter)
-
-
-def _shorter(word: str) -> set[str]:
-    """The word without one of its letters."""
-    return {word[:at] + word[at + 1 :] for at in range(len(word))}
+    name = match["flag"].replace("-", "").strip().lower()
+    shorter = {name[:at] + name[at + 1 :] for at in range(len(name))}
+    return match["value"].strip() if sorted(name) == sorted("cid") or "cid" in shorter else ""
 
 
 def cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
@@ -51,13 +35,9 @@ def cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
         if one:
             yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")
         elif literal and not is_cid(literal["value"]):
-            yield _warning(
-                item,
-                f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}",
-                "write '--cid=111'",
-            )
-        elif not takes_cid and (flag := meant(word, "--cid")) and (is_cid(flag[6:]) or "$" in flag):
-            yield _warning(item, f"'{word}' is not the flag '--cid'", f"did you mean '{flag}'?")
+            yield _warning(item, f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}", "write '--cid=111'")
+        elif not takes_cid and (value := _meant(word)) and (is_cid(value) or "$" in value):
+            yield _warning(item, f"'{word}' is not the flag '--cid'", f"did you mean '--cid={value}'?")
 
 
 def is_cid(value: str) -> bool:

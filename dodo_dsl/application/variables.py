@@ -10,6 +10,7 @@ from dataclasses import replace
 from decimal import Decimal
 
 from dodo_dsl import source
+from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.interpolation import filled, literal, names
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
@@ -79,6 +80,16 @@ def variables_of(
             own[name] = values[name].replace("$", "$$")
     of_files = _of_files(service, values, is_late)
     return {**of_files, **own, **{name: values[name].replace("$", "$$") for name in given}}
+
+
+def variables_with_cid(
+    service: ComposeService, values: Mapping[str, str], is_late: Callable[[str], bool], given: Iterable[str], cid: int
+) -> dict[str, str | None]:
+    """The same with the CID wherever one was, also in the place of one that ``env_file`` would set."""
+    found = variables_of(service, values, is_late, given)
+    made = {name: value and opendlv_flags.with_cid_text(value, cid) for name, value in found.items()}
+    names = [name for name in CID_VARIABLES if name in made or name in service.file_variables]
+    return made | dict.fromkeys(names, str(cid))
 
 
 def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Callable[[str], bool]) -> dict[str, str]:

@@ -10,7 +10,7 @@ from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.construction import Construction, Setting
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
-from dodo_dsl.application.variables import variables_of
+from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
 from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
 
@@ -84,11 +84,7 @@ def _process(service: ComposeService, application: ApplicationSource, setting: S
 
     written = plain(filled_node(service.raw["command"], known, is_late)) if "command" in service.raw else None
     command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
-    found = variables_of(service, known, is_late, dict(setting.given))
-    variables = {k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in found.items()}
-    for name in opendlv_flags.CID_VARIABLES:
-        if name in variables or name in service.cid_variables:
-            variables[name] = str(cid)
+    variables = variables_with_cid(service, known, is_late, dict(setting.given), cid)
     process = raw.get("x-dodo-process")
     command = opendlv_flags.arguments(list(map(str, process or ())), command)
     words = (*(process or ()), *command)
