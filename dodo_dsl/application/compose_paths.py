@@ -75,16 +75,6 @@ def escaped(text: str) -> str:
     return text.replace("$", "$$")
 
 
-def escaped_values(value: Any) -> Any:
-    """Values of JSON with all their texts escaped."""
-    return mapped_texts(value, escaped)
-
-
-def unescaped(value: Any) -> Any:
-    """What ``docker compose config`` shows, which escapes all texts, as they are."""
-    return mapped_texts(value, lambda text: text.replace("$$", "$"))
-
-
 def mapped_texts(value: Any, change: Callable[[str], str]) -> Any:
     """Values of JSON with ``change`` applied to each text."""
     if isinstance(value, dict):

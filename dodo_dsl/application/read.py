@@ -12,7 +12,6 @@ from dodo_dsl.application import declarations as declared
 from dodo_dsl.application import secret_problems
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles, dotenv_problems
-from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.model import (
@@ -25,7 +24,7 @@ from dodo_dsl.application.model import (
     plain,
 )
 from dodo_dsl.application.model import declared as declaration_of
-from dodo_dsl.application.variables import tunable_problems
+from dodo_dsl.application.variables import tunable_problems, with_values
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Reader
 from dodo_dsl.spec.deployment import Declarations
@@ -143,11 +142,7 @@ def _service(name: str, entry: Entry, folder: Path, files: ComposeFiles) -> Comp
     if not isinstance(node, source.Mapping):
         return None
     raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
-    entries = {
-        key: Entry(each.key, filled_node(each.value, files.known, files.is_late)) if key in raw else each
-        for key, each in node.entries.items()
-    }
-    node = replace(node, entries=entries)
+    node = with_values(node, raw, files.known, files.is_late)
     own = tuple(env_files(node))
     return ComposeService(name, node, entry.key, declaration_of(node), own, file_statements(own, folder), raw)
 

@@ -17,7 +17,7 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, enviro
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.source import Entry, Scalar
+from dodo_dsl.source import Entry, Node, Scalar
 from dodo_dsl.spec.vary import Range
 
 _LIBRARIES = ("CLUON_SHAREDMEMORY_POSIX", "VIRTUAL_ENV")
@@ -50,16 +50,19 @@ def with_variables(application: ApplicationSource, values: Mapping[str, str]) ->
     if not values:
         return application
     known = {**application.known, **values}
-    services = {name: _with_values(each, known, application.is_late) for name, each in application.services.items()}
+    services = {
+        name: replace(each, node=with_values(each.node, each.raw, known, application.is_late))
+        for name, each in application.services.items()
+    }
     return replace(application, services=services)
 
 
-def _with_values(service: ComposeService, known: Mapping[str, str], is_late: Callable[[str], bool]) -> ComposeService:
-    entries = dict(service.node.entries)
-    for key, node in service.raw.items():
-        value = filled_node(node, known, is_late)
-        entries[key] = Entry(entries[key].key, value)
-    return replace(service, node=replace(service.node, entries=entries))
+def with_values(
+    service: source.Mapping, raw: Mapping[str, Node], known: Mapping[str, str], is_late: Callable[[str], bool]
+) -> source.Mapping:
+    """A service with variables filled in where each test may set them; ``raw`` are these values as they are written."""
+    made = {key: Entry(service.entries[key].key, filled_node(node, known, is_late)) for key, node in raw.items()}
+    return replace(service, entries={**service.entries, **made})
 
 
 def variables_of(
