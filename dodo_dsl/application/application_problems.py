@@ -28,8 +28,6 @@ from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, onl
 from dodo_dsl.source import Node
 
 _GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
-_LONGEST = 63
-"""A service's name is also one in the test's network (RFC 1035)."""
 
 
 def application_problems(application: ApplicationSource, first: Span) -> Iterator[Diagnostic]:
@@ -162,8 +160,6 @@ def _name(service: ComposeService) -> Iterator[Diagnostic]:
     name = service.name
     if name == SANDBOX or name.startswith("dodo-"):
         yield _bad(service.span, f"the name '{name}' is reserved for DoDo's own services")
-    if len(name) > _LONGEST:
-        yield _bad(service.span, f"the name of a service has {len(name)} characters, expected at most {_LONGEST}")
     if not any(plain(service.node).get(key) for key in ("image", "build", "x-dodo-process")):
         yield _bad(service.span, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
 

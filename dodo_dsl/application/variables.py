@@ -7,7 +7,6 @@ A test sets ``application: {env: {SPEED: 0.5}}``. The application has parameters
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from decimal import Decimal
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
@@ -120,7 +119,6 @@ def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Calla
     return made
 
 
-_KEYS = ("from", "to", "default")
 _RULE = "application-file"
 
 
@@ -138,17 +136,28 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
 
 def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Parameters that are DoDo's own, without a range, or with different ones at several services."""
-    seen: dict[str, tuple[str, Range]] = {}
+    seen: dict[str, tuple[str, list[float]]] = {}
     for service in application.services.values():
         for name, entry in _written(service).items():
-            problems = list(_problems(name, entry))
-            yield from problems
-            if problems:
-                continue
-            one = _range(name, entry)
-            other, first = seen.setdefault(name, (service.name, one))
-            if _numbers(first) != _numbers(one):
-                message = f"'{name}' has another range at '{other}', expected the same one: a parameter has one value"
+            found = _range(name, entry)
+            ends = (*found.ends, found.nominal)
+            low, high, default = numbers = [float(str(end.value)) for end in ends]
+            if why := owner(name):
+                yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
+            elif wrong := next(
+                (end for end, number in zip(ends, numbers, strict=True) if not math.isfinite(number)), None
+            ):
+                yield Diagnostic(wrong.span, _RULE, f"'{wrong.text}' is not a finite decimal number")
+            elif low >= high:
+                message = f"'from' is {ends[0].text}, expected less than 'to', {ends[1].text}"
+                yield Diagnostic(ends[0].span, _RULE, message)
+            elif not low <= default <= high:
+                message = f"'default' is {ends[2].text}, expected {ends[0].text} to {ends[1].text}"
+                yield Diagnostic(ends[2].span, _RULE, message)
+            elif (first := seen.setdefault(name, (service.name, numbers)))[1] != numbers:
+                message = (
+                    f"'{name}' has another range at '{first[0]}', expected the same one: a parameter has one value"
+                )
                 yield Diagnostic(entry.key, _RULE, message)
 
 
@@ -158,33 +167,9 @@ def _written(service: ComposeService) -> dict[str, Entry]:
     return dict(tune.entries) if isinstance(tune, source.Mapping) else {}
 
 
-def _scalars(entry: Entry) -> tuple[Scalar, ...]:
-    node = entry.value
-    found = [node.get(key) for key in _KEYS] if isinstance(node, source.Mapping) else []
-    return tuple(one for one in found if isinstance(one, Scalar))
-
-
 def _range(name: str, entry: Entry) -> Range:
-    low, high, default = _scalars(entry)
+    about = entry.value
+    assert isinstance(about, source.Mapping)
+    low, high, default = (about.entries[key].value for key in ("from", "to", "default"))
+    assert isinstance(low, Scalar) and isinstance(high, Scalar) and isinstance(default, Scalar)
     return Range(name, default, (low, high))
-
-
-def _numbers(one: Range) -> tuple[Decimal, ...]:
-    return tuple(one.number(end.text) for end in (*one.ends, one.nominal))
-
-
-def _problems(name: str, entry: Entry) -> Iterator[Diagnostic]:
-    """Problems of one parameter that the schema does not see."""
-    if why := owner(name):
-        yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
-        return
-    low, high, default = (float(str(scalar.value)) for scalar in _scalars(entry))
-    start, end, middle = _scalars(entry)
-    for scalar in (start, end, middle):
-        if not math.isfinite(float(str(scalar.value))):
-            yield Diagnostic(scalar.span, _RULE, f"'{scalar.text}' is not a finite decimal number")
-            return
-    if low >= high:
-        yield Diagnostic(start.span, _RULE, f"'from' is {start.text}, expected less than 'to', {end.text}")
-    elif not low <= default <= high:
-        yield Diagnostic(middle.span, _RULE, f"'default' is {middle.text}, expected {start.text} to {end.text}")
