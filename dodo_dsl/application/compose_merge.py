@@ -107,14 +107,12 @@ def _as_waits(node: Node) -> Node:
     return _as_keys(node, Mapping(node.span, {"condition": Entry(node.span, started)}))
 
 
-def _as_networks(node: Node) -> Node:
-    return _as_keys(node, Scalar(node.span, None, ""))
-
-
-def _as_keys(node: Node, value: Node) -> Node:
+def _as_keys(node: Node, value: Node | None = None) -> Node:
+    """``[a]`` as ``{a: }``, or with another value."""
     if not isinstance(node, Sequence):
         return node
-    return Mapping(node.span, {i.text: Entry(i.span, value) for i in node.items if isinstance(i, Scalar)})
+    empty = value or Scalar(node.span, None, "")
+    return Mapping(node.span, {i.text: Entry(i.span, empty) for i in node.items if isinstance(i, Scalar)})
 
 
 def _as_build(node: Node) -> Node:
@@ -133,6 +131,6 @@ _FORMS: dict[Path, Callable[[Node], Node]] = {
     **{(key,): _as_list for key in _LISTS},
     ("build",): _as_build,
     ("depends_on",): _as_waits,
-    ("networks",): _as_networks,
+    ("networks",): _as_keys,
     ("extra_hosts",): _as_hosts,
 }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
+from dodo_dsl.application.compose_files import dotenv_problems
 from dodo_dsl.application.compose_paths import escaped, filled_node
 from dodo_dsl.application.model import (
     FILES,
@@ -101,13 +102,6 @@ class Container(Part):
             return ""
         return self.other(key, containers[name] if kind == "container" else name, span)
 
-    def number(self, node: Node, most: float, what: str, key: str, measure: Any = limits.number) -> Any:
-        """A limit of at most ``most``."""
-        value, is_cut = limits.cut(self.literal(node), most, measure)
-        if is_cut:
-            self.cut(node.span, what, most, key)
-        return int(value) if float(value).is_integer() else value
-
 
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 _WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"
@@ -157,7 +151,10 @@ def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
     for file in env_files(c.service.node):
         if path := c.path(file.path, file.span):
-            if file.required and not (c.project.application.folder / file.path).is_file():
+            place = c.project.application.folder / file.path
+            for problem in dotenv_problems(place, raw=file.raw):
+                c.add(problem)
+            if file.required and not place.is_file():
                 hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
                 c.bad(file.span, f"there is no file '{file.path}'", hint)
             about = {"path": path, **({} if file.required else {"required": False})}

@@ -50,12 +50,15 @@ def whole(value: object) -> float:
     return math.floor(found) if math.isfinite(found) else found
 
 
-def cut(value: object, most: float, measure: Callable[[object], float] = number) -> tuple[float, bool]:
-    """A limit of at most ``most``, and whether it was cut; 0 and below do not limit."""
-    found = measure(value)
-    if 0 < found <= most and math.isfinite(found):
-        return found, False
-    return most, math.isfinite(found) and found > most
+def limit(
+    c: "Container", node: Node, most: float, what: str, key: str, measure: Callable[[object], float] = number
+) -> float:
+    """A limit of at most ``most``, which also takes the place of 0 and below."""
+    found = measure(c.literal(node))
+    if math.isfinite(found) and found > most:
+        c.cut(node.span, what, most, key)
+    value = found if 0 < found <= most and math.isfinite(found) else most
+    return int(value) if float(value).is_integer() else value
 
 
 def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
@@ -115,7 +118,7 @@ def deploy(c: "Container", node: Node) -> Any:
 
 
 def cpus(c: "Container", node: Node) -> Any:
-    return c.number(node, float("inf") if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus")
+    return limit(c, node, float("inf") if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus")
 
 
 def tmpfs(c: "Container", node: Node) -> Any:
@@ -155,7 +158,7 @@ def own_limits(c: "Container") -> None:
 
 LIMITS: dict[str, Callable[["Container", Node], Any]] = {
     "cpus": cpus,
-    "mem_limit": lambda c, n: c.number(n, c.limits.memory, "mem_limit", "memory", size),
-    "pids_limit": lambda c, n: c.number(n, c.limits.processes, "pids_limit", "processes", whole),
-    "shm_size": lambda c, n: c.number(n, c.limits.memory, "shm_size", "memory", size),
+    "mem_limit": lambda c, n: limit(c, n, c.limits.memory, "mem_limit", "memory", size),
+    "pids_limit": lambda c, n: limit(c, n, c.limits.processes, "pids_limit", "processes", whole),
+    "shm_size": lambda c, n: limit(c, n, c.limits.memory, "shm_size", "memory", size),
 }

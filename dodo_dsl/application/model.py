@@ -136,8 +136,9 @@ class ComposeService:
     def _true(self, key: str) -> Span | None:
         """The place of a key of ``x-dodo`` that is true."""
         about = self.node.get(KEYS[0])
-        word = _scalar(about, key, bool)
-        return about.entries[key].key if word and word.value and isinstance(about, source.Mapping) else None
+        entry = about.entries.get(key) if isinstance(about, source.Mapping) else None
+        is_true = entry is not None and isinstance(entry.value, Scalar) and entry.value.value is True
+        return entry.key if entry and is_true else None
 
 
 @dataclass(frozen=True)
@@ -300,18 +301,9 @@ def words_of(node: Node | None) -> Iterator[tuple[str, Scalar]]:
 
 def declared_cid(node: source.Mapping) -> Scalar | None:
     """What ``x-dodo`` of a document or of a service says to be built in."""
-    return _scalar(node.get("x-dodo"), "cid", object)
-
-
-def _scalar(node: Node | None, key: str, kind: type) -> Scalar | None:
-    """The value of a key, if it is of that kind."""
-    found = node.get(key) if isinstance(node, source.Mapping) else None
-    return found if isinstance(found, Scalar) and isinstance(found.value, kind) else None
-
-
-def _whole(node: Node, key: str) -> int:
-    found = _scalar(node, key, int)
-    return found.value if found and isinstance(found.value, int) else 0
+    about = node.get("x-dodo")
+    cid = about.get("cid") if isinstance(about, source.Mapping) else None
+    return cid if isinstance(cid, Scalar) else None
 
 
 def declared(service: source.Mapping) -> Declared | None:
@@ -323,28 +315,29 @@ def declared(service: source.Mapping) -> Declared | None:
         return None
     words = {key: tuple((s.text, s.span) for s in scalars(e.value)) for key, e in entry.value.entries.items()}
     inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))
-    lines = tuple(printed_lines(entry.value.get("lines")))
+    readers = entry.value.get("readers")
+    count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 0
+    lines = printed_lines(entry.value.get("lines"))
     sent = {name.removesuffix("/0") for name, _ in outputs}
     printed = {line.port: (line.port, line.message_span) for line in lines if line.port not in sent}
-    return Declared(
-        inputs,
-        (*outputs, *printed.values()),
-        answers,
-        done[0] if done else None,
-        _whole(entry.value, "readers"),
-        entry.key,
-        lines,
-    )
+    return Declared(inputs, (*outputs, *printed.values()), answers, done[0] if done else None, count, entry.key, lines)
 
 
-def printed_lines(node: Node | None) -> Iterator[PrintedLine]:
+def printed_lines(node: Node | None) -> tuple[PrintedLine, ...]:
     """The ``lines`` of a service, as far as they fit the schema; ``$$`` is a dollar sign, as everywhere in compose."""
-    for item in node.items if isinstance(node, source.Sequence) else ():
-        match, message = (_scalar(item, key, object) for key in ("match", "message"))
-        if match and message:
-            yield PrintedLine(
-                match.text.replace("$$", "$"), match.span, message.text, message.span, _whole(item, "sender")
-            )
+    items = node.items if isinstance(node, source.Sequence) else ()
+    found = (_printed_line(item) for item in items)
+    return tuple(line for line in found if line is not None)
+
+
+def _printed_line(node: Node) -> PrintedLine | None:
+    if not isinstance(node, source.Mapping):
+        return None
+    match, message, sender = (node.get(key) for key in ("match", "message", "sender"))
+    if not (isinstance(match, Scalar) and isinstance(message, Scalar)):
+        return None
+    stamp = sender.value if isinstance(sender, Scalar) and isinstance(sender.value, int) else 0
+    return PrintedLine(match.text.replace("$$", "$"), match.span, message.text, message.span, stamp)
 
 
 def scalars(node: Node | None) -> list[Scalar]:

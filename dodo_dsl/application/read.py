@@ -11,7 +11,7 @@ from dodo_dsl import source
 from dodo_dsl.application import declarations as declared
 from dodo_dsl.application import secret_problems
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
-from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles, dotenv_problems
+from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.model import (
@@ -78,16 +78,11 @@ def read_application(
     found.extend(application_problems(application, next(iter(services.entries.values())).key))
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
-    found.extend(problem for problem in _secrets(application, document, files) if problem.span not in refused)
-    return (application if application.services else None), found
-
-
-def _secrets(application: ApplicationSource, document: source.Mapping, files: ComposeFiles) -> Iterator[Diagnostic]:
-    """Warnings of what looks like a secret, in the compose files and beside them."""
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
-    yield from secret_problems.withheld(nodes, files.written, {*files.known, *files.secrets, *files.passed}, os.environ)
-    for file, raw in _own_files(application):
-        yield from dotenv_problems(file, raw=raw)
+    known = {*files.known, *files.secrets, *files.passed}
+    secrets = secret_problems.withheld(nodes, files.written, known, os.environ)
+    found.extend(problem for problem in secrets if problem.span not in refused)
+    return (application if application.services else None), found
 
 
 def as_written(path: Path) -> ApplicationSource | None:
@@ -129,12 +124,6 @@ def _application(
         top=document.entries,
         cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
     )
-
-
-def _own_files(application: ApplicationSource) -> list[tuple[Path, bool]]:
-    """The files of ``env_file`` that the application may read, each once, and whether they are raw."""
-    words = sorted({(file.path, file.raw) for service in application.services.values() for file in service.env_files})
-    return [(Path(application.paths.whole(text)), raw) for text, raw in words if application.paths.is_own(text)]
 
 
 def _service(name: str, entry: Entry, folder: Path, files: ComposeFiles) -> ComposeService | None:
