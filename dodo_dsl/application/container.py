@@ -115,10 +115,6 @@ def _is_off(node: Node) -> bool:
     return plain(node) in (None, False, "", "false", [], {})
 
 
-def _as_written(_: Container, node: Node) -> Any:
-    return plain(node)
-
-
 def _command(c: Container, key: str, node: Node) -> Any:
     if isinstance(node, Scalar) and isinstance(node.value, str):
         try:
@@ -278,32 +274,13 @@ def _source(volume: Any) -> str:
     return str(volume.get("source", "")) if isinstance(volume, dict) else str(volume).partition(":")[0]
 
 
+_AS_WRITTEN = (
+    "cap_drop", "cpuset", "dns", "dns_opt", "dns_search", "domainname", "expose", "extra_hosts", "group_add",
+    "hostname", "init", "platform", "read_only", "stdin_open", "stop_grace_period", "stop_signal", "tty", "umask",
+    "user", "working_dir",
+)  # fmt: skip
 _CARRIED: dict[str, Key] = {
-    **dict.fromkeys(
-        [
-            "cap_drop",
-            "cpuset",
-            "dns",
-            "dns_opt",
-            "dns_search",
-            "domainname",
-            "expose",
-            "extra_hosts",
-            "group_add",
-            "hostname",
-            "init",
-            "platform",
-            "read_only",
-            "stdin_open",
-            "stop_grace_period",
-            "stop_signal",
-            "tty",
-            "umask",
-            "user",
-            "working_dir",
-        ],
-        _as_written,
-    ),
+    **dict.fromkeys(_AS_WRITTEN, lambda _, n: plain(n)),
     **limits.LIMITS,
     "build": image.build,
     "cap_add": hardware.capabilities,
@@ -340,43 +317,11 @@ _REFUSED = {
     "provider": "starts a program on the host",
     "use_api_socket": "gives access to the Docker engine",
 }
-_LEFT_OUT = frozenset(
-    [
-        "annotations",
-        "attach",
-        "blkio_config",
-        "cgroup",
-        "cgroup_parent",
-        "container_name",
-        "cpu_count",
-        "cpu_percent",
-        "cpu_period",
-        "cpu_quota",
-        "cpu_rt_period",
-        "cpu_rt_runtime",
-        "cpu_shares",
-        "develop",
-        "isolation",
-        "label_file",
-        "labels",
-        "logging",
-        "mac_address",
-        "mem_reservation",
-        "mem_swappiness",
-        "memswap_limit",
-        "oom_kill_disable",
-        "oom_score_adj",
-        "ports",
-        "post_start",
-        "pre_start",
-        "pre_stop",
-        "pull_policy",
-        "pull_refresh_after",
-        "restart",
-        "scale",
-        "storage_opt",
-        "userns_mode",
-        "uts",
-    ]
-)
+_LEFT_OUT = (
+    "annotations", "attach", "blkio_config", "cgroup", "cgroup_parent", "container_name", "cpu_count", "cpu_percent",
+    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "isolation", "label_file",
+    "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness", "memswap_limit", "oom_kill_disable",
+    "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop", "pull_policy", "pull_refresh_after", "restart",
+    "scale", "storage_opt", "userns_mode", "uts",
+)  # fmt: skip
 """Keys of the compose specification that a test has no use for."""

@@ -29,8 +29,6 @@ LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
 
 def size(value: object) -> float:
     """Bytes of a size as compose reads it, ``8g``; infinite where it is none."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return math.floor(value) if 0 <= value < math.inf else math.inf
     found = _SIZE.fullmatch(str(value))
     return math.floor(float(found[1]) * 1024.0 ** " kmgtp".index(found[2].lower() or " ")) if found else math.inf
 
