@@ -157,7 +157,7 @@ def takes_cid(service: ComposeService) -> bool:
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
     """Unknown keys that begin like DoDo's."""
-    entries = service.entries if isinstance(service, source.Mapping) else {}
+    entries = source.entries(service)
     for word, entry in entries.items():
         if word.startswith("x-dodo") and word not in KEYS:
             hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)

@@ -58,7 +58,7 @@ _BINDS = {("services", "volumes", "source"): "type", ("volumes", "driver_opts", 
 
 
 def _is_bind(holder: Node | None, key: str) -> bool:
-    word = holder.get(key) if isinstance(holder, source.Mapping) else None
+    word = source.part(holder, key)
     return isinstance(word, Scalar) and "bind" in word.text
 
 

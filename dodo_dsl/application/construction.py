@@ -17,7 +17,7 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, is_tru
 from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
 from dodo_dsl.application.part import Part
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Mapping, Node, Scalar
+from dodo_dsl.source import Mapping, Node, Scalar, entries
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _NAMED = ("volumes", "secrets", "configs")
@@ -76,8 +76,7 @@ class Construction:
 
     def _named(self, key: str) -> Iterator[tuple[str, Node, Span]]:
         top = self.application.top.get(key)
-        node = top.value if top else None
-        for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
+        for name, entry in (entries(top.value) if top else {}).items():
             yield name, entry.value, entry.key
 
     def about(self, name: str, span: Span) -> Part:
@@ -176,8 +175,7 @@ class Construction:
         top = Mapping(Span(str(self.application.path)), dict(self.application.top))
         for key, entry in top.entries.items():
             if key not in known:
-                about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
-                hint = "indent it by 2: it looks like a service" if about & _OF_SERVICES else ""
+                hint = "indent it by 2: it looks like a service" if entries(entry.value).keys() & _OF_SERVICES else ""
                 of.unknown_key(key, top, "the compose file", known, hint)
         for name, node, span in self._named("networks"):
             external = node.get("external") if isinstance(node, Mapping) else None

@@ -192,8 +192,7 @@ def _volumes_from(c: Container, node: Node) -> Any:
 
 def _networks(c: Container, node: Node) -> Any:
     """The names that the service has in networks, which are the test's one."""
-    about = node.entries.values() if isinstance(node, source.Mapping) else ()
-    aliases = [plain(a) for e in about if isinstance(e.value, source.Mapping) and (a := e.value.get("aliases"))]
+    aliases = [plain(a) for e in source.entries(node).values() if (a := source.part(e.value, "aliases"))]
     names = list(dict.fromkeys(str(name) for each in aliases for name in each or ()))
     return {"default": {"aliases": names}} if names else None
 
@@ -208,7 +207,7 @@ def _depends_on(c: Container, node: Node) -> Any:
         node = source.Mapping(node.span, {i.text: Entry(i.span, i) for i in c.items(node) if isinstance(i, Scalar)})
     made = {}
     for name, entry in node.entries.items():
-        about = entry.value.entries if isinstance(entry.value, source.Mapping) else {}
+        about = source.entries(entry.value)
         own = {
             key: plain(about[key].value) for key in ("condition", "required") if key in about
         }  # nothing is restarted
@@ -231,8 +230,7 @@ def _sysctls(c: Container, node: Node) -> Any:
 
 
 def _secrets(c: Container, node: Node, key: str) -> Any:
-    top = c.project.application.rest.get(key)
-    known = top.entries if isinstance(top, source.Mapping) else {}
+    known = source.entries(c.project.application.rest.get(key))
     for item in c.items(node):
         fields = c.fields(item, f"a {key[:-1]} of '{c.name}'", "source target uid gid mode")
         word = fields.get("source") if isinstance(item, source.Mapping) else item

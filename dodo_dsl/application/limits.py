@@ -76,7 +76,7 @@ def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
     """
     own = {"core": 0, "fsize": c.limits.file_size, "nofile": c.limits.files}
     made: dict[str, Any] = dict(own)
-    for name, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
+    for name, entry in source.entries(node).items():
         most = {**own, "memlock": c.limits.memory, "msgqueue": _MESSAGE_QUEUES}.get(name, math.inf)
         if name == "nproc":
             continue

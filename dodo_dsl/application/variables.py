@@ -129,7 +129,7 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
     """
     found: dict[str, Range] = {}
     for service in application.services.values():
-        for name, entry in _written(service).items():
+        for name, entry in source.entries(service.node, "x-dodo", "tune").items():
             found.setdefault(name, _range(name, entry))
     return tuple(found.values())
 
@@ -138,7 +138,7 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Parameters that are DoDo's own, without a range, or with different ones at several services."""
     seen: dict[str, tuple[str, list[float]]] = {}
     for service in application.services.values():
-        for name, entry in _written(service).items():
+        for name, entry in source.entries(service.node, "x-dodo", "tune").items():
             found = _range(name, entry)
             ends = (*found.ends, found.nominal)
             low, high, default = numbers = [float(str(end.value)) for end in ends]
@@ -161,15 +161,7 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
                 yield Diagnostic(entry.key, _RULE, message)
 
 
-def _written(service: ComposeService) -> dict[str, Entry]:
-    declared = service.node.get("x-dodo")
-    tune = declared.get("tune") if isinstance(declared, source.Mapping) else None
-    return dict(tune.entries) if isinstance(tune, source.Mapping) else {}
-
-
 def _range(name: str, entry: Entry) -> Range:
-    about = entry.value
-    assert isinstance(about, source.Mapping)
-    low, high, default = (about.entries[key].value for key in ("from", "to", "default"))
+    low, high, default = (source.part(entry.value, key) for key in ("from", "to", "default"))
     assert isinstance(low, Scalar) and isinstance(high, Scalar) and isinstance(default, Scalar)
     return Range(name, default, (low, high))
