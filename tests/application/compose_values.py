@@ -61,6 +61,8 @@ stop_grace_period:
 stop_grace_period: [5s]
 volumes: [known:/data, "data:/more:ro"]
 volumes: [a/b:/data]
+cap_drop: true
+cap_drop: ALL
 restart: 3
 restart:
 cpus: "0x10"
