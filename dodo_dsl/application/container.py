@@ -205,12 +205,10 @@ def _links(c: Container, node: Node) -> Any:
 def _depends_on(c: Container, node: Node) -> Any:
     if not isinstance(node, source.Mapping):
         node = source.Mapping(node.span, {i.text: Entry(i.span, i) for i in c.items(node) if isinstance(i, Scalar)})
-    made = {}
+    made = {}  # nothing of a test is restarted
     for name, entry in node.entries.items():
         about = source.entries(entry.value)
-        own = {
-            key: plain(about[key].value) for key in ("condition", "required") if key in about
-        }  # nothing is restarted
+        own = {key: plain(each.value) for key, each in about.items() if key in ("condition", "required")}
         condition = own.get("condition")
         if isinstance(condition, str) and condition not in _CONDITIONS:
             message = f"'{condition}' is not a condition of 'depends_on'"
