@@ -79,10 +79,6 @@ class Construction:
         for name, entry in (entries(top.value) if top else {}).items():
             yield name, entry.value, entry.key
 
-    def about(self, name: str, span: Span) -> Part:
-        """What reports problems of something with a name."""
-        return Part(self, name, span)
-
     def rebased(self, path: str) -> str:
         """A path of the application as seen from the compiled test's folder."""
         if path.startswith(("/", "~")):
@@ -133,7 +129,7 @@ class Construction:
     def _file(self, key: str, name: str, node: Node, span: Span) -> dict[str, Any]:
         """A secret or config: of a file of the repository, of a variable that is passed, or a text."""
         what = f"the {key[:-1]} '{name}'"
-        of = self.about(what, span)
+        of = Part(self, what, span)
         fields = of.fields(
             node, what, "file environment content", "labels name",
             refused=dict.fromkeys(("driver", "driver_opts", "template_driver"), "a program would provide it")
@@ -171,7 +167,7 @@ class Construction:
 
     def _top(self) -> None:
         known = ("services", "include", *_NAMED, *TOP_LEFT_OUT)
-        of = self.about("the compose file", Span(str(self.application.path)))
+        of = Part(self, "the compose file", Span(str(self.application.path)))
         top = Mapping(Span(str(self.application.path)), dict(self.application.top))
         for key, entry in top.entries.items():
             if key not in known:

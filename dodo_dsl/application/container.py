@@ -76,13 +76,10 @@ class Container(Part):
             self.add(Diagnostic(self.left[0][1], "application-key", message, severity="warning"))
         return self.own
 
-    def filled(self, node: Node) -> Node:
+    def filled(self, key: str) -> Any:
         """A value with the variables of the test filled in."""
-        late = self.project.application.is_late
-        return filled_node(node, self.known, late)
-
-    def raw(self, key: str) -> Node | None:
-        return self.service.raw.get(key)
+        node = self.service.raw.get(key)
+        return None if node is None else plain(filled_node(node, self.known, self.project.application.is_late))
 
     def other(self, key: str, name: str, span: Span, taken: Collection[str] = ()) -> str:
         """A service that a key names, if it starts; a problem if there is none."""
@@ -121,8 +118,7 @@ def _command(c: Container, key: str, node: Node) -> Any:
             opendlv_flags.split(node.value)
         except ValueError as error:
             c.bad(node.span, f"'{key}' of '{c.name}': {error}")
-    raw = c.raw(key)
-    value = plain(c.filled(raw)) if raw is not None else None
+    value = c.filled(key)
     return with_cid(value, c.project.setting.cid) if value is not None else None
 
 
@@ -133,9 +129,8 @@ def with_cid(command: Any, cid: int) -> Any:
     return list(opendlv_flags.with_cid([text(word) for word in command], cid))
 
 
-def _healthcheck(c: Container, _: Node) -> Any:
-    node = c.raw("healthcheck")
-    made = plain(c.filled(node)) if node is not None else {}
+def _healthcheck(c: Container, node: Node) -> Any:
+    made = c.filled("healthcheck") or {}
     known = "disable interval retries test timeout start_period start_interval"
     c.fields(node, f"'healthcheck' of '{c.name}'", known)
     if isinstance(made, dict) and made.get("test") is not None:
@@ -162,8 +157,8 @@ def _env_file(c: Container, node: Node) -> Any:
 def _own_environment(c: Container) -> None:
     application, setting = c.project.application, c.project.setting
     made = variables_with_cid(c.service, c.known, application.is_late, dict(setting.given), setting.cid)
-    raw = c.raw("environment")
-    names_it = raw is not None and "DISPLAY" in environment(plain(raw))
+    written = c.service.node.get("environment")
+    names_it = written is not None and "DISPLAY" in environment(plain(written))
     if names_it and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):
         made |= OFFSCREEN
     if made:

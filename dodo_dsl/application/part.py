@@ -94,7 +94,7 @@ class Part:
         """The fields of a mapping that a test carries; problems of those that it cannot have, and of unknown ones."""
         found: dict[str, Node] = {}
         words, gone = known.split(), left_out.split()
-        for key, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
+        for key, entry in source.entries(node).items():
             if key in words:
                 found.update({key: entry.value} if _is_set(entry.value) else {})
             elif refused and key in refused:
