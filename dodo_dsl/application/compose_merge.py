@@ -78,7 +78,7 @@ def _target(item: Node) -> str:
     return parts[1] if len(parts) > 1 else parts[0]
 
 
-def _as_pairs(node: Node) -> Node:
+def as_pairs(node: Node) -> Node:
     """``[A=1, B]`` as ``{A: 1, B: null}``."""
     if not isinstance(node, Sequence):
         return node
@@ -126,8 +126,8 @@ _LISTS = (
     "group_add", "links", "profiles", "security_opt", "tmpfs", "volumes_from",
 )  # fmt: skip
 _FORMS: dict[Path, Callable[[Node], Node]] = {
-    **{(key,): _as_pairs for key in ("environment", "sysctls")},
-    **{("build", key): _as_pairs for key in ("args", "additional_contexts")},
+    **{(key,): as_pairs for key in ("environment", "sysctls")},
+    **{("build", key): as_pairs for key in ("args", "additional_contexts")},
     **{(key,): _as_list for key in _LISTS},
     ("build",): _as_build,
     ("depends_on",): _as_waits,

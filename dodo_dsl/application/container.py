@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
 from dodo_dsl.application.compose_files import dotenv_problems
+from dodo_dsl.application.compose_merge import as_pairs
 from dodo_dsl.application.compose_paths import escaped, filled_node
 from dodo_dsl.application.model import (
     FILES,
@@ -25,7 +26,7 @@ from dodo_dsl.application.model import (
     text,
 )
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import Part, pairs, spot
+from dodo_dsl.application.part import Part, spot
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
 from dodo_dsl.source import Entry, Node, Scalar
@@ -217,9 +218,9 @@ def _depends_on(c: Container, node: Node) -> Any:
 
 
 def _sysctls(c: Container, node: Node) -> Any:
-    found = dict(pairs(node))
+    found = source.entries(as_pairs(node))
     is_own = c.project.setting.own_network
-    return {key: plain(value) for key, value in found.items() if is_own or not key.startswith("net.")} or None
+    return {key: plain(each.value) for key, each in found.items() if is_own or not key.startswith("net.")} or None
 
 
 def _secrets(c: Container, node: Node, key: str) -> Any:

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
+from dodo_dsl.application.compose_merge import as_pairs
 from dodo_dsl.application.compose_paths import escaped, is_local
 from dodo_dsl.application.model import environment, image_variable, plain, text
-from dodo_dsl.application.part import pairs
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Node
 
@@ -65,8 +65,9 @@ def build(c: "Container", node: Node) -> Any:
         made["args"] = _arguments(c, plain(fields["args"]))
     if "additional_contexts" in fields:
         made["additional_contexts"] = {
-            name: _context(c, where, word) for name, where in pairs(fields["additional_contexts"])
-            if (word := c.literal(where)) is not None
+            name: _context(c, each.value, word)
+            for name, each in source.entries(as_pairs(fields["additional_contexts"])).items()
+            if (word := c.literal(each.value)) is not None
         }  # fmt: skip
     network = c.literal(fields["network"]) if "network" in fields else None
     if network not in ("", "default", "none", None):

@@ -6,7 +6,7 @@
 import functools
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,12 +44,17 @@ def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[
         return None
     settled = compose_merge.settled(functools.reduce(compose_merge.merged, whole))
     assert isinstance(settled, source.Mapping)
-    services = settled.get("services")
-    if not isinstance(services, source.Mapping):
-        return settled
     here = files.relative(folder)
-    entries = {name: Entry(e.key, _with_context(e.value, here)) for name, e in services.entries.items()}
-    return with_entry(settled, "services", source.Mapping(services.span, entries, services.tag))
+    return _changed(settled, lambda _, service: _with_context(service, here))
+
+
+def _changed(document: source.Mapping, change: Callable[[str, Node], Node]) -> source.Mapping:
+    """A file with other services."""
+    services = document.get("services")
+    if not isinstance(services, source.Mapping):
+        return document
+    entries = {name: Entry(entry.key, change(name, entry.value)) for name, entry in services.entries.items()}
+    return with_entry(document, "services", source.Mapping(services.span, entries, services.tag))
 
 
 def _with_context(service: Node, here: str) -> Node:
@@ -66,13 +71,7 @@ def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...
     if document is None:
         return None
     rest = source.Mapping(document.span, {k: e for k, e in document.entries.items() if k != "include"})
-    services = document.get("services")
-    if isinstance(services, source.Mapping):
-        entries = {
-            name: Entry(entry.key, _extended(files, (Service(file, folder, name),), entry.value))
-            for name, entry in services.entries.items()
-        }
-        rest = with_entry(rest, "services", source.Mapping(services.span, entries, services.tag))
+    rest = _changed(rest, lambda name, service: _extended(files, (Service(file, folder, name),), service))
     include = document.get("include")
     for item in include.items if isinstance(include, source.Sequence) else (include,) if include else ():
         part = _included(files, item, folder, (*chain, file))
