@@ -157,12 +157,7 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
 
 
 _NAMES = ("compose.yaml", "compose.yml", "docker-compose.yml", "docker-compose.yaml")
-_OVERRIDES = (
-    "compose.override.yml",
-    "compose.override.yaml",
-    "docker-compose.override.yml",
-    "docker-compose.override.yaml",
-)
+_OVERRIDES = tuple(f"{name}.override.{end}" for name in ("compose", "docker-compose") for end in ("yml", "yaml"))
 """Of each, compose takes the first that is there."""
 _PLAIN = re.compile(r"[\w./-]+")
 
@@ -174,11 +169,10 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
     """
     folder = paths[0].parent
     named = [_whole_file(path) for path in paths]
-    found = [
-        next(_whole_file(folder / name) for name in names if (folder / name).is_file())
-        for names in (_NAMES, _OVERRIDES)
-        if any((folder / name).is_file() for name in names)
-    ]
+    there = (
+        [_whole_file(folder / name) for name in names if (folder / name).is_file()] for names in (_NAMES, _OVERRIDES)
+    )
+    found = [files[0] for files in there if files]
     others = [path for path in found if path not in named]
     if not others or len(others) == len(found):
         return
