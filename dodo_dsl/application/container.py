@@ -134,7 +134,7 @@ def _healthcheck(c: Container, node: Node) -> Any:
     made = c.filled("healthcheck") or {}
     known = "disable interval retries test timeout start_period start_interval"
     c.fields(node, f"'healthcheck' of '{c.name}'", known)
-    if isinstance(made, dict) and made.get("test") is not None:
+    if made.get("test") is not None:
         made["test"] = with_cid(made["test"], c.project.setting.cid)
     return {key: value for key, value in made.items() if key in known.split() and value is not None}
 

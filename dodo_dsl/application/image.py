@@ -1,5 +1,6 @@
 """The image of a service, and how it is built."""
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
@@ -13,7 +14,8 @@ if TYPE_CHECKING:
     from dodo_dsl.application.container import Container
 
 _REMOTE = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
-_REGISTRIES = ("index.docker.io/", "docker.io/")
+_AROUND_NAME = re.compile(r"^(index\.)?docker\.io/|:[^/:@]*(@.*)?\Z|@.*\Z", re.DOTALL)
+"""The registry that the engine takes by default, tag and digest."""
 _BASES = ("python", "library/python", "debian", "library/debian")
 """What DoDo's images, and those of many others, are built on."""
 
@@ -23,19 +25,9 @@ def image(c: "Container", node: Node) -> Any:
     return f"${{{image_variable(c.name)}:-{text(plain(node))}}}"
 
 
-def short_name(image: str) -> str:
-    """An image's name without tag, digest and the registry that the engine takes by default."""
-    name = image.partition("@")[0]
-    head, sign, tag = name.rpartition(":")
-    name = head if sign and "/" not in tag else name
-    for registry in _REGISTRIES:
-        name = name.removeprefix(registry)
-    return name
-
-
 def build(c: "Container", node: Node) -> Any:
     image = c.service.node.get("image")
-    name = short_name(text(plain(image))) if image is not None else ""
+    name = _AROUND_NAME.sub("", text(plain(image))) if image is not None else ""
     if name.startswith("dodo/") or name in _BASES:
         which = "one of DoDo's own" if name.startswith("dodo/") else "one on which others are built"
         c.refuse(node.span, f"the image '{name}' of '{c.name}' would replace {which}", "give the image another name")
