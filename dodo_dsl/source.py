@@ -91,6 +91,19 @@ def plain(node: Node) -> Any:
     return node.value
 
 
+def part(node: Node | None, *keys: str) -> Node | None:
+    """The value below keys, each of the mapping before; None where there is none."""
+    for key in keys:
+        node = node.get(key) if isinstance(node, Mapping) else None
+    return node
+
+
+def entries(node: Node | None, *keys: str) -> dict[str, Entry]:
+    """The entries of the mapping below keys; none where there is no mapping."""
+    found = part(node, *keys)
+    return found.entries if isinstance(found, Mapping) else {}
+
+
 def walk(node: Node) -> Iterator[Node]:
     """The node and everything below it."""
     waiting = [node]

@@ -1,15 +1,17 @@
-"""Problems of an application: of each service by itself, and of all of them together.
+"""Problems of an application beside those of its keys, which are judged where its services are made.
 
-A service has names, commands, references, and what cannot be isolated; together they have missing files, cycles of
-dependencies, and no service that takes a CID.
+A service has a name and a program; together they have cycles of dependencies, and buses.
 """
 
+import os
+import re
+import shlex
 from collections.abc import Collection, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
-from dodo_dsl.application.compose_paths import is_local
 from dodo_dsl.application.construction import construction_of
 from dodo_dsl.application.interpolation import filled, literal
 from dodo_dsl.application.model import (
@@ -24,17 +26,16 @@ from dodo_dsl.application.model import (
     references,
     words_of,
 )
-from dodo_dsl.application.part import spot
-from dodo_dsl.application.slips import cid_slips, is_cid, missing_program
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, has_errors, only_fix, shown_path
-from dodo_dsl.source import Node
-
-_CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix, shown_path
+from dodo_dsl.source import Node, Scalar
 
 _GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
-_LONGEST = 63
-"""A service's name is also one in the test's network (RFC 1035)."""
+_FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
+_IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
+_LITERAL = re.compile(r"--cid=(?P<value>[\w.+-]+)")
+_HIGHEST = 254
+_INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 
 
 def application_problems(application: ApplicationSource, first: Span) -> Iterator[Diagnostic]:
@@ -47,8 +48,7 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     of_stack = stack.parts(application)
     construction = construction_of(application)
     for name, service in application.services.items():
-        own = [*_problems(service, application), *_missing_files(service, application)]
-        own += [*_missing_folder(service, application), *missing_program(service, application.folder)]
+        own = [*_name(service), *_missing_program(service, application.folder)]
         begin = len(construction.problems)
         construction.service(service)
         own += construction.problems[begin:]
@@ -62,25 +62,6 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
     yield from found
     if not has_errors(found):
         yield from _without_cid(application)
-
-
-def _missing_files(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    for file in service.env_files:
-        if file.required and application.paths.is_own(file.path) and not (application.folder / file.path).is_file():
-            hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
-            yield Diagnostic(file.span, "application-file", f"there is no file '{file.path}'", hint)
-
-
-def _missing_folder(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    """A folder to build from that is not there: a warning, as an image or a variable for it may stand in."""
-    build = service.node.get("build")
-    context = build.get("context") if isinstance(build, source.Mapping) else build
-    folder = literal(context.value) if isinstance(context, source.Scalar) and isinstance(context.value, str) else None
-    if folder is None or context is None or not is_local(folder):
-        return
-    if application.paths.is_own(folder) and not (application.folder / folder).is_dir():
-        hint = "create it, or remove 'build'; paths are relative to this file"
-        yield Diagnostic(context.span, "application-file", f"there is no folder '{folder}'", hint, "warning")
 
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
@@ -145,13 +126,13 @@ def written_cids(service: ComposeService, application: ApplicationSource) -> set
     flags = (match["cid"] for part in (text, *given.values()) for match in opendlv_flags.NUMBER.finditer(part))
     built_in = declared_cid(service.node)
     found = (*flags, *map(given.get, opendlv_flags.CID_VARIABLES), str(built_in.value) if built_in else None)
-    return {int(cid) for cid in found if cid and is_cid(cid)}
+    return {int(cid) for cid in found if cid and _is_cid(cid)}
 
 
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Warnings of flags that give no CID, of services with messages that take none, and of none that does."""
     services = application.services.values()
-    slips = {service.name: list(cid_slips(service, takes_cid(service))) for service in services}
+    slips = {service.name: list(_cid_slips(service, takes_cid(service))) for service in services}
     yield from (slip for found in slips.values() for slip in found)
     if application.cid is not None:
         return
@@ -171,20 +152,12 @@ def takes_cid(service: ComposeService) -> bool:
     variables = variables_of(service, {}, lambda _: True)
     written = [word for key in COMMANDS for word, _ in words_of(service.raw.get(key, service.node.get(key)))]
     found = [*written, *(value for value in variables.values() if value)]
-    return opendlv_flags.takes_cid(found, {**variables, **dict.fromkeys(service.cid_variables)})
-
-
-def _problems(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    """What is wrong with one service beside its keys: its name, commands, and the services that it names."""
-    yield from _name(service)
-    yield from _commands(service)
-    yield from _references(service, application)
-    yield from _conditions(service)
+    return opendlv_flags.takes_cid(found, {**service.file_variables, **variables})
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
     """Unknown keys that begin like DoDo's."""
-    entries = service.entries if isinstance(service, source.Mapping) else {}
+    entries = source.entries(service)
     for word, entry in entries.items():
         if word.startswith("x-dodo") and word not in KEYS:
             hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
@@ -195,51 +168,73 @@ def _name(service: ComposeService) -> Iterator[Diagnostic]:
     name = service.name
     if name == SANDBOX or name.startswith("dodo-"):
         yield _bad(service.span, f"the name '{name}' is reserved for DoDo's own services")
-    if len(name) > _LONGEST:
-        yield _bad(service.span, f"the name of a service has {len(name)} characters, expected at most {_LONGEST}")
     if not any(plain(service.node).get(key) for key in ("image", "build", "x-dodo-process")):
         yield _bad(service.span, f"'{name}' has neither 'image' nor 'build', so it cannot be started")
 
 
-def _commands(service: ComposeService) -> Iterator[Diagnostic]:
-    for key in ("entrypoint", "command"):
-        node = service.node.get(key)
-        if isinstance(node, source.Scalar) and isinstance(node.value, str):
-            try:
-                opendlv_flags.split(node.value)
-            except ValueError as error:
-                yield _bad(node.span, f"'{key}' of '{service.name}': {error}")
+def _bad(span: Span, message: str, hint: str = "") -> Diagnostic:
+    return Diagnostic(span, "application-file", message, hint)
 
 
-def _references(service: ComposeService, application: ApplicationSource) -> Iterator[Diagnostic]:
-    others = application.services
-    named = list(references(plain(service.node), application.containers))
-    for key, name in named:
-        if name not in others and name not in application.dropped:
-            message = f"'{key}' of '{service.name}' names the unknown service '{name}'"
-            taken = [service.name, *(other for of, other in named if of == key)]
-            yield _bad(_of_name(service, key, name), message, did_you_mean(name, others), only_fix(name, others, taken))
+def _meant(word: str) -> str:
+    """The value in a word that is almost ``--cid=``: letters in another order or size, one too many, or blanks."""
+    match = _FLAG.fullmatch(word)
+    if match is None or match["flag"] == "--cid":
+        return ""
+    name = match["flag"].replace("-", "").strip().lower()
+    shorter = {name[:at] + name[at + 1 :] for at in range(len(name))}
+    return match["value"].strip() if sorted(name) == sorted("cid") or "cid" in shorter else ""
 
 
-def _conditions(service: ComposeService) -> Iterator[Diagnostic]:
-    """What compose does not know of ``depends_on``."""
-    needed = service.node.get("depends_on")
-    for entry in needed.entries.values() if isinstance(needed, source.Mapping) else ():
-        word = entry.value.get("condition") if isinstance(entry.value, source.Mapping) else None
-        if isinstance(word, source.Scalar) and isinstance(word.value, str) and word.value not in _CONDITIONS:
-            message = f"'{word.value}' is not a condition of 'depends_on'"
-            yield _bad(word.span, message, f"known: {', '.join(_CONDITIONS)}")
+def _cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
+    """Words that are meant to give a CID, and give none; a service that ``takes_cid`` may have flags that are alike."""
+    for word, item in service.words:
+        one, literal = _IN_ONE_WORD.fullmatch(word), _LITERAL.fullmatch(word)
+        if one:
+            yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")
+        elif literal and not _is_cid(literal["value"]):
+            yield _warning(item, f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}", "write '--cid=111'")
+        elif not takes_cid and (value := _meant(word)) and (_is_cid(value) or "$" in value):
+            yield _warning(item, f"'{word}' is not the flag '--cid'", f"did you mean '--cid={value}'?")
 
 
-def _of_name(service: ComposeService, key: str, name: str) -> Span:
-    """The place of a service's name in the value of a key."""
-    node = service.node.get(key)
-    if isinstance(node, source.Mapping) and name in node.entries:
-        return node.entries[name].key
-    items = node.items if isinstance(node, source.Sequence) else ()
-    fits = (item.span for item in items if isinstance(item, source.Scalar) and name in item.text.split(":"))
-    return next(fits, spot(service.node.entries[key]))
+def _is_cid(value: str) -> bool:
+    """Whether a text is a whole number from 1 to 254."""
+    return value.isascii() and value.isdigit() and len(value) < 9 and 1 <= int(value) <= _HIGHEST
 
 
-def _bad(span: Span, message: str, hint: str = "", fix: Fix | None = None) -> Diagnostic:
-    return Diagnostic(span, "application-file", message, hint, fix=fix)
+def _warning(item: Scalar, message: str, hint: str) -> Diagnostic:
+    return Diagnostic(item.span, "application-cid", message, hint, "warning")
+
+
+def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
+    """Warnings of the program and its script, which are seen from the compose file's ``folder``."""
+    process = service.node.get("x-dodo-process")
+    items = process.items if isinstance(process, source.Sequence) else ()
+    words = [word for word in items if isinstance(word, Scalar)]
+    if not words or "$" in words[0].text:
+        return
+    program = words[0]
+    if program.text in _INTERPRETERS:
+        yield from _missing_script(program.text, words[1:], folder)
+    elif " " in program.text.strip() and not (folder / program.text).exists():
+        parts = ", ".join(program.text.split())
+        yield _cannot_start(program, f"there is no program '{program.text}', which is one word", f"write [{parts}]")
+    elif "/" in program.text:
+        own = folder / program.text
+        if own.is_file() and not os.access(own, os.X_OK):
+            hint = f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
+            yield _cannot_start(program, f"'{program.text}' is not executable", hint)
+        elif not own.exists() and "build" not in service.node.entries:  # which a pipeline's check never sees
+            yield _cannot_start(program, f"there is no program '{program.text}'", "build it first")
+
+
+def _missing_script(interpreter: str, words: list[Scalar], folder: Path) -> Iterator[Diagnostic]:
+    name = words[0].text if words else ""
+    if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
+        hint = "without it the application starts in containers only"
+        yield _cannot_start(words[0], f"there is no file '{name}' for {interpreter} to run", hint)
+
+
+def _cannot_start(word: Scalar, message: str, hint: str) -> Diagnostic:
+    return Diagnostic(word.span, "application-file", message, hint, "warning")

@@ -58,11 +58,14 @@ class ComposeFiles:
         self._documents: dict[tuple[Path, Path, frozenset[tuple[str, str]]], source.Mapping | None] = {}
         self._nodes = 0
 
-    def filled(self, text: str, *, is_path: bool = True) -> str:
-        """A text with its variables filled in, and of a path the folder or the home that it starts with."""
+    def filled(self, text: str, own: Mapping[str, str] | None = None, *, is_path: bool = True) -> str:
+        """A text with its variables filled in, and of a path the folder or the home that it starts with.
+
+        ``own`` are those of earlier lines of a ``.env`` file.
+        """
         match = _FOLDER.match(text) if is_path else None
         text = _FOLDERS[match["braced"] or match["bare"]] + text[match.end() :] if match else text
-        return filled(text, {**self.included, **self.known}, self.is_late)
+        return filled(text, {**(own or {}), **self.included, **self.known}, self.is_late)
 
     def _of_include(self, text: str) -> str:
         """A text that each test fills in, with the variables that only an included file has."""
@@ -172,18 +175,12 @@ class ComposeFiles:
         for name, value in statements_of(file):
             if value is None or name in self.passed:
                 continue
-            text = literal(self.filled_with(value, own))
+            text = literal(self.filled(value, own))
             if text is not None and name not in taken and not holds_secret(name, text):
                 own[name] = text
             elif not is_steering(name):
                 self.secrets[name] = file
         return own
-
-    def filled_with(self, value: str, own: Mapping[str, str]) -> str:
-        """A value of an ``.env`` file after the variables of its own earlier lines."""
-        match = _FOLDER.match(value)
-        value = _FOLDERS[match["braced"] or match["bare"]] + value[match.end() :] if match else value
-        return filled(value, {**own, **self.included, **self.known}, self.is_late)
 
 
 Statements = tuple[tuple[str, str | None], ...]

@@ -78,7 +78,7 @@ def _target(item: Node) -> str:
     return parts[1] if len(parts) > 1 else parts[0]
 
 
-def _as_pairs(node: Node) -> Node:
+def as_pairs(node: Node) -> Node:
     """``[A=1, B]`` as ``{A: 1, B: null}``."""
     if not isinstance(node, Sequence):
         return node
@@ -107,14 +107,12 @@ def _as_waits(node: Node) -> Node:
     return _as_keys(node, Mapping(node.span, {"condition": Entry(node.span, started)}))
 
 
-def _as_networks(node: Node) -> Node:
-    return _as_keys(node, Scalar(node.span, None, ""))
-
-
-def _as_keys(node: Node, value: Node) -> Node:
+def _as_keys(node: Node, value: Node | None = None) -> Node:
+    """``[a]`` as ``{a: }``, or with another value."""
     if not isinstance(node, Sequence):
         return node
-    return Mapping(node.span, {i.text: Entry(i.span, value) for i in node.items if isinstance(i, Scalar)})
+    empty = value or Scalar(node.span, None, "")
+    return Mapping(node.span, {i.text: Entry(i.span, empty) for i in node.items if isinstance(i, Scalar)})
 
 
 def _as_build(node: Node) -> Node:
@@ -128,11 +126,11 @@ _LISTS = (
     "group_add", "links", "profiles", "security_opt", "tmpfs", "volumes_from",
 )  # fmt: skip
 _FORMS: dict[Path, Callable[[Node], Node]] = {
-    **{(key,): _as_pairs for key in ("environment", "sysctls")},
-    **{("build", key): _as_pairs for key in ("args", "additional_contexts")},
+    **{(key,): as_pairs for key in ("environment", "sysctls")},
+    **{("build", key): as_pairs for key in ("args", "additional_contexts")},
     **{(key,): _as_list for key in _LISTS},
     ("build",): _as_build,
     ("depends_on",): _as_waits,
-    ("networks",): _as_networks,
+    ("networks",): _as_keys,
     ("extra_hosts",): _as_hosts,
 }

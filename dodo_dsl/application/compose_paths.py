@@ -58,7 +58,7 @@ _BINDS = {("services", "volumes", "source"): "type", ("volumes", "driver_opts", 
 
 
 def _is_bind(holder: Node | None, key: str) -> bool:
-    word = holder.get(key) if isinstance(holder, source.Mapping) else None
+    word = source.part(holder, key)
     return isinstance(word, Scalar) and "bind" in word.text
 
 
@@ -73,16 +73,6 @@ def rebased(path: str, base: str) -> str:
 def escaped(text: str) -> str:
     """A path as a compose file has it, in which a dollar sign alone begins a variable."""
     return text.replace("$", "$$")
-
-
-def escaped_values(value: Any) -> Any:
-    """Values of JSON with all their texts escaped."""
-    return mapped_texts(value, escaped)
-
-
-def unescaped(value: Any) -> Any:
-    """What ``docker compose config`` shows, which escapes all texts, as they are."""
-    return mapped_texts(value, lambda text: text.replace("$$", "$"))
 
 
 def mapped_texts(value: Any, change: Callable[[str], str]) -> Any:

@@ -17,7 +17,7 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, is_tru
 from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
 from dodo_dsl.application.part import Part
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Mapping, Node, Scalar
+from dodo_dsl.source import Mapping, Node, Scalar, entries
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _NAMED = ("volumes", "secrets", "configs")
@@ -76,13 +76,8 @@ class Construction:
 
     def _named(self, key: str) -> Iterator[tuple[str, Node, Span]]:
         top = self.application.top.get(key)
-        node = top.value if top else None
-        for name, entry in node.entries.items() if isinstance(node, Mapping) else ():
+        for name, entry in (entries(top.value) if top else {}).items():
             yield name, entry.value, entry.key
-
-    def about(self, name: str, span: Span) -> Part:
-        """What reports problems of something with a name."""
-        return Part(self, name, span)
 
     def rebased(self, path: str) -> str:
         """A path of the application as seen from the compiled test's folder."""
@@ -134,7 +129,7 @@ class Construction:
     def _file(self, key: str, name: str, node: Node, span: Span) -> dict[str, Any]:
         """A secret or config: of a file of the repository, of a variable that is passed, or a text."""
         what = f"the {key[:-1]} '{name}'"
-        of = self.about(what, span)
+        of = Part(self, what, span)
         fields = of.fields(
             node, what, "file environment content", "labels name",
             refused=dict.fromkeys(("driver", "driver_opts", "template_driver"), "a program would provide it")
@@ -172,12 +167,11 @@ class Construction:
 
     def _top(self) -> None:
         known = ("services", "include", *_NAMED, *TOP_LEFT_OUT)
-        of = self.about("the compose file", Span(str(self.application.path)))
+        of = Part(self, "the compose file", Span(str(self.application.path)))
         top = Mapping(Span(str(self.application.path)), dict(self.application.top))
         for key, entry in top.entries.items():
             if key not in known:
-                about = entry.value.entries.keys() if isinstance(entry.value, Mapping) else set()
-                hint = "indent it by 2: it looks like a service" if about & _OF_SERVICES else ""
+                hint = "indent it by 2: it looks like a service" if entries(entry.value).keys() & _OF_SERVICES else ""
                 of.unknown_key(key, top, "the compose file", known, hint)
         for name, node, span in self._named("networks"):
             external = node.get("external") if isinstance(node, Mapping) else None

@@ -4,11 +4,13 @@ Each key has one function, which gives what the container has for it. All other 
 them; those without which something else would run are refused.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
+from dodo_dsl.application.compose_files import dotenv_problems
+from dodo_dsl.application.compose_merge import as_pairs
 from dodo_dsl.application.compose_paths import escaped, filled_node
 from dodo_dsl.application.model import (
     FILES,
@@ -24,10 +26,10 @@ from dodo_dsl.application.model import (
     text,
 )
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import Part, pairs, spot
-from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean, listed
-from dodo_dsl.source import Node, Scalar
+from dodo_dsl.application.part import Part, spot
+from dodo_dsl.application.variables import variables_with_cid
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
+from dodo_dsl.source import Entry, Node, Scalar
 
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
@@ -75,22 +77,31 @@ class Container(Part):
             self.add(Diagnostic(self.left[0][1], "application-key", message, severity="warning"))
         return self.own
 
-    def filled(self, node: Node) -> Node:
+    def filled(self, key: str) -> Any:
         """A value with the variables of the test filled in."""
-        late = self.project.application.is_late
-        return filled_node(node, self.known, late)
+        node = self.service.raw.get(key)
+        return None if node is None else plain(filled_node(node, self.known, self.project.application.is_late))
 
-    def raw(self, key: str) -> Node | None:
-        return self.service.raw.get(key)
+    def other(self, key: str, name: str, span: Span, taken: Collection[str] = ()) -> str:
+        """A service that a key names, if it starts; a problem if there is none."""
+        others = self.project.application.services
+        if name not in others and name not in self.project.application.dropped:
+            message = f"'{key}' of '{self.name}' names the unknown service '{name}'"
+            fix = only_fix(name, others, (self.name, *(taken or [name])))
+            self.bad(span, message, did_you_mean(name, others), fix)
+        return name if name in others else ""
 
-    def number(self, node: Node, most: float, what: str, key: str, measure: Any = limits.number) -> Any:
-        """A limit of at most ``most``."""
-        value, is_cut = limits.cut(self.literal(node), most, measure)
-        if is_cut:
-            self.cut(node.span, what, most, key)
-        return int(value) if float(value).is_integer() else value
+    def joined(self, key: str, kind: str, name: str, span: Span) -> str:
+        """The same for the name of a service or of a container, which has to be one of the application."""
+        containers = self.project.application.containers
+        if kind == "container" and name not in containers:
+            message = f"'{key}' joins the container '{name}', which is not part of the application"
+            self.refuse(span, message, "make it a service of the application")
+            return ""
+        return self.other(key, containers[name] if kind == "container" else name, span)
 
 
+_CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 _WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"
 
 
@@ -102,13 +113,13 @@ def _is_off(node: Node) -> bool:
     return plain(node) in (None, False, "", "false", [], {})
 
 
-def _as_written(_: Container, node: Node) -> Any:
-    return plain(node)
-
-
-def _command(c: Container, key: str) -> Any:
-    node = c.raw(key)
-    value = plain(c.filled(node)) if node is not None else None
+def _command(c: Container, key: str, node: Node) -> Any:
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        try:
+            opendlv_flags.split(node.value)
+        except ValueError as error:
+            c.bad(node.span, f"'{key}' of '{c.name}': {error}")
+    value = c.filled(key)
     return with_cid(value, c.project.setting.cid) if value is not None else None
 
 
@@ -119,12 +130,11 @@ def with_cid(command: Any, cid: int) -> Any:
     return list(opendlv_flags.with_cid([text(word) for word in command], cid))
 
 
-def _healthcheck(c: Container, _: Node) -> Any:
-    node = c.raw("healthcheck")
-    made = plain(c.filled(node)) if node is not None else {}
+def _healthcheck(c: Container, node: Node) -> Any:
+    made = c.filled("healthcheck") or {}
     known = "disable interval retries test timeout start_period start_interval"
     c.fields(node, f"'healthcheck' of '{c.name}'", known)
-    if isinstance(made, dict) and made.get("test") is not None:
+    if made.get("test") is not None:
         made["test"] = with_cid(made["test"], c.project.setting.cid)
     return {key: value for key, value in made.items() if key in known.split() and value is not None}
 
@@ -133,6 +143,12 @@ def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
     for file in env_files(c.service.node):
         if path := c.path(file.path, file.span):
+            place = c.project.application.folder / file.path
+            for problem in dotenv_problems(place, raw=file.raw):
+                c.add(problem)
+            if file.required and not place.is_file():
+                hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
+                c.bad(file.span, f"there is no file '{file.path}'", hint)
             about = {"path": path, **({} if file.required else {"required": False})}
             about |= {"format": "raw"} if file.raw else {}
             made.append(about if len(about) > 1 else path)
@@ -140,14 +156,10 @@ def _env_file(c: Container, node: Node) -> Any:
 
 
 def _own_environment(c: Container) -> None:
-    """Its variables, with the CID wherever one was, also in the place of one that ``env_file`` would set."""
     application, setting = c.project.application, c.project.setting
-    found = variables_of(c.service, c.known, application.is_late, dict(setting.given))
-    made = {k: None if v is None else opendlv_flags.with_cid_text(v, setting.cid) for k, v in found.items()}
-    names = [n for n in opendlv_flags.CID_VARIABLES if n in made or n in c.service.file_variables]
-    made |= dict.fromkeys(names, str(setting.cid))
-    raw = c.raw("environment")
-    names_it = raw is not None and "DISPLAY" in environment(plain(raw))
+    made = variables_with_cid(c.service, c.known, application.is_late, dict(setting.given), setting.cid)
+    written = c.service.node.get("environment")
+    names_it = written is not None and "DISPLAY" in environment(plain(written))
     if names_it and not made.keys() & OFFSCREEN.keys() and not application.is_late("DISPLAY"):
         made |= OFFSCREEN
     if made:
@@ -158,14 +170,10 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
     """Another service's namespace; that of a container of the application is its service's."""
     word = c.literal(node) or ""
     kind, name = reference(word)
-    containers, services = c.project.application.containers, c.project.application.services
-    if kind == "container" and name not in containers:
-        message = f"'{key}' joins the container '{name}', which is not part of the application"
-        c.refuse(node.span, message, "make it a service of the application")
-    elif kind:
-        name = containers[name] if kind == "container" else name
-        return f"service:{name}" if name in services else None
-    elif key == "pid" and word == "host":
+    if kind:
+        found = c.joined(key, kind, name, node.span)
+        return f"service:{found}" if found else None
+    if key == "pid" and word == "host":
         c.refuse(node.span, "'pid: host' gives access to the processes of all tests", "remove it")
     elif key == "network_mode" and word == "none":
         return word
@@ -173,52 +181,50 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
 
 
 def _volumes_from(c: Container, node: Node) -> Any:
-    containers, services = c.project.application.containers, c.project.application.services
-    made = []
-    for item in c.items(node):
-        kind, name, options = borrowed(c.literal(item))
-        if kind == "container" and name not in containers:
-            c.refuse(item.span, f"the container '{name}' is not part of the application", "make it a service of it")
-            continue
-        name = containers[name] if kind == "container" else name
-        made += [escaped(f"{name}{options}")] if name in services else []
-    return made or None
+    named = [(item, *borrowed(c.literal(item))) for item in c.items(node)]
+    made = [(c.joined("volumes_from", kind, name, item.span), options) for item, kind, name, options in named]
+    return [escaped(name + options) for name, options in made if name] or None
 
 
 def _networks(c: Container, node: Node) -> Any:
     """The names that the service has in networks, which are the test's one."""
-    about = node.entries.values() if isinstance(node, source.Mapping) else ()
-    aliases = [plain(a) for e in about if isinstance(e.value, source.Mapping) and (a := e.value.get("aliases"))]
+    aliases = [plain(a) for e in source.entries(node).values() if (a := source.part(e.value, "aliases"))]
     names = list(dict.fromkeys(str(name) for each in aliases for name in each or ()))
     return {"default": {"aliases": names}} if names else None
 
 
 def _links(c: Container, node: Node) -> Any:
-    found = [plain(item) for item in c.items(node)]
-    return [link for link in found if str(link).partition(":")[0] in c.project.application.services] or None
+    found = [(plain(item), item.span) for item in c.items(node)]
+    return [link for link, span in found if c.other("links", str(link).partition(":")[0], span)] or None
 
 
 def _depends_on(c: Container, node: Node) -> Any:
-    about = plain(node)
-    started = {"condition": "service_started"}
-    own = {str(name): dict(started) for name in about} if isinstance(about, list) else about
-    kept = ("condition", "required")  # nothing of a test is restarted
-    return {
-        name: {key: value for key, value in (how or {}).items() if key in kept} or dict(started)
-        for name, how in own.items()
-        if name in c.project.application.services
-    }
+    if not isinstance(node, source.Mapping):
+        node = source.Mapping(node.span, {i.text: Entry(i.span, i) for i in c.items(node) if isinstance(i, Scalar)})
+    made = {}  # nothing of a test is restarted
+    for name, entry in node.entries.items():
+        about = source.entries(entry.value)
+        own = {key: plain(each.value) for key, each in about.items() if key in ("condition", "required")}
+        condition = own.get("condition")
+        if isinstance(condition, str) and condition not in _CONDITIONS:
+            message = f"'{condition}' is not a condition of 'depends_on'"
+            c.bad(about["condition"].value.span, message, f"known: {', '.join(_CONDITIONS)}")
+        if own.get("required") is False:
+            is_there = name in c.project.application.services
+        else:
+            is_there = bool(c.other("depends_on", name, entry.key, node.entries))
+        made.update({name: own or {"condition": _CONDITIONS[0]}} if is_there else {})
+    return made
 
 
 def _sysctls(c: Container, node: Node) -> Any:
-    found = dict(pairs(node))
+    found = source.entries(as_pairs(node))
     is_own = c.project.setting.own_network
-    return {key: plain(value) for key, value in found.items() if is_own or not key.startswith("net.")} or None
+    return {key: plain(each.value) for key, each in found.items() if is_own or not key.startswith("net.")} or None
 
 
 def _secrets(c: Container, node: Node, key: str) -> Any:
-    top = c.project.application.rest.get(key)
-    known = top.entries if isinstance(top, source.Mapping) else {}
+    known = source.entries(c.project.application.rest.get(key))
     for item in c.items(node):
         fields = c.fields(item, f"a {key[:-1]} of '{c.name}'", "source target uid gid mode")
         word = fields.get("source") if isinstance(item, source.Mapping) else item
@@ -260,42 +266,23 @@ def _source(volume: Any) -> str:
     return str(volume.get("source", "")) if isinstance(volume, dict) else str(volume).partition(":")[0]
 
 
+_AS_WRITTEN = (
+    "cap_drop", "cpuset", "dns", "dns_opt", "dns_search", "domainname", "expose", "extra_hosts", "group_add",
+    "hostname", "init", "platform", "read_only", "stdin_open", "stop_grace_period", "stop_signal", "tty", "umask",
+    "user", "working_dir",
+)  # fmt: skip
 _CARRIED: dict[str, Key] = {
-    **dict.fromkeys(
-        [
-            "cap_drop",
-            "cpuset",
-            "dns",
-            "dns_opt",
-            "dns_search",
-            "domainname",
-            "expose",
-            "extra_hosts",
-            "group_add",
-            "hostname",
-            "init",
-            "platform",
-            "read_only",
-            "stdin_open",
-            "stop_grace_period",
-            "stop_signal",
-            "tty",
-            "umask",
-            "user",
-            "working_dir",
-        ],
-        _as_written,
-    ),
+    **dict.fromkeys(_AS_WRITTEN, lambda _, n: plain(n)),
     **limits.LIMITS,
     "build": image.build,
     "cap_add": hardware.capabilities,
-    "command": lambda c, _: _command(c, "command"),
+    "command": lambda c, n: _command(c, "command", n),
     "configs": lambda c, n: _secrets(c, n, "configs"),
     "depends_on": _depends_on,
     "deploy": limits.deploy,
     "device_cgroup_rules": hardware.device_rules,
     "devices": hardware.devices,
-    "entrypoint": lambda c, _: _command(c, "entrypoint"),
+    "entrypoint": lambda c, n: _command(c, "entrypoint", n),
     "env_file": _env_file,
     "environment": lambda c, _: None,
     "gpus": hardware.gpus,
@@ -322,43 +309,11 @@ _REFUSED = {
     "provider": "starts a program on the host",
     "use_api_socket": "gives access to the Docker engine",
 }
-_LEFT_OUT = frozenset(
-    [
-        "annotations",
-        "attach",
-        "blkio_config",
-        "cgroup",
-        "cgroup_parent",
-        "container_name",
-        "cpu_count",
-        "cpu_percent",
-        "cpu_period",
-        "cpu_quota",
-        "cpu_rt_period",
-        "cpu_rt_runtime",
-        "cpu_shares",
-        "develop",
-        "isolation",
-        "label_file",
-        "labels",
-        "logging",
-        "mac_address",
-        "mem_reservation",
-        "mem_swappiness",
-        "memswap_limit",
-        "oom_kill_disable",
-        "oom_score_adj",
-        "ports",
-        "post_start",
-        "pre_start",
-        "pre_stop",
-        "pull_policy",
-        "pull_refresh_after",
-        "restart",
-        "scale",
-        "storage_opt",
-        "userns_mode",
-        "uts",
-    ]
-)
+_LEFT_OUT = (
+    "annotations", "attach", "blkio_config", "cgroup", "cgroup_parent", "container_name", "cpu_count", "cpu_percent",
+    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "isolation", "label_file",
+    "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness", "memswap_limit", "oom_kill_disable",
+    "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop", "pull_policy", "pull_refresh_after", "restart",
+    "scale", "storage_opt", "userns_mode", "uts",
+)  # fmt: skip
 """Keys of the compose specification that a test has no use for."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dodo_dsl.application.model import KEYS, with_entry
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
-from dodo_dsl.source import Entry, Mapping, Node
+from dodo_dsl.source import Entry, Mapping, Node, entries
 from dodo_dsl.spec.deployment import Declarations
 
 PROCESS = "process"
@@ -27,7 +27,7 @@ def holding(declarations: Declarations, files: list[Path]) -> Declarations:
 
 def left_out(document: Mapping, declarations: Declarations) -> dict[str, str]:
     """Why services do not start, by name: those of ``without`` that the merged compose files have."""
-    services = _services(document)
+    services = entries(document, _SERVICES)
     return {word.text: "dodo.yml leaves it out" for word in declarations.without if word.text in services}
 
 
@@ -43,18 +43,10 @@ def declared_in(document: Mapping, declarations: Declarations) -> Mapping:
         name: Entry(entry.key, _declared(entry.value, declarations.services[name]))
         if name in declarations.services
         else entry
-        for name, entry in _services(document).items()
+        for name, entry in entries(document, _SERVICES).items()
         if name not in gone
     }
     return with_entry(document, _SERVICES, Mapping(document.entries[_SERVICES].value.span, kept))
-
-
-def _entries(node: Node | None) -> dict[str, Entry]:
-    return dict(node.entries) if isinstance(node, Mapping) else {}
-
-
-def _services(document: Mapping) -> dict[str, Entry]:
-    return _entries(document.get(_SERVICES))
 
 
 def _declared(service: Node, about: Entry) -> Node:
@@ -71,12 +63,12 @@ def _declared(service: Node, about: Entry) -> Node:
 
 def _both(old: Node | None, new: dict[str, Entry], span: Span) -> Mapping:
     """A mapping with other values of keys, at ``span`` if there is none."""
-    return Mapping(old.span if old else span, {**_entries(old), **new})
+    return Mapping(old.span if old else span, {**entries(old), **new})
 
 
 def problems(document: Mapping, declarations: Declarations) -> Iterator[Diagnostic]:
     """Unknown services, those that are left out and declared, and what both files say; ``document`` is as written."""
-    services = _services(document)
+    services = entries(document, _SERVICES)
     named = [(word.text, word.span) for word in declarations.without]
     named += [(name, entry.key) for name, entry in declarations.services.items()]
     taken = [name for name, _ in named]

@@ -118,17 +118,12 @@ def gpus(c: "Container", node: Node) -> Any:
         if not isinstance(item, source.Mapping):
             return plain(item)
         fields = c.fields(item, f"'gpus' of '{c.name}'", "driver count device_ids capabilities options")
-        driver = c.literal(fields["driver"]) if "driver" in fields else ""
-        ids = {c.literal(word): word for word in c.items(fields["device_ids"])} if "device_ids" in fields else {}
-        if (driver or "").lower() not in ("", "nvidia", "amd"):
-            c.refuse(
-                fields["driver"].span,
-                f"the driver '{driver}' of a device of '{c.name}' {_CDI}",
-                "use nvidia, or no driver",
-            )
-        elif found := [(word, each) for word, each in ids.items() if word and "=" in word]:
-            message = f"device '{found[0][0]}' of '{c.name}' {_CDI}"
-            c.refuse(found[0][1].span, message, "use numbers, or UUIDs of GPUs")
+        drivers, ids = ([*c.items(fields[key])] if key in fields else [] for key in ("driver", "device_ids"))
+        wrong = [word for word in drivers if (c.literal(word) or "").lower() not in ("", "nvidia", "amd")]
+        wrong += [word for word in ids if "=" in (c.literal(word) or "")]
+        if wrong:
+            message = f"'{plain(wrong[0])}' of a device of '{c.name}' {_CDI}"
+            c.refuse(wrong[0].span, message, "use numbers or UUIDs of GPUs, and nvidia or no driver")
         else:
             made.append({key: plain(value) for key, value in fields.items()})
     return made or None

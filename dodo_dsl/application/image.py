@@ -1,18 +1,21 @@
 """The image of a service, and how it is built."""
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_paths import escaped
+from dodo_dsl.application.compose_merge import as_pairs
+from dodo_dsl.application.compose_paths import escaped, is_local
 from dodo_dsl.application.model import environment, image_variable, plain, text
-from dodo_dsl.application.part import pairs
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Node
 
 if TYPE_CHECKING:
     from dodo_dsl.application.container import Container
 
 _REMOTE = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
-_REGISTRIES = ("index.docker.io/", "docker.io/")
+_AROUND_NAME = re.compile(r"^(index\.)?docker\.io/|:[^/:@]*(@.*)?\Z|@.*\Z", re.DOTALL)
+"""The registry that the engine takes by default, tag and digest."""
 _BASES = ("python", "library/python", "debian", "library/debian")
 """What DoDo's images, and those of many others, are built on."""
 
@@ -22,19 +25,9 @@ def image(c: "Container", node: Node) -> Any:
     return f"${{{image_variable(c.name)}:-{text(plain(node))}}}"
 
 
-def short_name(image: str) -> str:
-    """An image's name without tag, digest and the registry that the engine takes by default."""
-    name = image.partition("@")[0]
-    head, sign, tag = name.rpartition(":")
-    name = head if sign and "/" not in tag else name
-    for registry in _REGISTRIES:
-        name = name.removeprefix(registry)
-    return name
-
-
 def build(c: "Container", node: Node) -> Any:
     image = c.service.node.get("image")
-    name = short_name(text(plain(image))) if image is not None else ""
+    name = _AROUND_NAME.sub("", text(plain(image))) if image is not None else ""
     if name.startswith("dodo/") or name in _BASES:
         which = "one of DoDo's own" if name.startswith("dodo/") else "one on which others are built"
         c.refuse(node.span, f"the image '{name}' of '{c.name}' would replace {which}", "give the image another name")
@@ -51,6 +44,11 @@ def build(c: "Container", node: Node) -> Any:
     context = c.literal(fields["context"]) if "context" in fields else "."
     if context is not None:
         made = {"context": _context(c, fields.get("context"), context), **made}
+        own = c.project.paths
+        if is_local(context) and own.is_own(context) and not (own.folder / context).is_dir():
+            hint = "create it, or remove 'build'; paths are relative to this file"
+            message = f"there is no folder '{context}'"  # a warning, as an image or a variable for it may stand in
+            c.add(Diagnostic(fields["context"].span, "application-file", message, hint, "warning"))
         if "dockerfile" in fields and (file := c.literal(fields["dockerfile"])):
             if not context.startswith(_REMOTE):
                 c.path(file, fields["dockerfile"].span, base=context)
@@ -59,8 +57,9 @@ def build(c: "Container", node: Node) -> Any:
         made["args"] = _arguments(c, plain(fields["args"]))
     if "additional_contexts" in fields:
         made["additional_contexts"] = {
-            name: _context(c, where, word) for name, where in pairs(fields["additional_contexts"])
-            if (word := c.literal(where)) is not None
+            name: _context(c, each.value, word)
+            for name, each in source.entries(as_pairs(fields["additional_contexts"])).items()
+            if (word := c.literal(each.value)) is not None
         }  # fmt: skip
     network = c.literal(fields["network"]) if "network" in fields else None
     if network not in ("", "default", "none", None):

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_VARIABLE_NAME = re.compile(rf"\$\$|\$\{{?({_NAME.pattern})")
 _SHOWN = 60
 _BLANKS = r"[ \t\v\f\r\x85\xa0]*"
 _SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
@@ -36,29 +37,13 @@ def end_of_variable(text: str, start: int) -> int:
 
 def split_outside(text: str, sign: str) -> list[str]:
     """A string split at a sign, but not within variables: ``${A:-b:c}:d`` has two parts at the colons."""
-    parts, begin, place = [], 0, 0
-    while place < len(text):
-        if text[place] == "$":
-            place = end_of_variable(text, place)
-            continue
-        if text[place] == sign:
-            parts.append(text[begin:place])
-            begin = place + 1
-        place += 1
-    return [*parts, text[begin:]]
+    hidden = _replaced(text, lambda match: match[0].replace(sign, "\0"))
+    return [part.replace("\0", sign) for part in hidden.split(sign)]
 
 
 def names(text: str) -> set[str]:
     """The variables in a string, those in defaults included."""
-    found: set[str] = set()
-    place = text.find("$")
-    while place >= 0:
-        match = _NAME.match(text, place + 1 + (text[place + 1 : place + 2] == "{"))
-        if match:
-            found.add(match[0])
-        escaped = text[place + 1 : place + 2] == "$"
-        place = text.find("$", place + (2 if escaped else 1))
-    return found
+    return {match[1] for match in _VARIABLE_NAME.finditer(text) if match[1]}
 
 
 class EnvironmentProblem(ValueError):

@@ -29,8 +29,6 @@ LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
 
 def size(value: object) -> float:
     """Bytes of a size as compose reads it, ``8g``; infinite where it is none."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return math.floor(value) if 0 <= value < math.inf else math.inf
     found = _SIZE.fullmatch(str(value))
     return math.floor(float(found[1]) * 1024.0 ** " kmgtp".index(found[2].lower() or " ")) if found else math.inf
 
@@ -50,12 +48,15 @@ def whole(value: object) -> float:
     return math.floor(found) if math.isfinite(found) else found
 
 
-def cut(value: object, most: float, measure: Callable[[object], float] = number) -> tuple[float, bool]:
-    """A limit of at most ``most``, and whether it was cut; 0 and below do not limit."""
-    found = measure(value)
-    if 0 < found <= most and math.isfinite(found):
-        return found, False
-    return most, math.isfinite(found) and found > most
+def limit(
+    c: "Container", node: Node, most: float, what: str, key: str, measure: Callable[[object], float] = number
+) -> float:
+    """A limit of at most ``most``, which also takes the place of 0 and below."""
+    found = measure(c.literal(node))
+    if math.isfinite(found) and found > most:
+        c.cut(node.span, what, most, key)
+    value = found if 0 < found <= most and math.isfinite(found) else most
+    return int(value) if float(value).is_integer() else value
 
 
 def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
@@ -75,7 +76,7 @@ def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
     """
     own = {"core": 0, "fsize": c.limits.file_size, "nofile": c.limits.files}
     made: dict[str, Any] = dict(own)
-    for name, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
+    for name, entry in source.entries(node).items():
         most = {**own, "memlock": c.limits.memory, "msgqueue": _MESSAGE_QUEUES}.get(name, math.inf)
         if name == "nproc":
             continue
@@ -115,7 +116,7 @@ def deploy(c: "Container", node: Node) -> Any:
 
 
 def cpus(c: "Container", node: Node) -> Any:
-    return c.number(node, float("inf") if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus")
+    return limit(c, node, float("inf") if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus")
 
 
 def tmpfs(c: "Container", node: Node) -> Any:
@@ -155,7 +156,7 @@ def own_limits(c: "Container") -> None:
 
 LIMITS: dict[str, Callable[["Container", Node], Any]] = {
     "cpus": cpus,
-    "mem_limit": lambda c, n: c.number(n, c.limits.memory, "mem_limit", "memory", size),
-    "pids_limit": lambda c, n: c.number(n, c.limits.processes, "pids_limit", "processes", whole),
-    "shm_size": lambda c, n: c.number(n, c.limits.memory, "shm_size", "memory", size),
+    "mem_limit": lambda c, n: limit(c, n, c.limits.memory, "mem_limit", "memory", size),
+    "pids_limit": lambda c, n: limit(c, n, c.limits.processes, "pids_limit", "processes", whole),
+    "shm_size": lambda c, n: limit(c, n, c.limits.memory, "shm_size", "memory", size),
 }

@@ -6,7 +6,7 @@
 import functools
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,10 +31,8 @@ def load(files: ComposeFiles, names: Sequence[Path]) -> source.Mapping | None:
 
 def _variables_of_secrets(files: ComposeFiles, file: Path) -> Iterator[str]:
     """The variables of which a file makes secrets, before it is read."""
-    document = files.read(file)
-    node = document.get("secrets") if isinstance(document, source.Mapping) else None
-    for entry in node.entries.values() if isinstance(node, source.Mapping) else ():
-        word = entry.value.get("environment") if isinstance(entry.value, source.Mapping) else None
+    for entry in source.entries(files.read(file), "secrets").values():
+        word = source.part(entry.value, "environment")
         if isinstance(word, Scalar):
             yield word.text
 
@@ -46,17 +44,22 @@ def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[
         return None
     settled = compose_merge.settled(functools.reduce(compose_merge.merged, whole))
     assert isinstance(settled, source.Mapping)
-    services = settled.get("services")
-    if not isinstance(services, source.Mapping):
-        return settled
     here = files.relative(folder)
-    entries = {name: Entry(e.key, _with_context(e.value, here)) for name, e in services.entries.items()}
-    return with_entry(settled, "services", source.Mapping(services.span, entries, services.tag))
+    return _changed(settled, lambda _, service: _with_context(service, here))
+
+
+def _changed(document: source.Mapping, change: Callable[[str, Node], Node]) -> source.Mapping:
+    """A file with other services."""
+    services = document.get("services")
+    if not isinstance(services, source.Mapping):
+        return document
+    entries = {name: Entry(entry.key, change(name, entry.value)) for name, entry in services.entries.items()}
+    return with_entry(document, "services", source.Mapping(services.span, entries, services.tag))
 
 
 def _with_context(service: Node, here: str) -> Node:
     """A service whose build has the folder that compose takes without one."""
-    build = service.get("build") if isinstance(service, source.Mapping) else None
+    build = source.part(service, "build")
     if not isinstance(service, source.Mapping) or not isinstance(build, source.Mapping) or "context" in build.entries:
         return service
     return with_entry(service, "build", with_entry(build, "context", Scalar(service.entries["build"].key, here, here)))
@@ -68,13 +71,7 @@ def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...
     if document is None:
         return None
     rest = source.Mapping(document.span, {k: e for k, e in document.entries.items() if k != "include"})
-    services = document.get("services")
-    if isinstance(services, source.Mapping):
-        entries = {
-            name: Entry(entry.key, _extended(files, (Service(file, folder, name),), entry.value))
-            for name, entry in services.entries.items()
-        }
-        rest = with_entry(rest, "services", source.Mapping(services.span, entries, services.tag))
+    rest = _changed(rest, lambda name, service: _extended(files, (Service(file, folder, name),), service))
     include = document.get("include")
     for item in include.items if isinstance(include, source.Sequence) else (include,) if include else ():
         part = _included(files, item, folder, (*chain, file))
@@ -84,21 +81,18 @@ def _whole(files: ComposeFiles, file: Path, folder: Path, chain: tuple[Path, ...
 
 def _included(files: ComposeFiles, item: Node, folder: Path, chain: tuple[Path, ...]) -> source.Mapping | None:
     """What an item of ``include`` brings, whose paths are relative to ``folder``."""
-    words: Mapping[str, Node] = {"path": item}
-    if isinstance(item, source.Mapping):
-        words = {key: entry.value for key, entry in item.entries.items()}
-    names = scalars(words.get("path"))
+    names = scalars(source.part(item, "path") if isinstance(item, source.Mapping) else item)
     if not names:
         files.problem(item.span, "'include' does not name a file", "for example include: [sensors.yml]")
     found = [file for name in names if (file := files.other(name, folder))]
     circle = next((name for name, file in zip(names, found, strict=False) if file in chain), None)
     if circle:
         files.problem(circle.span, f"'{circle.text}' includes itself, directly or through other files")
-    place = words.get("project_directory")
+    place = source.part(item, "project_directory")
     if not names or circle or len(found) < len(names) or (isinstance(place, Scalar) and not files.holds(place, folder)):
         return None
     project = Path(os.path.normpath(folder / place.text)) if isinstance(place, Scalar) else found[0].parent
-    own = [files.other(word, folder) for word in scalars(words.get("env_file"))] or [project / ".env"]
+    own = [files.other(word, folder) for word in scalars(source.part(item, "env_file"))] or [project / ".env"]
     before = files.included
     taken = [word for name in found for word in _variables_of_secrets(files, name)]
     files.included = {**before, **{k: v for file in own if file for k, v in files.gather(file, taken).items()}}
@@ -109,9 +103,8 @@ def _included(files: ComposeFiles, item: Node, folder: Path, chain: tuple[Path, 
 
 def _joined(files: ComposeFiles, document: source.Mapping, part: source.Mapping) -> source.Mapping:
     """A file with what another one brings, of which it changes everything but services."""
-    services, own = part.get("services"), document.get("services")
-    theirs = services.entries if isinstance(services, source.Mapping) else {}
-    for name, entry in own.entries.items() if isinstance(own, source.Mapping) else ():
+    theirs = source.entries(part, "services")
+    for name, entry in source.entries(document, "services").items():
         if name in theirs:
             included = Path(theirs[name].key.file).name
             files.problem(entry.key, f"the included '{included}' also has a service '{name}'", "rename one of them")
@@ -151,8 +144,7 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
         return None
     base = Service(file, file.parent if where else chain[-1].folder, word.text)
     document = files.document(file, base.folder)
-    services = document.get("services") if document else None
-    entries = services.entries if isinstance(services, source.Mapping) else {}
+    entries = source.entries(document, "services")
     if base.name in entries and base not in chain and len(chain) < MAX_DEPTH:
         return compose_merge.settled(_extended(files, (*chain, base), entries[base.name].value))
     if base in chain or base.name in entries:
@@ -165,12 +157,7 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
 
 
 _NAMES = ("compose.yaml", "compose.yml", "docker-compose.yml", "docker-compose.yaml")
-_OVERRIDES = (
-    "compose.override.yml",
-    "compose.override.yaml",
-    "docker-compose.override.yml",
-    "docker-compose.override.yaml",
-)
+_OVERRIDES = tuple(f"{name}.override.{end}" for name in ("compose", "docker-compose") for end in ("yml", "yaml"))
 """Of each, compose takes the first that is there."""
 _PLAIN = re.compile(r"[\w./-]+")
 
@@ -182,11 +169,10 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
     """
     folder = paths[0].parent
     named = [_whole_file(path) for path in paths]
-    found = [
-        next(_whole_file(folder / name) for name in names if (folder / name).is_file())
-        for names in (_NAMES, _OVERRIDES)
-        if any((folder / name).is_file() for name in names)
-    ]
+    there = (
+        [_whole_file(folder / name) for name in names if (folder / name).is_file()] for names in (_NAMES, _OVERRIDES)
+    )
+    found = [files[0] for files in there if files]
     others = [path for path in found if path not in named]
     if not others or len(others) == len(found):
         return

@@ -14,7 +14,7 @@ from dodo_dsl import source
 from dodo_dsl.application.compose_files import Statements, is_late, statements_of
 from dodo_dsl.application.host_paths import HostPaths, repository
 from dodo_dsl.application.interpolation import literal
-from dodo_dsl.application.opendlv_flags import CID_VARIABLES, split
+from dodo_dsl.application.opendlv_flags import split
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -124,11 +124,6 @@ class ComposeService:
         return {name: value for statements in self.statements for name, value in statements}
 
     @property
-    def cid_variables(self) -> tuple[str, ...]:
-        """The CID variables among those of its files."""
-        return tuple(name for name in CID_VARIABLES if name in self.file_variables)
-
-    @property
     def has_display(self) -> bool:
         """Whether its process is to have an X server."""
         return self._true("display") is not None
@@ -140,8 +135,7 @@ class ComposeService:
 
     def _true(self, key: str) -> Span | None:
         """The place of a key of ``x-dodo`` that is true."""
-        about = self.node.get(KEYS[0])
-        entry = about.entries.get(key) if isinstance(about, source.Mapping) else None
+        entry = source.entries(self.node, KEYS[0]).get(key)
         is_true = entry is not None and isinstance(entry.value, Scalar) and entry.value.value is True
         return entry.key if entry and is_true else None
 
@@ -306,8 +300,7 @@ def words_of(node: Node | None) -> Iterator[tuple[str, Scalar]]:
 
 def declared_cid(node: source.Mapping) -> Scalar | None:
     """What ``x-dodo`` of a document or of a service says to be built in."""
-    about = node.get("x-dodo")
-    cid = about.get("cid") if isinstance(about, source.Mapping) else None
+    cid = source.part(node, "x-dodo", "cid")
     return cid if isinstance(cid, Scalar) else None
 
 
@@ -322,27 +315,19 @@ def declared(service: source.Mapping) -> Declared | None:
     inputs, outputs, answers, done = (words.get(key, ()) for key in ("in", "out", "answers", "done"))
     readers = entry.value.get("readers")
     count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 0
-    lines = printed_lines(entry.value.get("lines"))
+    lines = tuple(printed_lines(entry.value.get("lines")))
     sent = {name.removesuffix("/0") for name, _ in outputs}
     printed = {line.port: (line.port, line.message_span) for line in lines if line.port not in sent}
     return Declared(inputs, (*outputs, *printed.values()), answers, done[0] if done else None, count, entry.key, lines)
 
 
-def printed_lines(node: Node | None) -> tuple[PrintedLine, ...]:
+def printed_lines(node: Node | None) -> Iterator[PrintedLine]:
     """The ``lines`` of a service, as far as they fit the schema; ``$$`` is a dollar sign, as everywhere in compose."""
-    items = node.items if isinstance(node, source.Sequence) else ()
-    found = (_printed_line(item) for item in items)
-    return tuple(line for line in found if line is not None)
-
-
-def _printed_line(node: Node) -> PrintedLine | None:
-    if not isinstance(node, source.Mapping):
-        return None
-    match, message, sender = (node.get(key) for key in ("match", "message", "sender"))
-    if not (isinstance(match, Scalar) and isinstance(message, Scalar)):
-        return None
-    stamp = sender.value if isinstance(sender, Scalar) and isinstance(sender.value, int) else 0
-    return PrintedLine(match.text.replace("$$", "$"), match.span, message.text, message.span, stamp)
+    for item in node.items if isinstance(node, source.Sequence) else ():
+        match, message, sender = (source.part(item, key) for key in ("match", "message", "sender"))
+        if isinstance(match, Scalar) and isinstance(message, Scalar):
+            stamp = sender.value if isinstance(sender, Scalar) and isinstance(sender.value, int) else 0
+            yield PrintedLine(match.text.replace("$$", "$"), match.span, message.text, message.span, stamp)
 
 
 def scalars(node: Node | None) -> list[Scalar]:

@@ -233,7 +233,7 @@ class Volume:
 
 def volume(project: "Construction", name: str, node: Node, span: Span) -> Volume:
     """A top-level volume of an application, each test having its own."""
-    of = project.about(f"the volume '{name}'", span)
+    of = Part(project, f"the volume '{name}'", span)
     about = of.fields(node, f"the volume '{name}'", "driver driver_opts external name", "labels")
     driver = of.literal(about["driver"]) if "driver" in about else "local"
     if driver not in ("local", "", None):

@@ -94,7 +94,7 @@ class Part:
         """The fields of a mapping that a test carries; problems of those that it cannot have, and of unknown ones."""
         found: dict[str, Node] = {}
         words, gone = known.split(), left_out.split()
-        for key, entry in node.entries.items() if isinstance(node, source.Mapping) else ():
+        for key, entry in source.entries(node).items():
             if key in words:
                 found.update({key: entry.value} if _is_set(entry.value) else {})
             elif refused and key in refused:
@@ -117,12 +117,3 @@ def spot(entry: source.Entry) -> Span:
 
 def _is_set(node: Node) -> bool:
     return not (isinstance(node, Scalar) and node.value is None)
-
-
-def pairs(node: Node) -> list[tuple[str, Node]]:
-    """The values of a mapping, or of a list of ``name=value``."""
-    if isinstance(node, source.Mapping):
-        return [(name, entry.value) for name, entry in node.entries.items()]
-    items = [i for i in (node.items if isinstance(node, source.Sequence) else ()) if isinstance(i, Scalar)]
-    split = [(i, *i.text.partition("=")) for i in items]
-    return [(name, Scalar(item.span, value, value)) for item, name, _, value in split]

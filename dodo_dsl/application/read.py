@@ -3,7 +3,6 @@
 import itertools
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,7 @@ from dodo_dsl import source
 from dodo_dsl.application import declarations as declared
 from dodo_dsl.application import secret_problems
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
-from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles, dotenv_problems
-from dodo_dsl.application.compose_paths import filled_node
+from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.model import (
@@ -25,7 +23,7 @@ from dodo_dsl.application.model import (
     plain,
 )
 from dodo_dsl.application.model import declared as declaration_of
-from dodo_dsl.application.variables import tunable_problems
+from dodo_dsl.application.variables import tunable_problems, with_values
 from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
 from dodo_dsl.source import Entry, Reader
 from dodo_dsl.spec.deployment import Declarations
@@ -56,39 +54,47 @@ def read_application(
     found.extend(_links(paths))
     if found:
         return None, found
-    document, gone = load(files, paths), {}
-    if document is not None:
-        found.extend(declared.problems(document, declarations))
-        document, gone = declared.declared_in(document, declarations), declared.left_out(document, declarations)
-    services = document.get("services") if document else None
-    if isinstance(services, source.Mapping):
-        found.extend(itertools.chain.from_iterable(unknown_keys(e.value) for e in services.entries.values()))
-        if len(services.entries) > MAX_SERVICES:
-            found.append(
-                Diagnostic(services.span, "too-large", f"the application has more than {MAX_SERVICES} services")
-            )
-    if document is not None and not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
-        found.extend(validate(document, "application"))
-    if document is None or not isinstance(services, source.Mapping) or has_errors(found):
+    document = load(files, paths)
+    if document is None:
         return None, found
-    application = _application(paths[0].resolve(), document, services, files, access, limits)
+    found.extend(declared.problems(document, declarations))
+    gone = declared.left_out(document, declarations)
+    document = declared.declared_in(document, declarations)
+    services = source.entries(document, "services")
+    found.extend(itertools.chain.from_iterable(unknown_keys(entry.value) for entry in services.values()))
+    if len(services) > MAX_SERVICES:
+        message = f"the application has more than {MAX_SERVICES} services"
+        found.append(Diagnostic(document.entries["services"].value.span, "too-large", message))
+    if not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
+        found.extend(validate(document, "application"))
+    if has_errors(found):
+        return None, found
     root = Path(access.roots[0]) if access.roots else None
-    named = tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths)
-    application = replace(application, dropped={**application.dropped, **gone}, named=named, without=tuple(gone))
+    dropped = {name: why for name, entry in services.items() if (why := _why_dropped(plain(entry.value)))}
+    kept = {name: _service(name, entry, files) for name, entry in services.items() if name not in dropped}
+    application = ApplicationSource(
+        path=paths[0].resolve(),
+        services=kept,
+        dropped={**dropped, **gone},
+        containers={str(c): n for n, s in kept.items() if (c := plain(s.node).get("container_name"))},
+        secrets=files.secrets,
+        known={name: value for name, value in files.known.items() if name not in files.secrets},
+        access=access,
+        limits=limits,
+        top=document.entries,
+        named=tuple(as_item(path.resolve(), (root or paths[0].parent).resolve()) for path in paths),
+        without=tuple(gone),
+        cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
+    )
     found.extend(() if "COMPOSE_FILE" in files.known else unread(paths, root))
-    found.extend(application_problems(application, next(iter(services.entries.values())).key))
+    found.extend(application_problems(application, next(iter(services.values())).key))
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
-    found.extend(problem for problem in _secrets(application, document, files) if problem.span not in refused)
-    return (application if application.services else None), found
-
-
-def _secrets(application: ApplicationSource, document: source.Mapping, files: ComposeFiles) -> Iterator[Diagnostic]:
-    """Warnings of what looks like a secret, in the compose files and beside them."""
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
-    yield from secret_problems.withheld(nodes, files.written, {*files.known, *files.secrets, *files.passed}, os.environ)
-    for file, raw in _own_files(application):
-        yield from dotenv_problems(file, raw=raw)
+    known = {*files.known, *files.secrets, *files.passed}
+    secrets = secret_problems.withheld(nodes, files.written, known, os.environ)
+    found.extend(problem for problem in secrets if problem.span not in refused)
+    return (application if application.services else None), found
 
 
 def as_written(path: Path) -> ApplicationSource | None:
@@ -104,52 +110,14 @@ def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
             yield Diagnostic(Span(str(path)), "application-isolation", message, INSIDE)
 
 
-def _application(
-    path: Path,
-    document: source.Mapping,
-    services: source.Mapping,
-    files: ComposeFiles,
-    access: Access,
-    limits: SandboxLimits,
-) -> ApplicationSource:
-    dropped = {name: why for name, entry in services.entries.items() if (why := _why_dropped(plain(entry.value)))}
-    kept = {
-        name: service
-        for name, entry in services.entries.items()
-        if name not in dropped and (service := _service(name, entry, path.parent, files)) is not None
-    }
-    return ApplicationSource(
-        path=path,
-        services=kept,
-        dropped=dropped,
-        containers={str(c): n for n, s in kept.items() if (c := plain(s.node).get("container_name"))},
-        secrets=files.secrets,
-        known={name: value for name, value in files.known.items() if name not in files.secrets},
-        access=access,
-        limits=limits,
-        top=document.entries,
-        cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
-    )
-
-
-def _own_files(application: ApplicationSource) -> list[tuple[Path, bool]]:
-    """The files of ``env_file`` that the application may read, each once, and whether they are raw."""
-    words = sorted({(file.path, file.raw) for service in application.services.values() for file in service.env_files})
-    return [(Path(application.paths.whole(text)), raw) for text, raw in words if application.paths.is_own(text)]
-
-
-def _service(name: str, entry: Entry, folder: Path, files: ComposeFiles) -> ComposeService | None:
+def _service(name: str, entry: Entry, files: ComposeFiles) -> ComposeService:
     node = entry.value
-    if not isinstance(node, source.Mapping):
-        return None
+    assert isinstance(node, source.Mapping)
     raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
-    entries = {
-        key: Entry(each.key, filled_node(each.value, files.known, files.is_late)) if key in raw else each
-        for key, each in node.entries.items()
-    }
-    node = replace(node, entries=entries)
+    node = with_values(node, raw, files.known, files.is_late)
     own = tuple(env_files(node))
-    return ComposeService(name, node, entry.key, declaration_of(node), own, file_statements(own, folder), raw)
+    statements = file_statements(own, files.folder.resolve())
+    return ComposeService(name, node, entry.key, declaration_of(node), own, statements, raw)
 
 
 def _why_dropped(service: dict[str, Any]) -> str:

@@ -7,16 +7,16 @@ A test sets ``application: {env: {SPEED: 0.5}}``. The application has parameters
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from decimal import Decimal
 
 from dodo_dsl import source
+from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.interpolation import filled, literal, names
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.source import Entry, Scalar
+from dodo_dsl.source import Entry, Node, Scalar
 from dodo_dsl.spec.vary import Range
 
 _LIBRARIES = ("CLUON_SHAREDMEMORY_POSIX", "VIRTUAL_ENV")
@@ -49,16 +49,19 @@ def with_variables(application: ApplicationSource, values: Mapping[str, str]) ->
     if not values:
         return application
     known = {**application.known, **values}
-    services = {name: _with_values(each, known, application.is_late) for name, each in application.services.items()}
+    services = {
+        name: replace(each, node=with_values(each.node, each.raw, known, application.is_late))
+        for name, each in application.services.items()
+    }
     return replace(application, services=services)
 
 
-def _with_values(service: ComposeService, known: Mapping[str, str], is_late: Callable[[str], bool]) -> ComposeService:
-    entries = dict(service.node.entries)
-    for key, node in service.raw.items():
-        value = filled_node(node, known, is_late)
-        entries[key] = Entry(entries[key].key, value)
-    return replace(service, node=replace(service.node, entries=entries))
+def with_values(
+    service: source.Mapping, raw: Mapping[str, Node], known: Mapping[str, str], is_late: Callable[[str], bool]
+) -> source.Mapping:
+    """A service with variables filled in where each test may set them; ``raw`` are these values as they are written."""
+    made = {key: Entry(service.entries[key].key, filled_node(node, known, is_late)) for key, node in raw.items()}
+    return replace(service, entries={**service.entries, **made})
 
 
 def variables_of(
@@ -79,6 +82,16 @@ def variables_of(
             own[name] = values[name].replace("$", "$$")
     of_files = _of_files(service, values, is_late)
     return {**of_files, **own, **{name: values[name].replace("$", "$$") for name in given}}
+
+
+def variables_with_cid(
+    service: ComposeService, values: Mapping[str, str], is_late: Callable[[str], bool], given: Iterable[str], cid: int
+) -> dict[str, str | None]:
+    """The same with the CID wherever one was, also in the place of one that ``env_file`` would set."""
+    found = variables_of(service, values, is_late, given)
+    made = {name: value and opendlv_flags.with_cid_text(value, cid) for name, value in found.items()}
+    names = [name for name in CID_VARIABLES if name in made or name in service.file_variables]
+    return made | dict.fromkeys(names, str(cid))
 
 
 def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Callable[[str], bool]) -> dict[str, str]:
@@ -106,7 +119,6 @@ def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Calla
     return made
 
 
-_KEYS = ("from", "to", "default")
 _RULE = "application-file"
 
 
@@ -117,60 +129,39 @@ def tunables(application: ApplicationSource) -> tuple[Range, ...]:
     """
     found: dict[str, Range] = {}
     for service in application.services.values():
-        for name, entry in _written(service).items():
+        for name, entry in source.entries(service.node, "x-dodo", "tune").items():
             found.setdefault(name, _range(name, entry))
     return tuple(found.values())
 
 
 def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Parameters that are DoDo's own, without a range, or with different ones at several services."""
-    seen: dict[str, tuple[str, Range]] = {}
+    seen: dict[str, tuple[str, list[float]]] = {}
     for service in application.services.values():
-        for name, entry in _written(service).items():
-            problems = list(_problems(name, entry))
-            yield from problems
-            if problems:
-                continue
-            one = _range(name, entry)
-            other, first = seen.setdefault(name, (service.name, one))
-            if _numbers(first) != _numbers(one):
-                message = f"'{name}' has another range at '{other}', expected the same one: a parameter has one value"
+        for name, entry in source.entries(service.node, "x-dodo", "tune").items():
+            found = _range(name, entry)
+            ends = (*found.ends, found.nominal)
+            low, high, default = numbers = [float(str(end.value)) for end in ends]
+            if why := owner(name):
+                yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
+            elif wrong := next(
+                (end for end, number in zip(ends, numbers, strict=True) if not math.isfinite(number)), None
+            ):
+                yield Diagnostic(wrong.span, _RULE, f"'{wrong.text}' is not a finite decimal number")
+            elif low >= high:
+                message = f"'from' is {ends[0].text}, expected less than 'to', {ends[1].text}"
+                yield Diagnostic(ends[0].span, _RULE, message)
+            elif not low <= default <= high:
+                message = f"'default' is {ends[2].text}, expected {ends[0].text} to {ends[1].text}"
+                yield Diagnostic(ends[2].span, _RULE, message)
+            elif (first := seen.setdefault(name, (service.name, numbers)))[1] != numbers:
+                message = (
+                    f"'{name}' has another range at '{first[0]}', expected the same one: a parameter has one value"
+                )
                 yield Diagnostic(entry.key, _RULE, message)
 
 
-def _written(service: ComposeService) -> dict[str, Entry]:
-    declared = service.node.get("x-dodo")
-    tune = declared.get("tune") if isinstance(declared, source.Mapping) else None
-    return dict(tune.entries) if isinstance(tune, source.Mapping) else {}
-
-
-def _scalars(entry: Entry) -> tuple[Scalar, ...]:
-    node = entry.value
-    found = [node.get(key) for key in _KEYS] if isinstance(node, source.Mapping) else []
-    return tuple(one for one in found if isinstance(one, Scalar))
-
-
 def _range(name: str, entry: Entry) -> Range:
-    low, high, default = _scalars(entry)
+    low, high, default = (source.part(entry.value, key) for key in ("from", "to", "default"))
+    assert isinstance(low, Scalar) and isinstance(high, Scalar) and isinstance(default, Scalar)
     return Range(name, default, (low, high))
-
-
-def _numbers(one: Range) -> tuple[Decimal, ...]:
-    return tuple(one.number(end.text) for end in (*one.ends, one.nominal))
-
-
-def _problems(name: str, entry: Entry) -> Iterator[Diagnostic]:
-    """Problems of one parameter that the schema does not see."""
-    if why := owner(name):
-        yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
-        return
-    low, high, default = (float(str(scalar.value)) for scalar in _scalars(entry))
-    start, end, middle = _scalars(entry)
-    for scalar in (start, end, middle):
-        if not math.isfinite(float(str(scalar.value))):
-            yield Diagnostic(scalar.span, _RULE, f"'{scalar.text}' is not a finite decimal number")
-            return
-    if low >= high:
-        yield Diagnostic(start.span, _RULE, f"'from' is {start.text}, expected less than 'to', {end.text}")
-    elif not low <= default <= high:
-        yield Diagnostic(middle.span, _RULE, f"'default' is {middle.text}, expected {start.text} to {end.text}")

@@ -10,7 +10,7 @@ from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.construction import Construction, Setting
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
-from dodo_dsl.application.variables import variables_of
+from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
 from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
 
@@ -30,7 +30,9 @@ def plan_application(application: ApplicationSource, setting: Setting) -> Applic
     )
     return Application(
         _relative(application.folder, setting.folder),
-        tuple(_process(service, application, setting) for service in application.services.values()),
+        tuple(
+            _process(service, services[name], application, setting) for name, service in application.services.items()
+        ),
         {"services": services, **construction.rest()},
         tuple(_changes(application, services)),
         setting.limits,
@@ -74,8 +76,10 @@ def _changes(application: ApplicationSource, made: dict[str, dict[str, Any]]) ->
         yield from [line if len(line) <= _LONG else f"{line[: _LONG - 3]}..."] if parts else []
 
 
-def _process(service: ComposeService, application: ApplicationSource, setting: Setting) -> ApplicationService:
-    """The service as it starts without containers; its CID is filled in when it starts."""
+def _process(
+    service: ComposeService, container: dict[str, Any], application: ApplicationSource, setting: Setting
+) -> ApplicationService:
+    """The service as it starts without its container; its CID is filled in when it starts."""
     raw, own, cid = plain(service.node), service.declared, setting.cid
     known = {**application.known, **dict(setting.given)}
 
@@ -84,15 +88,12 @@ def _process(service: ComposeService, application: ApplicationSource, setting: S
 
     written = plain(filled_node(service.raw["command"], known, is_late)) if "command" in service.raw else None
     command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
-    found = variables_of(service, known, is_late, dict(setting.given))
-    variables = {k: opendlv_flags.with_cid_text(v, cid) if v else v for k, v in found.items()}
-    for name in opendlv_flags.CID_VARIABLES:
-        if name in variables or name in service.cid_variables:
-            variables[name] = str(cid)
+    variables = variables_with_cid(service, known, is_late, dict(setting.given), cid)
     process = raw.get("x-dodo-process")
     command = opendlv_flags.arguments(list(map(str, process or ())), command)
     words = (*(process or ()), *command)
-    after = _after(raw, application)
+    needed = [name for _, name in references(raw, application.containers) if name in application.services]
+    waits = {n: how for n, how in container.get("depends_on", {}).items() if n in application.services}
     return ApplicationService(
         name=service.name,
         process=(*(DISPLAY_SERVER if service.has_display else ()), *map(str, process)) if process else None,
@@ -104,29 +105,10 @@ def _process(service: ComposeService, application: ApplicationSource, setting: S
         raw_files=tuple(file.path for file in service.env_files if file.raw),
         inputs=_names(own.inputs) if own else (),
         outputs=_names(own.outputs) if own else (),
-        after=after,
-        optional=_optional(raw, after),
+        after={**dict.fromkeys(needed, STARTED), **{n: how.get("condition", STARTED) for n, how in waits.items()}},
+        optional=tuple(n for n, how in waits.items() if how.get("required") is False),
         lines=tuple(Line(line.match, line.message, line.sender) for line in own.lines) if own else (),
     )
-
-
-def _after(service: dict[str, Any], application: ApplicationSource) -> dict[str, str]:
-    """The services that start before this one, each with its condition: also those whose namespaces it joins."""
-    needed = [name for _, name in references(service, application.containers)]
-    about = service.get("depends_on")
-    written = {str(n): _condition(how) for n, how in about.items()} if isinstance(about, dict) else {}
-    every = {**dict.fromkeys(needed, STARTED), **written}
-    return {name: condition for name, condition in every.items() if name in application.services}
-
-
-def _optional(service: dict[str, Any], after: Iterable[str]) -> tuple[str, ...]:
-    about = service.get("depends_on")
-    written = about if isinstance(about, dict) else {}
-    return tuple(n for n in after if isinstance(written.get(n), dict) and written[n].get("required") is False)
-
-
-def _condition(about: Any) -> str:
-    return str((about.get("condition") if isinstance(about, dict) else "") or STARTED)
 
 
 def _names(words: Iterable[Word]) -> tuple[str, ...]:

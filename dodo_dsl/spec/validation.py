@@ -224,7 +224,7 @@ def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
         beside, part = part, part[step]  # type: ignore[index]
         if step == "$ref":
             part, root = _target(str(part), root)
-            part = part | {key: value for key, value in beside.items() if key != "$ref"}
+            part = {key: value for key, value in beside.items() if key != "$ref"} | part
     return part
 
 

@@ -13,6 +13,8 @@ from typing import Any
 import yaml
 
 from dodo_dsl import compiler
+from dodo_dsl.application.compose_paths import mapped_texts
+from dodo_dsl.application.interpolation import dotenv, interpolate
 from dodo_dsl.diagnostics import Diagnostic, forget_lines
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Plan
@@ -159,70 +161,16 @@ def _told(diagnostics: Sequence[Diagnostic], root: Path) -> Iterator[Told]:
         yield Told(one.rule, one.severity, file, one.span.line, one.span.column, f"{one.message}; {one.hint}")
 
 
-_VARIABLE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-
-
 def filled(value: Any, variables: Mapping[str, str]) -> Any:
-    """A value with its variables filled in, as compose does it."""
-    if isinstance(value, dict):
-        return {key: filled(inner, variables) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [filled(inner, variables) for inner in value]
-    return _text(value, variables) if isinstance(value, str) else value
-
-
-def _text(text: str, variables: Mapping[str, str]) -> str:
-    made, rest = "", text
-    while "$" in rest:
-        before, _, rest = rest.partition("$")
-        made += before
-        if rest.startswith("$"):
-            made, rest = f"{made}$", rest[1:]
-        elif rest.startswith("{"):
-            inner = rest[1 : _end(rest)]
-            rest = rest[len(inner) + 2 :]
-            made += _braced(inner, variables)
-        elif name := _VARIABLE.match(rest):
-            made, rest = made + variables.get(name[0], ""), rest[name.end() :]
-        else:
-            made += "$"
-    return made + rest
-
-
-def _end(text: str) -> int:
-    """The index of the brace that closes the first one."""
-    depth = 0
-    for index, character in enumerate(text):
-        depth += (character == "{") - (character == "}")
-        if not depth:
-            return index
-    return len(text)
-
-
-def _braced(inner: str, variables: Mapping[str, str]) -> str:
-    name = _VARIABLE.match(inner)
-    assert name is not None, inner
-    value, word = variables.get(name[0]), inner[name.end() :]
-    if word.startswith(":"):
-        value, word = value or None, word[1:]
-    if word.startswith("+"):
-        return _text(word[1:], variables) if value is not None else ""
-    return _text(word[1:], variables) if value is None and word.startswith("-") else value or ""
-
-
-_ESCAPES = {"n": "\n", "r": "\r", "\\": "\\", '"': '"'}
+    """A value with its variables filled in, as compose does it: merging.yml says how, and compose is asked there."""
+    return mapped_texts(value, lambda text: interpolate(text, variables))
 
 
 def _dotenv(text: str) -> dict[str, str]:
-    """The variables of a compiled test's ``.env``, which quotes values with escapes where it has to."""
+    """The variables of a compiled test's ``.env``."""
     found: dict[str, str] = {}
-    for line in text.splitlines():
-        name, equals, value = line.partition("=")
-        if not equals or line.startswith("#"):
-            continue
-        if value.startswith('"'):
-            value = re.sub(r"\\(.)", lambda match: _ESCAPES[match[1]], value[1:-1])
-        found[name] = _text(value, found)
+    for name, value in dotenv(text)[0]:
+        found[name] = interpolate(value or "", found)
     return found
 
 

@@ -55,22 +55,6 @@ def test_each_key_of_the_deployment_replaces_that_of_the_compose_file(folder: Pa
     assert found["driver"].process == ("python3", "-m", "steering")
 
 
-def test_something_has_to_be_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "docker-compose.yml").write_text("services: {viewer: {image: view}}\n")
-    (tmp_path / "dodo.yml").write_text("dodo: 1\napplication: {files: [docker-compose.yml], without: [viewer]}\n")
-    [found] = load([], []).diagnostics
-    assert (found.rule, found.message) == (
-        "application-file",
-        "'without' leaves out every service of the application, so that a test has nothing to start",
-    )
-    assert (Path(found.span.file).name, found.span.line, found.hint) == (
-        "dodo.yml",
-        2,
-        "name a compose file that has the service of your program under 'files'",
-    )
-
-
 def test_they_are_about_the_files_that_they_name(folder: Path) -> None:
     (folder / "other.yml").write_text("services: {steer: {image: steer, command: --cid=111}}")
     assert load([folder / "tests" / "network.dodo.yml"], [Path("other.yml")]).ok

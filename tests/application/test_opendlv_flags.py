@@ -5,12 +5,6 @@ import pytest
 from dodo_dsl.application import opendlv_flags
 
 
-@pytest.mark.parametrize("command", ["prog 'open", 'prog "open', "(prog)"])
-def test_what_is_no_command_is_refused(command: str) -> None:
-    with pytest.raises(ValueError, match=r"quotation mark|parenthesis"):
-        opendlv_flags.split(command)
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -19,7 +19,6 @@ ON_RIGS = ("truck", "usecase")
 """Those that have hardware."""
 MAY_BE_REFUSED = {"networks", "long-forms"}
 """They have a network of others, and a rule for devices."""
-WHOLE = ("include", "truck")
 PATHS = ("/opt/models", *(f"~/{name}" for name in ("kiwi-recordings", "models", "recordings")))
 """What 'paths' in dodo.yml names: styles mount these folders of the host."""
 SUMMARY = FOLDER / "styles.yml"
@@ -75,15 +74,6 @@ def test_summaries(style: str, tmp_path: Path, update_goldens: bool) -> None:
     assert summary(test) == known[style]
 
 
-@pytest.mark.parametrize("style", WHOLE)
-def test_goldens(style: str, tmp_path: Path, update_goldens: bool) -> None:
-    text = made(style, tmp_path, way_of(style)).files["application.compose.yml"]
-    golden = FOLDER / "golden" / f"{style}.yml"
-    if update_goldens:
-        golden.write_text(text)
-    assert text == golden.read_text()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("style", STYLES)
 def test_compose_accepts_them(style: str, tmp_path: Path) -> None:
@@ -109,4 +99,3 @@ def test_plans_survive_their_file(style: str, tmp_path: Path) -> None:
 def test_each_style_is_known() -> None:
     known: dict[str, Any] = yaml.safe_load(SUMMARY.read_text())
     assert list(known) == STYLES
-    assert {path.stem for path in (FOLDER / "golden").iterdir()} == {*WHOLE}

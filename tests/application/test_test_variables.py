@@ -68,12 +68,3 @@ def test_processes_have_them(test_of_car: Compiled, tmp_path: Path) -> None:
         assert {name: command.environment[name] for name in GIVEN} == GIVEN
     assert made["mapped"].environment["TWICE"] == "0.50.5"
     assert made["listed"].environment["OTHER"] == "a$b c"
-
-
-@pytest.mark.parametrize("name", ["PATH", "LD_PRELOAD", "ld_audit", "PYTHONPATH", "DODO_KEY", "CID", "OD4SESSION_CID"])
-def test_what_a_test_may_not_set(name: str, tmp_path: Path) -> None:
-    root = repository(tmp_path, {FILE: "services: {a: {image: x, command: --cid=111}}\n"})
-    spec = root / "tests" / "network.dodo.yml"
-    for given, count in ((name, 1), ("OMP_NUM_THREADS", 0), ("KEYPOINTS", 0)):
-        spec.write_text(f"{spec.read_text().partition('application:')[0]}application: {{env: {{{given}: x}}}}\n")
-        assert len(compiled(root).errors) == count

@@ -12,50 +12,27 @@ from tests.application.compiled import size
 
 Document = Mapping[str, Any]
 
-KEYS = {
-    *("blkio_config", "build", "cap_add", "cap_drop", "command", "configs", "cpu_count", "cpu_percent", "cpu_period"),
-    *(
-        "cpu_quota",
-        "cpu_shares",
-        "cpus",
-        "cpuset",
-        "depends_on",
-        "deploy",
-        "dns",
-        "dns_opt",
-        "dns_search",
-        "domainname",
-    ),
-    *("entrypoint", "env_file", "environment", "expose", "extra_hosts", "gpus", "group_add", "healthcheck", "hostname"),
-    *("image", "init", "ipc", "links", "logging", "mem_limit", "mem_swappiness", "memswap_limit", "network_mode"),
-    *("networks", "pid", "pids_limit", "platform", "read_only", "runtime", "secrets", "security_opt", "shm_size"),
-    *("stdin_open", "stop_grace_period", "stop_signal", "storage_opt", "sysctls", "tmpfs", "tty", "ulimits", "umask"),
-    *("user", "volumes", "volumes_from", "working_dir"),
+_CARRIED = """
+build cap_add cap_drop command configs cpus cpuset depends_on deploy dns dns_opt dns_search domainname entrypoint
+env_file environment expose extra_hosts gpus group_add healthcheck hostname image init ipc links logging mem_limit
+network_mode networks pid pids_limit platform read_only runtime secrets security_opt shm_size stdin_open
+stop_grace_period stop_signal sysctls tmpfs tty ulimits umask user volumes volumes_from working_dir
+"""
+KEYS = {*_CARRIED.split()}
+"""Those of a service that a test carries; any other is harm. Their values are judged below."""
+_BUILT = "additional_contexts args context dockerfile dockerfile_inline extra_hosts network platforms secrets target"
+MOUNT = {
+    "": {"bind", "image", "read_only", "source", "target", "tmpfs", "type", "volume"},
+    "bind": {"create_host_path", "selinux"},
+    "volume": {"nocopy", "subpath"},
 }
-"""Those of a service that cannot reach the host by themselves; any other is harm. Their values are judged below."""
-BUILD = {
-    *(
-        "additional_contexts",
-        "args",
-        "context",
-        "dockerfile",
-        "dockerfile_inline",
-        "extra_hosts",
-        "network",
-        "no_cache",
-    ),
-    *("no_cache_filter", "platforms", "provenance", "pull", "sbom", "secrets", "shm_size", "target", "ulimits"),
-}
-MOUNT = {"bind", "consistency", "image", "read_only", "source", "target", "tmpfs", "type", "volume"}
-TOP = {"services", "volumes", "secrets", "configs", "networks"}
+TOP = {"services", "volumes", "secrets", "configs"}
 MEMORY, FILES = 2_000_000_000, 1_000_000_000
-LIMITS = {"pids_limit": 1024, "mem_limit": MEMORY, "memswap_limit": 2 * MEMORY, "shm_size": MEMORY, "cpu_shares": 1024}
 ULIMITS = {"core": 0, "nofile": 1024, "fsize": FILES, "nproc": 1024, "memlock": MEMORY, "msgqueue": MEMORY}
+LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
 DROPPED = {"AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT"}
-ADDED = {
-    *("AUDIT_WRITE", "CHOWN", "DAC_OVERRIDE", "FOWNER", "FSETID", "IPC_LOCK", "KILL", "NET_BIND_SERVICE", "SETFCAP"),
-    *("SETGID", "SETPCAP", "SETUID", "SYS_CHROOT", "SYS_NICE", "SYS_PTRACE"),
-}
+_OWN = "CHOWN DAC_OVERRIDE FOWNER FSETID IPC_LOCK KILL NET_BIND_SERVICE SETGID SETPCAP SETUID SYS_NICE SYS_PTRACE"
+ADDED = {"AUDIT_WRITE", "SETFCAP", "SYS_CHROOT", *_OWN.split()}
 TO_READ = (
     *("/usr/share", "/usr/src", "/lib/modules", "/lib/firmware", "/etc/localtime", "/etc/timezone", "/run/udev/data"),
     *(f"/sys/{name}" for name in ("block", "bus", "class", "dev", "devices", "module")),
@@ -93,8 +70,6 @@ def harm(document: Document, repository: Path) -> Iterator[str]:
     for key in ("secrets", "configs"):
         for name, about in (document.get(key) or {}).items():
             yield from (f"{key} {name}: {text}" for text in _content(about or {}, folder, repository))
-    if document.get("networks"):
-        yield f"networks: {document['networks']}"
 
 
 def _others(mapping: Document, known: set[str], where: str) -> Iterator[str]:
@@ -134,37 +109,32 @@ def _privileges(service: Document) -> Iterator[str]:
     options = _list(service.get("security_opt"))
     if not options or not all(re.match(r"no-new-privileges\b", str(option)) for option in options):
         yield f"security_opt: {options}"
-    reserved = _at(service, "deploy", "resources", "reservations", "devices") or []
+    deploy = service.get("deploy") or {}
+    reserved = _at(deploy, "resources", "reservations", "devices") or []
     for device in [*reserved, *(service.get("gpus") if isinstance(service.get("gpus"), list) else [])]:
         if str(device.get("driver")).lower() == "cdi" or any("=" in str(i) for i in device.get("device_ids") or ()):
             yield f"device {device}"
-    for key in set(service.get("deploy") or {}) - {"resources"}:
-        yield f"deploy.{key}"
-    if _at(service, "logging", "driver") not in ("json-file", "local", "", None):
-        yield f"logging: {service['logging']}"
+    if deploy not in ({}, {"resources": {"reservations": {"devices": reserved}}}):
+        yield f"deploy: {deploy}"
 
 
 def _limits(service: Document) -> Iterator[str]:
-    own = _at(service, "deploy", "resources", "limits") or {}
-    for key, other in (("pids_limit", "pids"), ("mem_limit", "memory")):
-        if key not in service and other not in own:
-            yield f"no {key}"
-        values = (service.get(key), own.get(other))
-        for value in values:
-            if value is not None and _beyond(value, LIMITS[key], 1):
-                yield f"{key}: {value}"
-    for key in ("memswap_limit", "shm_size", "cpu_shares"):
-        if service.get(key) is not None and _beyond(service[key], LIMITS[key]):
-            yield f"{key}: {service[key]}"
+    for key, most in (("pids_limit", 1024), ("mem_limit", MEMORY)):
+        if key not in service or _beyond(service[key], most, 1):
+            yield f"{key}: {service.get(key)}"
+    if "shm_size" in service and _beyond(service["shm_size"], MEMORY):
+        yield f"shm_size: {service['shm_size']}"
     ulimits = service.get("ulimits") or {}
     if {"core", "nofile", "fsize"} - set(ulimits):
         yield f"ulimits: {ulimits}"
-    yield from _ulimits(ulimits)
+    for name, value in ulimits.items():
+        numbers = value.values() if isinstance(value, dict) else [value]
+        if name in ULIMITS and any(_beyond(number, ULIMITS[name]) for number in numbers):
+            yield f"ulimits: {name} {value}"
     for entry in _list(service.get("tmpfs")):
         yield from _tmpfs(str(entry).partition(":")[2])
-    options = _at(service, "logging", "options") or {}
-    if size(options.get("max-size", -1)) * int(options.get("max-file", 1)) not in range(1, FILES + 1):
-        yield f"logging: {options}"
+    if service.get("logging") != LOGS:
+        yield f"logging: {service.get('logging')}"
 
 
 def _beyond(value: Any, most: int, least: int = 0) -> bool:
@@ -172,13 +142,6 @@ def _beyond(value: Any, most: int, least: int = 0) -> bool:
     with contextlib.suppress(ValueError):
         return not least <= size(value) <= most
     return False
-
-
-def _ulimits(ulimits: Document) -> Iterator[str]:
-    for name, value in ulimits.items():
-        numbers = value.values() if isinstance(value, dict) else [value]
-        if name in ULIMITS and any(_beyond(number, ULIMITS[name]) for number in numbers):
-            yield f"ulimits: {name} {value}"
 
 
 def _tmpfs(options: str) -> Iterator[str]:
@@ -190,17 +153,10 @@ def _tmpfs(options: str) -> Iterator[str]:
 def _mount(mount: Any, volumes: Document, folder: Path, repository: Path) -> Iterator[str]:
     if isinstance(mount, dict):
         kind, source, is_read = mount.get("type"), str(mount.get("source") or ""), bool(mount.get("read_only"))
-        yield from _others(mount, MOUNT, "of a mount")
-        options = {**(mount.get("bind") or {}), **(mount.get("volume") or {})}
+        for key, known in MOUNT.items():
+            yield from _others((mount.get(key) or {}) if key else mount, known, "of a mount")
         if mount.get("tmpfs") or kind == "tmpfs":
             yield from _tmpfs(f"size={_at(mount, 'tmpfs', 'size') or 0}")
-        if (
-            options.get("propagation") not in (None, "", "private", "rprivate")
-            or options.get("recursive") == "writable"
-        ):
-            yield f"mount {mount}"
-        if set(options) - {"create_host_path", "nocopy", "propagation", "recursive", "selinux", "subpath"}:
-            yield f"mount {mount}"
     else:
         source, _, rest = mount.partition(":") if ":" in mount else ("", "", mount)
         words = rest.split(":")[1].split(",") if ":" in rest else []
@@ -230,7 +186,7 @@ def _bound(source: str, is_read: bool, folder: Path, repository: Path) -> Iterat
 
 def _build(build: Any, folder: Path, repository: Path) -> Iterator[str]:
     build = {"context": build} if isinstance(build, str) else build
-    yield from _others(build, BUILD, "of a build")
+    yield from _others(build, {*_BUILT.split()}, "of a build")
     context = str(build.get("context") or ".")
     contexts = build.get("additional_contexts") or {}
     others = [str(word).partition("=")[2] for word in contexts] if isinstance(contexts, list) else contexts.values()
@@ -243,9 +199,6 @@ def _build(build: Any, folder: Path, repository: Path) -> Iterator[str]:
         yield f"a build by '{file}'"
     if build.get("network") not in (None, "", "none", "default"):
         yield f"a build on {build['network']}"
-    if build.get("shm_size") is not None and _beyond(build["shm_size"], MEMORY):
-        yield f"a build with {build['shm_size']}"
-    yield from _ulimits(build.get("ulimits") or {})
 
 
 def _files(service: Document, folder: Path, repository: Path) -> Iterator[str]:
@@ -256,7 +209,7 @@ def _files(service: Document, folder: Path, repository: Path) -> Iterator[str]:
 
 
 def _content(about: Document, folder: Path, repository: Path) -> Iterator[str]:
-    yield from _others(about, {"file", "content", "environment", "labels"}, "")
+    yield from _others(about, {"file", "content", "environment"}, "")
     if about.get("file", "/dev/null") != "/dev/null" and not _is_own(str(about["file"]), folder, repository):
         yield f"file: {about['file']}"
     if re.match("CI_|DODO_", str(about.get("environment") or "")):
@@ -264,29 +217,21 @@ def _content(about: Document, folder: Path, repository: Path) -> Iterator[str]:
 
 
 def _volume(volume: Document, folder: Path, repository: Path) -> Iterator[str]:
-    yield from _others(volume, {"driver", "driver_opts", "external", "name" if _is_external(volume) else ""}, "")
-    if isinstance(volume.get("driver_opts"), list):
-        yield f"driver_opts: {volume['driver_opts']}"
+    yield from _others(volume, {"external", "name"} if _is_external(volume) else {"driver_opts"}, "")
+    name, options = str(volume.get("name") or "a"), volume.get("driver_opts") or {}
+    if _is_external(volume) and (
+        volume["external"] is not True or not re.fullmatch("(?!dodo-)[a-zA-Z0-9][a-zA-Z0-9_.-]*", name)
+    ):
+        yield f"external: {volume}"
+    if not isinstance(options, dict):
+        yield f"driver_opts: {options}"
         return
-    options = {key: str(value) for key, value in (volume.get("driver_opts") or {}).items()}
-    words = [word for word in options.get("o", "").split(",") if word]
-    if volume.get("driver") not in (None, "", "local"):
-        yield f"driver: {volume['driver']}"
-    external = volume.get("external")
-    name = external.get("name") if isinstance(external, dict) else volume.get("name")
-    if _is_external(volume) and not re.fullmatch("[a-zA-Z0-9][a-zA-Z0-9_.-]*", str(name or "a")):
-        yield f"external: {volume}"
-    if str(name or "").startswith("dodo-"):
-        yield f"external: {volume}"
-    if {"bind", "rbind"} & {word.strip() for word in words}:
+    words = str(options.get("o", "")).split(",")
+    if {"bind", "rbind"} & {word.strip() for word in words} and options.get("type") == "none":
         is_read = [word for word in words if word in ("ro", "rw")][-1:] == ["ro"]
-        yield from _bound(options.get("device", ""), is_read, folder, repository)
-        if options.get("type") not in ("none", "", None):
-            yield f"driver_opts: {options}"
-    elif options.get("type") == "tmpfs" and options.get("device") == "tmpfs":
-        yield from _tmpfs(options.get("o", ""))
-        if "remount" in words:
-            yield f"driver_opts: {options}"
+        yield from _bound(str(options.get("device", "")), is_read, folder, repository)
+    elif options.get("type") == options.get("device") == "tmpfs" and "remount" not in words:
+        yield from _tmpfs(",".join(words))
     elif options:
         yield f"driver_opts: {options}"
 

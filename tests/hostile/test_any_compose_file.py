@@ -15,83 +15,16 @@ from tests.hostile.harmless import harm
 
 Values = st.SearchStrategy[Any]
 
-WORDS = st.sampled_from(
-    [
-        *("", "host", "none", "x", "b", "1", "1s", "64m", "64g", "-1", "true", "service:b", "container:x", "bridge"),
-        *(
-            "/",
-            "..",
-            ".",
-            "./data",
-            "../other",
-            "link",
-            "/etc",
-            "~",
-            "~nobody/x",
-            "/dev",
-            "/dev/sda",
-            "/tmp",
-            "/usr/share",
-        ),
-        *(
-            "./data:/d",
-            "./data:/d:ro",
-            "/:/h",
-            "vol:/v",
-            "link:/l",
-            "/tmp:/tmp",
-            "/var/run/docker.sock:/s",
-            ":",
-            "a:b:c",
-        ),
-        *("${A", "${A:-/}", "${A:-host}", "${A:-./data}", "$$A", "A=1", "A", "CI_JOB_TOKEN", "x=y", "h=/etc"),
-        *(
-            "ALL",
-            "SYS_ADMIN",
-            "SYS_NICE",
-            "seccomp:unconfined",
-            "no-new-privileges:true",
-            "bind",
-            "bind,ro",
-            "size=64g",
-        ),
-        *(
-            "volume",
-            "tmpfs",
-            "local",
-            "nfs",
-            "vol",
-            "n",
-            "syslog",
-            "json-file",
-            "size=64m",
-            "/t:size=64g",
-            "/t",
-            "rshared",
-        ),
-        *(
-            "a.env",
-            "/etc/passwd",
-            "Dockerfile",
-            "file:///x",
-            "https://a.b/c.git",
-            "oci-layout:///var/lib",
-            "b:ro",
-            "cdi",
-        ),
-        *(
-            "service_healthy",
-            "service_started",
-            "--cid=111",
-            "writable",
-            "default",
-            "nvidia",
-            "runc",
-            "c 1:3 mr",
-            "b 8:* r",
-        ),
-    ]
-)
+_TEXTS = """
+host | none | x | b | 1 | 1s | 64m | 64g | -1 | true | service:b | container:x | bridge | / | .. | . | ./data |
+../other | link | /etc | ~ | ~nobody/x | /dev | /dev/sda | /tmp | /usr/share | ./data:/d | ./data:/d:ro | /:/h |
+vol:/v | link:/l | /tmp:/tmp | /var/run/docker.sock:/s | : | a:b:c | ${A | ${A:-/} | ${A:-host} | ${A:-./data} | $$A |
+A=1 | A | CI_JOB_TOKEN | x=y | h=/etc | ALL | SYS_ADMIN | SYS_NICE | seccomp:unconfined | no-new-privileges:true |
+bind | bind,ro | size=64g | volume | tmpfs | local | nfs | vol | n | syslog | json-file | size=64m | /t:size=64g |
+/t | rshared | a.env | /etc/passwd | Dockerfile | file:///x | https://a.b/c.git | oci-layout:///var/lib | b:ro | cdi |
+service_healthy | service_started | --cid=111 | writable | default | nvidia | runc | c 1:3 mr | b 8:* r
+"""
+WORDS = st.sampled_from(["", *(text.strip() for text in _TEXTS.split("|"))])
 NAMES = st.sampled_from(
     ["a", "b", "vol", "n", "A", "nofile", "core", "memlock", "o", "type", "device", "x-a", "max-size"]
 )
