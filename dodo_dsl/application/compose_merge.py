@@ -101,7 +101,7 @@ def _as_hosts(node: Node) -> Node:
     return Sequence(node.span, tuple(Scalar(span, text, text) for span, text in texts))
 
 
-def _as_waits(node: Node) -> Node:
+def as_waits(node: Node) -> Node:
     """``[a]`` as ``{a: {condition: service_started}}``."""
     started = Scalar(node.span, "service_started", "service_started")
     return _as_keys(node, Mapping(node.span, {"condition": Entry(node.span, started)}))
@@ -130,7 +130,7 @@ _FORMS: dict[Path, Callable[[Node], Node]] = {
     **{("build", key): as_pairs for key in ("args", "additional_contexts")},
     **{(key,): _as_list for key in _LISTS},
     ("build",): _as_build,
-    ("depends_on",): _as_waits,
+    ("depends_on",): as_waits,
     ("networks",): _as_keys,
     ("extra_hosts",): _as_hosts,
 }

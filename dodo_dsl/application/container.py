@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
 from dodo_dsl.application.compose_files import dotenv_problems
-from dodo_dsl.application.compose_merge import as_pairs
+from dodo_dsl.application.compose_merge import as_pairs, as_waits
 from dodo_dsl.application.compose_paths import escaped, filled_node
 from dodo_dsl.application.model import (
     FILES,
@@ -29,7 +29,7 @@ from dodo_dsl.application.mounts import mounts
 from dodo_dsl.application.part import Part, spot
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
-from dodo_dsl.source import Entry, Node, Scalar
+from dodo_dsl.source import Node, Scalar
 
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
@@ -199,11 +199,9 @@ def _links(c: Container, node: Node) -> Any:
 
 
 def _depends_on(c: Container, node: Node) -> Any:
-    if not isinstance(node, source.Mapping):
-        node = source.Mapping(node.span, {i.text: Entry(i.span, i) for i in c.items(node) if isinstance(i, Scalar)})
-    made = {}  # nothing of a test is restarted
-    for name, entry in node.entries.items():
-        about = source.entries(entry.value)
+    made, services = {}, source.entries(as_waits(node))
+    for name, entry in services.items():
+        about = source.entries(entry.value)  # nothing of a test is restarted
         own = {key: plain(each.value) for key, each in about.items() if key in ("condition", "required")}
         condition = own.get("condition")
         if isinstance(condition, str) and condition not in _CONDITIONS:
@@ -212,7 +210,7 @@ def _depends_on(c: Container, node: Node) -> Any:
         if own.get("required") is False:
             is_there = name in c.project.application.services
         else:
-            is_there = bool(c.other("depends_on", name, entry.key, node.entries))
+            is_there = bool(c.other("depends_on", name, entry.key, services))
         made.update({name: own or {"condition": _CONDITIONS[0]}} if is_there else {})
     return made
 
