@@ -20,10 +20,8 @@ LENS = 95.0
 """Height of the lens: the default of projected-truth, and what the shipped tests give to virtual-camera."""
 CARRIAGE = 100.0
 """Chosen: the length of a carriage along its rail, buffers included."""
-PROFILE_WIDTH, PROFILE_HEIGHT = 40.0, 80.0
-"""Chosen: the section of rails."""
-COUPLING, MOTOR, MOTOR_SIDE, PLATE = 12.0, 40.0, 42.3, 4.0
-"""Heights of the shaft's flange, of a NEMA 17, its side, and the thickness of plates."""
+PLATE = 4.0
+"""Thickness of the camera's holder."""
 
 
 @dataclass(frozen=True)

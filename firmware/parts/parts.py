@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 import trimesh
 
-from firmware.drawings.measures import INDEX_WIDTH, LENS, PLATE
+from firmware.parts.measures import INDEX_WIDTH, LENS, PLATE
 
 MAP = Path(__file__).parents[2] / "tests_registry" / "maps" / "rig-straight"
 BED = 200.0
