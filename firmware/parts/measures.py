@@ -6,7 +6,7 @@ x is forward, y to the left, z up; 0 is the middle of the workspace on the table
 import math
 from dataclasses import dataclass
 
-from services.gantry.rig_table import BOUNDS, CIRCLE_OFFSET, CIRCLE_STEPS, INDEX, OFFSETS, STEPS
+from services.gantry.rig_table import BOUNDS, CIRCLE_STEPS, INDEX, OFFSETS, STEPS
 
 HOME_CLOSES, FAR_CLOSES, FRAME = 1.0, 5.0, 20.0
 """From step 0 to where its switch closes, from the highest place to the other switch, from both places to the frame."""
@@ -54,4 +54,3 @@ X, Y, YAW = map(_travel, ("x", "y", "yaw"))
 INDEX_WIDTH = float(INDEX[0])
 """Degrees in which the index of a rig of the kind circle is closed, clockwise from the heading backward."""
 CIRCLE_STEP = 360.0 / CIRCLE_STEPS
-CIRCLE_HOME = -CIRCLE_OFFSET * CIRCLE_STEP

@@ -34,11 +34,6 @@ CAM, CAM_LOW, CAM_HEIGHT, CAM_BORE = 30.0, 25.0, 6.0, 5.1
 Part = Callable[[], Any]
 
 
-def sweep() -> float:
-    """Radius of what the hub sweeps when it turns."""
-    return math.hypot(HUB_BACK, HUB_HALF)
-
-
 def lowest() -> float:
     """Height of the hub's lowest edge above the table."""
     return LENS - LENS_MARGIN
