@@ -296,6 +296,8 @@ class Outcome:
     measured."""
     goals: tuple[Goal, ...] = ()
     """The soft goals of the test, for dodo rank."""
+    decided_by: str = ""
+    """The evaluator whose verdict is the outcome; empty if several passed, or something else decided."""
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,8 @@ class Finding:
     result: Result
     reason: str
     service: str = ""
-    is_timed: bool = False
-    """Whether a machine that is too busy may be the reason for it: a verdict, not the end of a program."""
+    is_verdict: bool = False
+    """Whether an evaluator found it: then a machine that is too busy may be the reason, unlike for a program's end."""
 
 
 @dataclass
@@ -65,6 +65,7 @@ def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
         clock=plan.clock,
         backend=backend,
         goals=plan.goals,
+        decided_by=finding.service if finding.is_verdict and finding.result != "error" else "",
     )
 
 
@@ -88,14 +89,15 @@ def decide(facts: Facts, others: Sequence[Finding] = ()) -> Finding:
     result = worst(f.result for f in findings)
     deciding = [f for f in findings if f.result == result]
     if result == "passed":
-        return Finding("passed", "; ".join(f.reason for f in deciding), deciding[0].service)
+        is_one = len(deciding) == 1
+        return Finding("passed", "; ".join(f.reason for f in deciding), deciding[0].service, is_one)
     return deciding[0]
 
 
 def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
     if len(verdicts) > 1:
         return [Finding("error", f"evaluator '{evaluator}' gave {len(verdicts)} verdicts, expected one", evaluator)]
-    return [Finding("passed" if v.passed else "failed", v.reason, evaluator, is_timed=True) for v in verdicts]
+    return [Finding("passed" if v.passed else "failed", v.reason, evaluator, is_verdict=True) for v in verdicts]
 
 
 def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:

@@ -232,7 +232,7 @@ class RunState:
 
     def _is_of_conditions(self, finding: Finding) -> bool:
         """Whether a failure may come from what a program was given, unlike a message that it must not send."""
-        return finding.result == "failed" and bool(finding.is_timed or self._ended_by or self.is_unanswered)
+        return finding.result == "failed" and bool(finding.is_verdict or self._ended_by or self.is_unanswered)
 
     def ended_early(self) -> bool:
         """Whether the end of a service was that of the test."""

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
@@ -117,11 +117,16 @@ def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
     return None
 
 
+_UNSEEN = dict.fromkeys(("processor_median_s", "processor_p95_s", "processor_worst_s", "over"))
+"""What the clock leaves out where it cannot see the application's processes, or the test has no limit."""
+
+
 def _response(message: dict[str, Any]) -> Responded | None:
     """How long the application took, where all of the numbers can be."""
     processor = message.get("processor")
+    given = {**_UNSEEN, **message, "processor": processor if _is_text(processor) else ""}
     try:
-        found = msgspec.convert({**message, "processor": processor if _is_text(processor) else ""}, Response)
+        found = msgspec.convert(given, Response)
     except msgspec.ValidationError:
         return None
     counts = (found.slow, found.over or 0, found.uncopied, found.worst_frame - 1)
@@ -146,7 +151,6 @@ class _Check(Struct, forbid_unknown_fields=True):
 
 
 class _Verdict(Struct):
-    outcome: Literal["passed", "failed"]
     reason: _Text
     checks: list[_Check]
     evidence: Evidence = {}
@@ -154,6 +158,9 @@ class _Verdict(Struct):
 
 def _verdict(service: str, message: dict[str, Any]) -> Event:
     """The verdict, or what is wrong with it; its checks stay as they are written."""
+    outcome = message.get("outcome")
+    if outcome not in ("passed", "failed"):
+        return Malformed(service, f"its outcome is {json.dumps(outcome)[:40]}, expected passed or failed")
     try:
         msgspec.convert(message, _Verdict)
         json.dumps(message, ensure_ascii=False).encode()
@@ -161,8 +168,10 @@ def _verdict(service: str, message: dict[str, Any]) -> Event:
         return Malformed(service, "it has characters that UTF-8 cannot encode")
     except msgspec.ValidationError as error:
         return Malformed(service, str(error))
-    passed, evidence = message["outcome"] == "passed", message.get("evidence", {})
-    return VerdictEvent(service, passed, message["reason"], tuple(map(with_margin, message["checks"])), evidence)
+    evidence = message.get("evidence", {})
+    return VerdictEvent(
+        service, outcome == "passed", message["reason"], tuple(map(with_margin, message["checks"])), evidence
+    )
 
 
 def _finite(text: str) -> Any:

@@ -8,7 +8,12 @@ import pytest
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.report.viewer.moment import decisive
 
-OUTCOME = Outcome("t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad", 130, 0, "lockstep", "process")
+OUTCOME = replace(
+    Outcome(
+        "t", "t", "t.dodo.yml", "sil", "open-loop", "failed", "bad; it is told its pose", 130, 0, "lockstep", "process"
+    ),
+    decided_by="signal",
+)
 EVIDENCE = {"time": 2.4, "value": 0.2, "target": 0.0, "gap-begin": 1.0, "gap-end": 1.6, "broken-time": 0.7}
 
 
@@ -24,7 +29,7 @@ def test_evidence_by_what_failed(checks: tuple[str, ...], time: float) -> None:
     assert decisive(replace(OUTCOME, checks=failed(*checks), verdicts=(verdict,)), 5.5).time == time
 
 
-@pytest.mark.parametrize("verdicts", [(), ({"reason": "other", "evidence": EVIDENCE},), ({"reason": "bad"},)])
+@pytest.mark.parametrize("verdicts", [(), ({"evaluator": "other", "evidence": EVIDENCE},), ({"evaluator": "signal"},)])
 def test_what_no_verdict_explains_ended_the_test(verdicts: tuple[dict[str, Any], ...]) -> None:
     moment = decisive(replace(OUTCOME, verdicts=verdicts), 5.5)
     assert (moment.time, moment.what) == (5.5, "the end of the test")
@@ -32,5 +37,5 @@ def test_what_no_verdict_explains_ended_the_test(verdicts: tuple[dict[str, Any],
 
 def test_a_hit_has_its_place() -> None:
     evidence = {"time": 3.2, "x": 1.0, "y": 2.0, "obstacle": "left"}
-    moment = decisive(replace(OUTCOME, verdicts=({"reason": "bad", "evidence": evidence},)), 3.0)
+    moment = decisive(replace(OUTCOME, verdicts=({"evaluator": "signal", "evidence": evidence},)), 3.0)
     assert (moment.time, moment.what, moment.x, moment.y) == (3.2, "touched left", 1.0, 2.0)

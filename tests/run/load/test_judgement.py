@@ -12,7 +12,7 @@ CALM = MachineLoad(
     7.5, 2, Wait(1.0, 0.9, 0.7, "perception"), Wait(1.5, 0.5, 0.4, "camera"), 0.61, 7.5, 0.05, 0.05, 0.06
 )
 CROWDED = replace(CALM, application=Wait(1.0, 2.0, 1.9, "perception"))
-FAILED = Finding("failed", "only 43 frames had an answer (at least 50)", "judge", is_timed=True)
+FAILED = Finding("failed", "only 43 frames had an answer (at least 50)", "judge", is_verdict=True)
 
 
 def test_a_failure_on_a_busy_machine_is_an_error() -> None:
@@ -23,7 +23,7 @@ def test_a_failure_on_a_busy_machine_is_an_error() -> None:
         "it found: only 43 frames had an answer (at least 50); "
         "run it with --clock lockstep, or fewer tests at once (-j 1)",
         "judge",
-        is_timed=True,
+        is_verdict=True,
     )
     assert judged.load == replace(CROWDED, undecided=True)
 
@@ -62,7 +62,7 @@ def test_an_emulated_rig_that_stood_still_is_no_rig(load: MachineLoad) -> None:
         "the machine was too busy to judge: the emulated rig could not keep real time and stood still for 0.06 s; it "
     )
     assert judged.load == replace(paused, undecided=True)
-    passed = Finding("passed", "it drove", "judge", is_timed=True)
+    passed = Finding("passed", "it drove", "judge", is_verdict=True)
     assert consider(passed, paused).finding == passed
 
 

@@ -71,7 +71,7 @@ def test_limits(limits: ResourceLimits, name: str, check: tuple[float, str], rea
     (finding,) = found.findings
     assert (finding.result, finding.service) == ("failed", "vision")
     assert finding.reason == f"application service 'vision' {reason}"
-    assert not finding.is_timed, "a busy machine is no excuse"
+    assert not finding.is_verdict, "a busy machine is no excuse"
 
 
 def test_each_service_is_judged() -> None:

@@ -247,3 +247,12 @@ KINDS = st.sampled_from(["verdict", "ready", "lost", "time", "stuck"]) | VALUES
 @pytest.mark.thorough
 def test_any_message_is_read(message: dict[str, Any]) -> None:
     read_line(CLOCK, True, json.dumps(message).encode())
+
+
+def test_what_the_clock_cannot_see_it_leaves_out() -> None:
+    known = {"answers": 48, "period_s": 0.1, "median_s": 0.01, "p95_s": 0.02, "worst_s": 0.03, "slow": 0}
+    said = read_line("dodo-clock", False, json.dumps({"dodo": "response", **known, "uncopied": 2}).encode())
+    assert isinstance(said, Responded)
+    assert (said.response.over, said.response.uncopied, said.response.processor_median_s) == (None, 2, None)
+    for change in ({"answers": 0}, {"slow": 49}, {"worst_s": -1}, {"uncopied": 1.5}):
+        assert read_line("dodo-clock", False, json.dumps({"dodo": "response", **known, **change}).encode()) is None
