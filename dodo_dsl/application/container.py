@@ -181,7 +181,7 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
 
 
 def _volumes_from(c: Container, node: Node) -> Any:
-    named = [(item, *borrowed(c.literal(item))) for item in c.items(node)]
+    named = [(item, *borrowed(word)) for item in c.items(node) if (word := c.literal(item))]
     made = [(c.joined("volumes_from", kind, name, item.span), options) for item, kind, name, options in named]
     return [escaped(name + options) for name, options in made if name] or None
 
@@ -194,7 +194,7 @@ def _networks(c: Container, node: Node) -> Any:
 
 
 def _links(c: Container, node: Node) -> Any:
-    found = [(plain(item), item.span) for item in c.items(node)]
+    found = [(link, item.span) for item in c.items(node) if (link := plain(item))]
     return [link for link, span in found if c.other("links", str(link).partition(":")[0], span)] or None
 
 
@@ -203,8 +203,9 @@ def _depends_on(c: Container, node: Node) -> Any:
     for name, entry in services.items():
         about = source.entries(entry.value)  # nothing of a test is restarted
         own = {key: plain(each.value) for key, each in about.items() if key in ("condition", "required")}
-        condition = own.get("condition")
-        if isinstance(condition, str) and condition not in _CONDITIONS:
+        own = {key: value for key, value in own.items() if value is not None}
+        condition = own.get("condition", _CONDITIONS[0])
+        if condition not in _CONDITIONS:
             message = f"'{condition}' is not a condition of 'depends_on'"
             c.bad(about["condition"].value.span, message, f"known: {', '.join(_CONDITIONS)}")
         if own.get("required") is False:

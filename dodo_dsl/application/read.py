@@ -71,7 +71,11 @@ def read_application(
         return None, found
     root = Path(access.roots[0]) if access.roots else None
     dropped = {name: why for name, entry in services.items() if (why := _why_dropped(plain(entry.value)))}
-    kept = {name: _service(name, entry, files) for name, entry in services.items() if name not in dropped}
+    kept = {
+        name: _service(name, entry, files, paths[0].resolve().parent)
+        for name, entry in services.items()
+        if name not in dropped
+    }
     application = ApplicationSource(
         path=paths[0].resolve(),
         services=kept,
@@ -110,14 +114,13 @@ def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
             yield Diagnostic(Span(str(path)), "application-isolation", message, INSIDE)
 
 
-def _service(name: str, entry: Entry, files: ComposeFiles) -> ComposeService:
+def _service(name: str, entry: Entry, files: ComposeFiles, folder: Path) -> ComposeService:
     node = entry.value
     assert isinstance(node, source.Mapping)
     raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
     node = with_values(node, raw, files.known, files.is_late)
     own = tuple(env_files(node))
-    statements = file_statements(own, files.folder.resolve())
-    return ComposeService(name, node, entry.key, declaration_of(node), own, statements, raw)
+    return ComposeService(name, node, entry.key, declaration_of(node), own, file_statements(own, folder), raw)
 
 
 def _why_dropped(service: dict[str, Any]) -> str:

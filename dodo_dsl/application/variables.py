@@ -145,7 +145,12 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
             if why := owner(name):
                 yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
             elif wrong := next(
-                (end for end, number in zip(ends, numbers, strict=True) if not math.isfinite(number)), None
+                (
+                    e
+                    for e, number in zip(ends, numbers, strict=True)
+                    if not math.isfinite(number) or {*"xo"} & {*e.text}
+                ),
+                None,
             ):
                 yield Diagnostic(wrong.span, _RULE, f"'{wrong.text}' is not a finite decimal number")
             elif low >= high:

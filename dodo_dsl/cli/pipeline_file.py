@@ -42,7 +42,8 @@ def problems(root: Path) -> list[Diagnostic]:
 def _included(file: Mapping) -> Iterator[Included]:
     entry = file.get("include")
     for node in entry.items if isinstance(entry, source.Sequence) else (entry,):
-        given = source.plain(node) if isinstance(node, Mapping) else {}
+        what = source.plain(node) if node is not None else {}
+        given = {"local": what} if isinstance(what, str) else what if isinstance(what, dict) else {}
         found = _TEMPLATE.search(" ".join(str(given.get(key)) for key in ("local", "remote", "file", "component")))
         if node is None or not found:
             continue

@@ -3,6 +3,7 @@
 YAML counts lines and columns, an editor lines and code units.
 """
 
+import bisect
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,7 +60,8 @@ def saved_text(path: Path) -> str:
         return ""
 
 
-_BREAK = re.compile(r"\r\n|[\n\r]")
+_SHOWN, _READ = re.compile(r"\r\n|[\n\r]"), re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+"""The breaks of an editor's lines, and of YAML's."""
 _BOM = "\ufeff"
 
 
@@ -67,8 +69,8 @@ class Lines:
     """The lines of a text, in which a span lies in the line where it begins, as far as the text has it."""
 
     def __init__(self, text: str, codec: PositionCodec) -> None:
-        self._lines = _BREAK.split(text.removeprefix(_BOM))
-        self._codec = codec
+        self._text, self._codec = text.removeprefix(_BOM), codec
+        self._shown, self._read = ([0, *(b.end() for b in each.finditer(self._text))] for each in (_SHOWN, _READ))
 
     def range(self, span: Span) -> Range:
         number, line, start, end = self._place(span)
@@ -80,8 +82,11 @@ class Lines:
         return line[start:end]
 
     def _place(self, span: Span) -> tuple[int, str, int, int]:
-        """Number and text of the line, from 0, and between which characters of it the span is."""
-        number = min(span.line, len(self._lines)) - 1
-        line = self._lines[number]
-        start = min(span.column - 1, len(line)) if number == span.line - 1 else len(line)
+        """Number and text of the editor's line, from 0, and between which characters of it the span is."""
+        ends = [*(start - 1 for start in self._read[1:]), len(self._text)]
+        known = span.line <= len(ends)
+        offset = min(self._read[span.line - 1] + span.column - 1, ends[span.line - 1]) if known else len(self._text)
+        number = bisect.bisect_right(self._shown, offset) - 1
+        line = _SHOWN.split(self._text[self._shown[number] :], maxsplit=1)[0]
+        start = min(offset - self._shown[number], len(line))
         return number, line, start, min(start + span.length, len(line))

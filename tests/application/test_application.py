@@ -314,6 +314,17 @@ def test_what_no_application_sees(document: dict[str, Any], holder: str, root: P
     assert compiled(root, text.replace("FOLDER", "data")).errors == []
 
 
+def test_variables_are_read_beside_the_file_that_a_link_means(root: Path) -> None:
+    """As compose reads them: a bare name would else take what its caller has."""
+    (root / "sub").mkdir()
+    (root / "sub" / "vars.env").write_text("HOME\nOD4SESSION_CID=112\n")
+    (root / "sub" / FILE).write_text(json.dumps({"services": {"a": {"image": "x", "env_file": "vars.env"}}}))
+    (root / FILE).unlink(missing_ok=True)
+    (root / FILE).symlink_to(f"sub/{FILE}")
+    made = compiled(root).services["a"]["environment"]
+    assert made["HOME"] == "" and made["OD4SESSION_CID"] != "112"
+
+
 SANDBOX = {"cpus": 2.5, "memory": "500 MB", "processes": 100, "files": 50, "file-size": "10 MB"}
 
 

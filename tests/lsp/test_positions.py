@@ -10,15 +10,22 @@ from dodo_dsl.lsp.documents import Lines
 
 
 @pytest.mark.parametrize(
-    ("text", "units"), [("a: 🚗\n🚗b: x", 5), ("\ufeffb: x", 3), ("a: 1\r\nb: x", 3), ("a: 1\rb: x", 3)]
+    ("text", "line", "units"),
+    [
+        ("a: 🚗\n🚗b: x", 1, 5),
+        ("\ufeffb: x", 0, 3),
+        ("a: 1\r\nb: x", 1, 3),
+        ("a: 1\rb: x", 1, 3),
+        ("a: ä # \u2028c: y\nb: x", 1, 3),
+    ],
 )
-def test_a_mark_of_yaml_is_where_the_text_is(text: str, units: int) -> None:
+def test_a_mark_of_yaml_is_where_the_text_is(text: str, line: int, units: int) -> None:
     events = yaml.parse(text.removeprefix("\ufeff"), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     mark = next(e.start_mark for e in events if isinstance(e, yaml.ScalarEvent) and e.value == "x")
     lines = Lines(text, PositionCodec("utf-16"))
     span = Span("f", mark.line + 1, mark.column + 1)
     assert lines.text(span) == "x"
-    assert lines.range(span).start == Position(mark.line, units)
+    assert lines.range(span).start == Position(line, units)
 
 
 def test_a_span_ends_with_its_line_or_the_text() -> None:

@@ -27,6 +27,10 @@ _KEYS: Mapping[str, frozenset[str]] = {
 """The format's keys at the top and in the entries of each list, and DoDo's ``sample_time``."""
 
 
+class NoBoxes(InputError):
+    """A truth without a single box."""
+
+
 def plain(label: str) -> str:
     """A class without ``color:`` and blanks around it."""
     return label.strip().removeprefix(PREFIX).strip()
@@ -42,7 +46,7 @@ def read(path: Path, frames: Frames) -> dict[int, list[tuple[str, Area]]]:
         image, category = _known(entry, "image_id", images), _known(entry, "category_id", names)
         boxes[image].append((names[category], _box(entry, images[image])))
     if not any(boxes.values()):
-        raise InputError(path, "no boxes, expected at least one", "$.annotations")
+        raise NoBoxes(path, "no boxes, expected at least one", "$.annotations")
     keys = _keys(images, frames, path)
     return {keys[number]: found for number, found in boxes.items()}
 

@@ -24,7 +24,8 @@ class Moment:
 
 def decisive(outcome: Outcome, duration: float) -> Moment:
     """The evidence of the verdict that became the outcome; without one the end, as what else decides ends a test."""
-    verdict = next((v for v in outcome.verdicts if v.get("evaluator") == outcome.decided_by), None)
+    by = ("evaluator", outcome.decided_by) if outcome.decided_by else ("reason", outcome.reason)  # of earlier versions
+    verdict = next((v for v in outcome.verdicts if v.get(by[0]) == by[1]), None)
     if verdict is None or not isinstance(verdict.get("evidence"), Mapping):
         return Moment(duration, END)
     evidence = verdict["evidence"]
