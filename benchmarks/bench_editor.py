@@ -30,7 +30,7 @@ OWN = ROOT / "build" / "bench" / "node" / "node_modules" / ".bin" / SERVER
 PEER = str(OWN) if OWN.is_file() else shutil.which(SERVER)
 NO_PEER = f"{SERVER} is not installed (scripts/install-bench-tools, with npm)"
 TESTS, ROUNDS, KEYS = 100, 5, 10
-GOAL = Goal(1.0, of="value")
+GOAL = Goal(0.2, of="value")
 OPENED = "sil-closed-straight-1"
 MISTAKE = ("timeout: 60 s", "timeot: 60 s")
 KEY, LATE = "problems after a key", "problems after a key, 95 %"
