@@ -89,9 +89,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', and its file does not say so")
 
 
+FIRST_FAILURE = pytest.StashKey[str]()
+
+
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> None:
+    if call.excinfo and item.get_closest_marker("engine"):
+        item.stash[FIRST_FAILURE] = str(item.repr_failure(call.excinfo))
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("engine") and getattr(item, "execution_count", 1) > 1:
-        assert engine.is_stuck() and engine.start_anew(), "the engine was not stuck: the test itself hung"
+        failure = item.stash.get(FIRST_FAILURE, "")
+        assert engine.is_stuck() and engine.start_anew(), f"the engine was not stuck:\n{failure}"
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -1,7 +1,7 @@
 """A Docker engine that is stuck: it answers, but one of its containers holds a lock for ever.
 
-Engines of some machines do so when many containers start and end at once, whoever starts them. A test that was kept
-waiting by one has another try, with the engine started anew.
+It happened once on a busy machine, after a container's start that never came back; the cause is not known. A test that
+such an engine kept waiting has another try, with the engine started anew, and only then.
 """
 
 import contextlib
