@@ -202,8 +202,8 @@ def _depends_on(c: Container, node: Node) -> Any:
     made, services = {}, source.entries(as_waits(node))
     for name, entry in services.items():
         about = source.entries(entry.value)  # nothing of a test is restarted
-        own = {key: plain(each.value) for key, each in about.items() if key in ("condition", "required")}
-        own = {key: value for key, value in own.items() if value is not None}
+        found = {key: plain(about[key].value) for key in ("condition", "required") if key in about}
+        own = {key: value for key, value in found.items() if value is not None}
         condition = own.get("condition", _CONDITIONS[0])
         if condition not in _CONDITIONS:
             message = f"'{condition}' is not a condition of 'depends_on'"

@@ -16,6 +16,7 @@ from dodo_dsl.application.model import ApplicationSource, ComposeService, enviro
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.opendlv.numbers import number
 from dodo_dsl.source import Entry, Node, Scalar
 from dodo_dsl.spec.vary import Range
 
@@ -144,14 +145,7 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
             low, high, default = numbers = [float(str(end.value)) for end in ends]
             if why := owner(name):
                 yield Diagnostic(entry.key, _RULE, f"'{name}' cannot be tuned: {why}")
-            elif wrong := next(
-                (
-                    e
-                    for e, number in zip(ends, numbers, strict=True)
-                    if not math.isfinite(number) or {*"xo"} & {*e.text}
-                ),
-                None,
-            ):
+            elif wrong := next((end for end in ends if not _is_decimal(end.text)), None):
                 yield Diagnostic(wrong.span, _RULE, f"'{wrong.text}' is not a finite decimal number")
             elif low >= high:
                 message = f"'from' is {ends[0].text}, expected less than 'to', {ends[1].text}"
@@ -164,6 +158,13 @@ def tunable_problems(application: ApplicationSource) -> Iterator[Diagnostic]:
                     f"'{name}' has another range at '{first[0]}', expected the same one: a parameter has one value"
                 )
                 yield Diagnostic(entry.key, _RULE, message)
+
+
+def _is_decimal(text: str) -> bool:
+    try:
+        return math.isfinite(number(text))
+    except ValueError:  # of a hexadecimal one, say
+        return False
 
 
 def _range(name: str, entry: Entry) -> Range:

@@ -71,6 +71,7 @@ class Lines:
     def __init__(self, text: str, codec: PositionCodec) -> None:
         self._text, self._codec = text.removeprefix(_BOM), codec
         self._shown, self._read = ([0, *(b.end() for b in each.finditer(self._text))] for each in (_SHOWN, _READ))
+        self._ends = [*(start - 1 for start in self._read[1:]), len(self._text)]
 
     def range(self, span: Span) -> Range:
         number, line, start, end = self._place(span)
@@ -83,9 +84,9 @@ class Lines:
 
     def _place(self, span: Span) -> tuple[int, str, int, int]:
         """Number and text of the editor's line, from 0, and between which characters of it the span is."""
-        ends = [*(start - 1 for start in self._read[1:]), len(self._text)]
-        known = span.line <= len(ends)
-        offset = min(self._read[span.line - 1] + span.column - 1, ends[span.line - 1]) if known else len(self._text)
+        offset = len(self._text)
+        if span.line <= len(self._read):
+            offset = min(self._read[span.line - 1] + span.column - 1, self._ends[span.line - 1])
         number = bisect.bisect_right(self._shown, offset) - 1
         line = _SHOWN.split(self._text[self._shown[number] :], maxsplit=1)[0]
         start = min(offset - self._shown[number], len(line))

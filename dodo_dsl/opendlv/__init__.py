@@ -15,12 +15,19 @@ if TYPE_CHECKING:
     from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 
 __all__ = ["Envelope", "MessageSet", "Recording", "RecordingWriter", "Session", "SharedMemory", "SharedMemoryError"]
-_MODULES = ("envelope", "message_set", "recording", "recording_writer", "session", "shared_memory", "shared_memory")
+_MODULES = {
+    "Envelope": "envelope",
+    "MessageSet": "message_set",
+    "Recording": "recording",
+    "RecordingWriter": "recording_writer",
+    "Session": "session",
+    "SharedMemory": "shared_memory",
+    "SharedMemoryError": "shared_memory",
+}
 
 
 def __getattr__(name: str) -> Any:
     """Loads what is asked for, and nothing else: DoDo's commands would wait for all of it."""
-    module = dict(zip(__all__, _MODULES, strict=True)).get(name)
-    if module is None:
+    if name not in _MODULES:
         raise AttributeError(f"module '{__name__}' has no '{name}'")
-    return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)

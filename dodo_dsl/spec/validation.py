@@ -88,9 +88,9 @@ def values(node: Node, schema: dict[str, Any]) -> Any:
         return {key: values(entry.value, schema_at(schema, key)) for key, entry in node.entries.items()}
     if isinstance(node, Scalar) and UNIT in schema and node.text not in schema.get(WORDS, ()):
         return float(quantity.convert(node.text, schema[UNIT]))
-    found = plain(node)
-    is_text = isinstance(node, Scalar) and isinstance(found, float) and not math.isfinite(found)
-    return node.text if is_text else found  # type: ignore[union-attr]  # as it is validated
+    if isinstance(node, Scalar) and isinstance(node.value, float) and not math.isfinite(node.value):
+        return node.text  # as which it is validated
+    return plain(node)
 
 
 def _exact(part: dict[str, Any]) -> dict[str, Any]:
