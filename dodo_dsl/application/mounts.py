@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
     from dodo_dsl.application.container import Container
 
-OWN_VOLUMES = ("tmp", "report", "dodo-time")
+OWN_VOLUMES = ("tmp", "report", "dodo-channel", "dodo-time")
 """The names of DoDo's own volumes in a test; an application's volumes of these names get others."""
 COPY = "files-"
 """How the volumes of copies begin, each with a number."""

@@ -104,7 +104,7 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
         plan = named(run.plan)
         if not plan.lockstep and history.is_timed(plan.spec, families[run.test]):
             plan = replace(plan, timed=plan.timed or ("application",))
-        job = Job(plan, folders[run.test], report / plan.slug, families[run.test])
+        job = Job(plan, folders[run.test], report / plan.slug, families[run.test], work=folder)
         first = found.get(plan.slug)
         found[plan.slug] = replace(first, others=(*first.others, job)) if first else job
     return list(found.values()), deployment

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.plan.added_services import CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Application, Flag, Plan, PlannedService
 from dodo_dsl.plan.test_files import SHARED
 
 FILES = "/dodo/files"
 REPORT = "/dodo/report"
+CHANNEL = "/dodo/channel"
 FILES_MOUNT: Mapping[str, Any] = {
     "type": "bind",
     "source": "./files",
@@ -32,6 +34,7 @@ Defaults = Mapping[str, Mapping[str, str]]
 
 _NOTES = {
     "DODO_CLOCK": "Services take the time from dodo-clock, which steps the test, and not from the machine.",
+    CHANNEL_VARIABLE: "Where services meet the clock; the application has no such folder.",
     "DODO_READERS": "How many programs of the application read each frame; it comes when all are waiting.",
     "DODO_SENDERS": "Who alone may send a message, as message=services; with none behind =, nobody.",
     "DODO_WORLD": "The services that get what the application must not hear.",
@@ -98,7 +101,7 @@ def containers(plan: Plan, layer: str, defaults: Defaults = NO_DEFAULTS) -> Laye
     if plan.isolation == "network":
         after.insert(0, ("sandbox", "service_started"))
     messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
-    shared = {**plan.variables, "DODO_ODVD": messages}
+    shared = {**plan.variables, "DODO_ODVD": messages, CHANNEL_VARIABLE: CHANNEL if plan.lockstep else ""}
     found = tuple(
         Container(
             service.name,
@@ -113,7 +116,9 @@ def containers(plan: Plan, layer: str, defaults: Defaults = NO_DEFAULTS) -> Laye
         )
         for service in plan.layer(layer)
     )
-    return Layer(found, tuple(Variable(*each) for each in shared.items() if each[1]), (_tmp(plan),), tuple(after))
+    return Layer(
+        found, tuple(Variable(*each) for each in shared.items() if each[1]), tuple(_common(plan)), tuple(after)
+    )
 
 
 def _written(plan: Plan, service: PlannedService, defaults: Defaults) -> list[Flag]:
@@ -191,13 +196,15 @@ def _shared_mount(name: str) -> Mapping[str, Any]:
     return {**FILES_MOUNT, "source": f"../{SHARED}/{name}", "target": f"/{SHARED}/{name}"}
 
 
-def _tmp(plan: Plan) -> str:
-    return "tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"
+def _common(plan: Plan) -> list[str]:
+    """The volumes of all services."""
+    tmp = "tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"
+    return [tmp, f"dodo-channel:{CHANNEL}"] if plan.lockstep else [tmp]
 
 
 def _volumes(plan: Plan, service: PlannedService) -> tuple[str | Mapping[str, Any], ...]:
     kinds = {flag.kind for flag in service.flags}
-    volumes: list[str | Mapping[str, Any]] = [_tmp(plan)]
+    volumes: list[str | Mapping[str, Any]] = [*_common(plan)]
     if "path" in kinds or plan.messages:
         volumes += [FILES_MOUNT, *(_shared_mount(name) for name in _shared(plan, service))]
     if "report" in kinds:

@@ -18,6 +18,9 @@ POSE = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
 LINES = "dodo-lines"
 """The sender, among a test's services, of what its application prints: the runner, from its own address."""
 
+CHANNEL_VARIABLE = "DODO_CHANNEL"
+"""Environment variable of DoDo's services in lockstep: the folder where they meet the clock."""
+
 
 def group(cid: int) -> Address:
     """The multicast group of a session, with its port."""

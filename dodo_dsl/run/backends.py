@@ -2,9 +2,10 @@
 
 import asyncio
 import contextlib
+import tempfile
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -26,7 +27,7 @@ class Job:
     """A Plan, the folder that it was compiled into, and the folder for its logs and pictures.
 
     ``test`` is the slug that all repetitions of a test share. ``others`` are the same test for other rigs, of which any
-    will do.
+    will do. ``work`` takes what exists only while it runs.
     """
 
     plan: Plan
@@ -34,6 +35,7 @@ class Job:
     report: Path
     test: str = ""
     others: tuple["Job", ...] = ()
+    work: Path = field(default_factory=lambda: Path(tempfile.gettempdir()))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "test", self.test or self.plan.slug)
@@ -123,7 +125,7 @@ class Processes:
         if isolation == "network":
             if self._problem:
                 raise BackendError(self._problem)
-            slot = Slot(plan.cid, descriptors=self._descriptors)
+            slot = Slot(plan.cid, descriptors=self._descriptors, work=job.work)
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, self._fork_server)
             return
         async with (
@@ -133,5 +135,5 @@ class Processes:
             ) as leased,
             attended(plan, leased, say, self._roots, self._session) as descriptors,
         ):
-            slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
+            slot = replace(leased, descriptors=(*descriptors, *self._descriptors), work=job.work)
             yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)

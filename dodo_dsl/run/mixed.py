@@ -282,13 +282,13 @@ class Mixed:
             raise BackendError(NOT_ROOT)
         with self._containers.project(ApplicationContainers, job, say, b"") as containers:
             if plan.isolation == "network":
-                yield self._backend(job, containers, Slot(plan.cid, descriptors=self._descriptors))
+                yield self._backend(job, containers, Slot(plan.cid, descriptors=self._descriptors, work=job.work))
                 return
             async with (
                 host_isolation.host_slot(plan, (plan.cid,), say, keep, alone=True) as leased,
                 attended(plan, leased, say, self._roots) as descriptors,
             ):
-                slot = replace(leased, descriptors=(*descriptors, *self._descriptors))
+                slot = replace(leased, descriptors=(*descriptors, *self._descriptors), work=job.work)
                 yield self._backend(job, containers, slot)
 
     def _backend(self, job: Job, containers: ApplicationContainers, slot: Slot) -> MixedBackend:

@@ -284,7 +284,8 @@ class Drives:
         plans = {plan.slug: plan for plan in made.compiled.suite.plans}
         slugs = {number: test.spec.slug for number, test in tests.items()}
         return {
-            n: Job(plans[slug], folder / slug, self.folder / slug, points[n].spec.slug) for n, slug in slugs.items()
+            n: Job(plans[slug], folder / slug, self.folder / slug, points[n].spec.slug, work=folder)
+            for n, slug in slugs.items()
         }
 
     def _test(self, number: int, point: SearchPoint) -> ResolvedTest:

@@ -68,8 +68,8 @@ class Clock(Protocol):
         """
         ...
 
-    def sent(self, frame: bytes) -> None:
-        """The service has sent this frame."""
+    def sent(self, envelope: Envelope) -> None:
+        """The service has sent this message."""
         ...
 
     def expect(self, time: int) -> None:
@@ -114,7 +114,7 @@ class RealTimeClock:
             number += 1
             number += self._skipped(start + round(number * period), period)
 
-    def sent(self, frame: bytes) -> None:
+    def sent(self, envelope: Envelope) -> None:
         """Nothing to do: time goes on by itself."""
 
     def expect(self, time: int) -> None:

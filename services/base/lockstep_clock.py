@@ -2,7 +2,7 @@
 
 What a service consumes comes inside the step message and nowhere else, and what it produces goes back inside the
 answer, so that no lost or late datagram can change a result (``docs/explanation/lockstep.md``). A picture in shared
-memory is announced when the clock says so and all its readers wait. A service that observes the bus gets each message
+memory is announced when all its readers wait and the clock says so. A service that observes the bus gets each message
 once, in the step that it belongs to.
 
 A recording has marks of the steps. The messages of the test's services are in it as they were sent, ``received`` at 0,
@@ -19,6 +19,7 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Protocol
 
+from dodo_dsl.opendlv.channel import About, Done, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.posix_memory import PosixSegment
@@ -26,7 +27,7 @@ from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import LOCK_PATIENCE, SharedMemory
 from dodo_dsl.opendlv.sysv_memory import Segment
 from services.base.clock import Inbox
-from services.base.clock_link import STEP_DONE, ClockClient, Reply, Step, split
+from services.base.clock_link import ClockClient
 
 _POLL_S = 0.0002
 _LONGEST_POLL_S = 0.002
@@ -208,26 +209,23 @@ class StepMarks:
 
 __all__ = ["EPOCH", "LockstepClock"]
 
-_GOODBYES = 10
 _LINGER_S = 0.05
 
 
 class StepSource(Protocol):
-    """Where steps come from and their answers go, as ClockClient implements it; ``is_over`` when no more will come."""
+    """Where commands come from and answers go, as ClockClient implements it; ``is_over`` when no more will come."""
 
     is_over: bool
 
-    def next_step(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None: ...
-    def answer(self, reply: Reply, on_the_bus: bool = False) -> None: ...
-    def repeat(self) -> None: ...
-    def is_acknowledged(self) -> bool: ...
+    def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | Show | None: ...
+    def answer(self, done: Done) -> None: ...
     def close(self) -> None: ...
 
 
 class LockstepClock:
     """Test time in the clock service's steps; ``name`` is the service's name in the test.
 
-    Steps come from ``source``, by default from the clock service, which has the ``key`` of the test.
+    Steps come from ``source``, by default from the clock service.
     """
 
     relays = True
@@ -238,23 +236,20 @@ class LockstepClock:
         name: str,
         readers: int,
         source: StepSource | None = None,
-        key: bytes = b"",
         is_virtual: bool = False,
     ) -> None:
-        """With ``is_virtual`` the application's own time is the test's: frames are shown when they are due."""
-        self._session, self._name = session, name
-        self._step_done = session.messages.type(STEP_DONE)
-        self._client: StepSource = source or ClockClient(session, name, key)
+        """With ``is_virtual`` the application's own time is the test's."""
+        self._name = name
+        self._source: StepSource = source or ClockClient(session, name)
         self._now = EPOCH - 1
-        self._number = -1
         self._open = False
-        self._sent: list[bytes] = []
+        self._sent: list[Envelope] = []
         self._announcer = Announcer(readers)
         self._observer = Observer(StepMarks(session.messages).of)
         self._next = 0
-        self._consumed = ""
+        self._address = session.address
+        self._about: About | None = None
         self.is_virtual = is_virtual
-        self._has_shown = False
 
     def now(self) -> int:
         return self._now
@@ -265,18 +260,23 @@ class LockstepClock:
 
     def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         """As ``Clock.steps``; messages are delivered in the order of their sample times."""
-        self._consumed = "" if inbox.observes else ",".join(map(str, sorted(inbox.consumes)))
+        consumes = [] if inbox.observes else sorted(inbox.consumes)
+        self._about = About(self._address, len(self._announcer.memories), consumes)
         yield from self._steps(period, inbox, stopped)
         if inbox.observes:
             self._observer.flush(inbox)
 
     def _steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         number, due = 0, EPOCH
-        while (step := self._next_step(inbox, stopped)) is not None:
+        while (command := self._command(inbox, stopped)) is not None:
+            if isinstance(command, Show):
+                if not self._show(command, stopped):
+                    return
+                continue
             if inbox.observes:
-                self._observer.deliver(inbox, step.time, step.messages)
-            messages = in_order(step.messages)
-            while due <= step.time:
+                self._observer.deliver(inbox, command.time, command.messages)
+            messages = in_order(command.messages)
+            while due <= command.time:
                 while messages and messages[0][0] <= due:
                     self._hand(messages.popleft()[1], inbox)
                 if stopped():
@@ -285,12 +285,21 @@ class LockstepClock:
                 yield due
                 number += 1
                 due = EPOCH + round(number * period)
-            self._now = step.time
+            self._now = command.time
             for _, envelope in messages:
                 self._hand(envelope, inbox)
-            if stopped() or (step.show and self._waits and not self._announcer.await_readers(stopped)):
+            if stopped():
                 return
-            self._answer(step.show)
+            self._answer()
+
+    def _show(self, command: Show, stopped: Callable[[], bool]) -> bool:
+        """False when ``stopped`` before."""
+        if command.awaits and not self._announcer.await_readers(stopped):
+            return False
+        if command.announces:
+            self._announcer.announce()
+        self._answer()
+        return True
 
     def _hand(self, envelope: Envelope, inbox: Inbox) -> None:
         """Where the application's time is the test's, the service learns when it was sent."""
@@ -299,14 +308,9 @@ class LockstepClock:
         inbox.handle(envelope)
         self._now = now
 
-    @property
-    def _waits(self) -> bool:
-        """Whether a picture waits for its readers: the first one does in any case."""
-        return not (self.is_virtual and self._has_shown)
-
-    def sent(self, frame: bytes) -> None:
-        """The service has sent this frame."""
-        self._sent.append(frame)
+    def sent(self, envelope: Envelope) -> None:
+        """The service has sent this message."""
+        self._sent.append(envelope)
 
     def expect(self, time: int) -> None:
         """The test may go on to this time in one step."""
@@ -319,60 +323,29 @@ class LockstepClock:
         return memory
 
     def close(self, stopped: Callable[[], bool]) -> None:
-        """The service ends: answer the open step, and wait until the clock has the answer.
+        """The service ends: answer the open step.
 
         Its memories stay until the test is over, as removing them would show the last picture once more.
         """
         if self._open:
-            self._open = False
-            self._client.answer(self._reply(ended=True))
-            for _ in range(_GOODBYES):
-                if self._client.is_acknowledged():
-                    break
-                self._client.repeat()
-        self._client.close()
+            self._answer(ended=True)
+        self._source.close()
         while self._announcer.memories and not stopped():
             time.sleep(_LINGER_S)
 
-    def _next_step(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | None:
-        """The next step that is for this service; None when it is to stop."""
-        while not (stopped() or self._client.is_over):
-            step = self._client.next_step(inbox.observes, self._observer.collect)
-            if step is not None:
-                self._number, self._open = step.number, True
-                return step
+    def _command(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | Show | None:
+        """The next command; None when the service is to stop."""
+        while not (stopped() or self._source.is_over):
+            if command := self._source.next(inbox.observes, self._observer.collect):
+                self._open = True
+                return command
         return None
 
-    def _answer(self, show: bool) -> None:
-        """A picture is announced after the answer, so that its readers' messages come after that, too.
-
-        Where the application's time is the test's, it must not go on before the picture is there.
-        """
-        self._open = False
-        if show and self.is_virtual:
-            self._announcer.announce()
-            self._has_shown = True
-        self._client.answer(self._reply(ended=False), on_the_bus=show and not self.is_virtual)
-        if show and not self.is_virtual:
-            self._announcer.announce()
-
-    def _reply(self, ended: bool) -> Reply:
-        parts = split(self._sent)
-        self._sent = []
-        facts = {
-            "number": self._number,
-            "service": self._name,
-            "parts": len(parts),
-            "memories": len(self._announcer.memories),
-            "pictures": len(self._announcer.new),
-            "sampled": self._announcer.sampled,
-            "ended": ended,
-            "next": self._next,
-            "port": self._session.port,
-            "hears": self._consumed,
-        }
-        self._consumed = ""
-        return [self._step_done(part=part, frames=data, **facts) for part, data in enumerate(parts)]
+    def _answer(self, ended: bool = False) -> None:
+        sent, about, announcer = self._sent, self._about, self._announcer
+        self._sent, self._about, self._open = [], None, False
+        pictures = len(announcer.new)
+        self._source.answer(Done(self._name, sent, pictures, announcer.sampled, self._next, ended, about))
 
 
 def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:

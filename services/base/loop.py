@@ -15,7 +15,7 @@ from fractions import Fraction
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageError, decode
 from dodo_dsl.opendlv.protobuf_classes import Layout
 from dodo_dsl.opendlv.session import Session, SessionError
@@ -262,18 +262,18 @@ class Loop:
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         envelope = output if isinstance(output, Envelope) else self._envelope(output, now)
-        self.clock.sent(self._publish(envelope))
+        self._publish(envelope)
+        self.clock.sent(envelope)
 
-    def _publish(self, envelope: Envelope) -> bytes:
-        """Send an envelope, and return its frame: on the bus, or where the application is not."""
-        if self._world.holds(envelope):
-            if self.clock.relays:
-                return encode_frame(envelope)
-            if self.members is None:
-                name = self.session.messages.name(envelope.data_type)
-                raise SessionError(f"'{name}' must not come to the bus, and the services that get it are not known")
-            return self.members.send(envelope)
-        return self.session.send_envelope(envelope)
+    def _publish(self, envelope: Envelope) -> None:
+        """Send an envelope on the bus, or where the application is not."""
+        if not self._world.holds(envelope):
+            self.session.send_envelope(envelope)
+        elif self.members is not None:
+            self.members.send(envelope)
+        elif not self.clock.relays:
+            name = self.session.messages.name(envelope.data_type)
+            raise SessionError(f"'{name}' must not come to the bus, and the services that get it are not known")
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:
         message, stamp, sampled = output if isinstance(output, Output) else Output(output, self.sender_stamp)

@@ -278,21 +278,22 @@ class Members:
         if self._session.source not in self._known if producers is None else LINES in producers.services:
             self._table.check_numbers(message, envelope.sender_stamp, [self._name], elapsed)
 
-    def send(self, envelope: Envelope) -> bytes:
-        """Send a message of the world to the test's services alone, and return its frame.
+    def send(self, envelope: Envelope) -> None:
+        """Send a message of the world to the test's services alone.
 
         From the start of the test on, what a service of the deployment consumes that does not say where it listens
         comes to the bus.
         """
         silent = [name for name in self._world.awaited_by(envelope) if name not in self._addresses]
         if not silent or self._silent_from is None or time.monotonic() < self._silent_from:
-            return self._session.send_directly(envelope, self._others)
+            self._session.send_directly(envelope, self._others)
+            return
         if envelope.data_type not in self._overheard:
             self._overheard.add(envelope.data_type)
             why = f"'{silent[0]}' does not use DoDo's base for services"
             text = f"the application can hear {self._world.names[envelope.data_type]}, as service {why}"
             print(json.dumps({"dodo": "note", "text": text}), flush=True)
-        return self._session.send_envelope(envelope)
+        self._session.send_envelope(envelope)
 
     def begin(self) -> None:
         """The test begins: all of its services are ready, and have said their addresses if they ever do."""

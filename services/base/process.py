@@ -185,7 +185,9 @@ def _serve(
             world = World.load(session.messages)
             resources.enter_context(published(session, flags["log-id"]))
             key = take_key()
-            clock = clock or _clock(session, role, key)
+            if clock is None:
+                with interruptible():  # it waits for the clock service
+                    clock = _clock(session, role)
             on_rig = bool(os.environ.get("DODO_RIG"))
             service = build(Context(name, flags, session.messages, resources, clock, session, key, on_rig))
             code = BROKEN
@@ -244,7 +246,7 @@ def _session(cid: int, messages: MessageSet) -> Session:
     return SilentSession(cid, messages)
 
 
-def _clock(session: Session, role: str, key: bytes) -> Clock:
+def _clock(session: Session, role: str) -> Clock:
     """The test's clock, by ``DODO_CLOCK``."""
     if (recording := _recording()) is not None:
         from services.base.recorded_clock import clock_of
@@ -254,13 +256,8 @@ def _clock(session: Session, role: str, key: bytes) -> Clock:
         return RealTimeClock()
     from services.base.lockstep_clock import LockstepClock
 
-    return LockstepClock(
-        session,
-        role,
-        int(os.environ.get("DODO_READERS") or 1),
-        key=key,
-        is_virtual=os.environ["DODO_CLOCK"] == "virtual",
-    )
+    is_virtual = os.environ["DODO_CLOCK"] == "virtual"
+    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1), is_virtual=is_virtual)
 
 
 @contextmanager

@@ -9,16 +9,14 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from google.protobuf.message import Message
-
 from dodo_dsl.opendlv.address import Address
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.channel import Done, Step
+from dodo_dsl.opendlv.envelope import HEADER_BYTES, Envelope, body_length, decode_frame, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base.clock import Clock, Inbox
-from services.base.clock_link import Step, decode
 from services.base.evaluator import UnjudgeableError
 from services.base.lockstep_clock import RECORDED_STEP, RECORDING_END, LockstepClock
 
@@ -38,30 +36,20 @@ class RecordedSteps:
 
     def __init__(self, path: Path, messages: MessageSet) -> None:
         self._steps: Iterator[RecordedStep] = read_steps(path, messages)
-        self._number = 0
         self._sent: Counter[Envelope] = Counter()
         self.is_over = False
 
-    def next_step(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None:
+    def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | None:
         """The next step; None at the end of the recording."""
         step = next(self._steps, None)
         if step is None:
             self.is_over = True
             return None
-        self._number += 1
-        return Step(self._number, step.time, False, [each for each in step.messages if not self._is_own(each)])
+        return Step(step.time, [each for each in step.messages if not self._is_own(each)])
 
-    def answer(self, reply: list[Message], on_the_bus: bool = False) -> None:
+    def answer(self, done: Done) -> None:
         """The service has finished a step."""
-        parts: list[Any] = list(reply)
-        self._sent.update(_key(each.envelope) for each in decode(b"".join(part.frames for part in parts)))
-
-    def repeat(self) -> None:
-        """Nobody asks again."""
-
-    def is_acknowledged(self) -> bool:
-        """Nobody has to acknowledge."""
-        return True
+        self._sent.update(map(_key, done.messages))
 
     def close(self) -> None:
         """Nothing is open."""
@@ -92,11 +80,18 @@ def read_steps(path: Path, messages: MessageSet) -> Iterator[RecordedStep]:
                         f"the recording {lacks}: it was paused, reached its largest size, or is damaged"
                     )
                 step, number = RecordedStep(mark.time, []), mark.number
-            step.messages.extend(each.envelope for each in decode(mark.frames))
+            step.messages.extend(_decoded(mark.frames))
         elif number and envelope.data_type != end_id:
             step.messages.append(envelope)
     if number:
         yield step
+
+
+def _decoded(frames: bytes) -> Iterator[Envelope]:
+    """The envelopes of frames that follow one another; raises FrameError."""
+    while frames:
+        yield decode_frame(frames)
+        frames = frames[HEADER_BYTES + body_length(frames) :]
 
 
 def _key(envelope: Envelope) -> Envelope:
@@ -138,7 +133,7 @@ class RecordingClock:
             if stopped():
                 return
 
-    def sent(self, frame: bytes) -> None:
+    def sent(self, envelope: Envelope) -> None:
         """It goes nowhere."""
 
     def expect(self, time: int) -> None:

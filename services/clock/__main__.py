@@ -4,9 +4,9 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from services.base import Context, Service, run
+from services.base import Context, RealTimeClock, Service, run
 from services.base.clock import MICROSECONDS
-from services.base.clock_link import ClockChannel
+from services.base.clock_link import socket_path
 from services.base.flags import Flags
 from services.base.members import SenderTable
 from services.base.service import period_of
@@ -30,12 +30,10 @@ def build(context: Context) -> Service:
     senders = SenderTable.load(context.messages, context.key)
     answering = (each.data_type for each in answers.filters)
     context.session.hear_only([*answering, *senders.ids, *(ids[name] for name in CONSUMED)])
-    channel = ClockChannel(context.session.cid, context.messages, context.key)
-    context.resources.callback(channel.close)
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])
     timing = Timing(period_of(flags["freq"]), timeout, patience, flags["max-response"])
-    return ClockService(context.session, channel, roles, answers, timing, senders, own_time)
+    return ClockService(context.session, socket_path(), roles, answers, timing, senders, own_time)
 
 
 def _answers(flags: Flags, ids: Mapping[str, int]) -> Answers:
@@ -44,4 +42,4 @@ def _answers(flags: Flags, ids: Mapping[str, int]) -> Answers:
 
 
 if __name__ == "__main__":
-    sys.exit(run(Path(__file__).parent, build))
+    sys.exit(run(Path(__file__).parent, build, clock=RealTimeClock()))

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
-from services.base.clock_link import EncodedEnvelope
 from services.base.loop import others
 from services.clock.answers import MOST_SURPLUS, Answers
 from services.clock.exchange import (
@@ -22,8 +22,6 @@ from services.clock.exchange import (
     IsStopped,
     Patience,
     ServiceLink,
-    StepCommand,
-    StepResult,
 )
 from services.clock.processor_time import NOTHING, ApplicationProcesses, Spent, contention_s, own_wait_s
 
@@ -136,7 +134,7 @@ class SteppedApplication:
         self._pause_after, self._answered = _FIRST_PAUSE, 0.0
         self._gaps: list[float] = []
         """Times in s from one answer to the next."""
-        self._first: list[EncodedEnvelope] = []
+        self._first: list[Envelope] = []
         self._reading: set[str] = set()
         """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
 
@@ -149,12 +147,12 @@ class SteppedApplication:
         self.answers.expect([now])
         self.answers.seen()
 
-    def remember(self, messages: Iterable[EncodedEnvelope]) -> None:
+    def remember(self, messages: Iterable[Envelope]) -> None:
         """Services have sent this; before the first picture the application may not be there yet."""
         if not self.frames:
             self._first.extend(messages)
 
-    def show(self, shown: Sequence[StepResult], now: int) -> None:
+    def show(self, shown: Sequence[Done], now: int) -> None:
         """Announce new pictures as soon as readers wait for them; raises ApplicationSilent and ApplicationFloods."""
         self.frames += 1
         self._began, self._before, self._own_before = time.monotonic(), self.processes.snapshot(), own_wait_s()
@@ -163,20 +161,22 @@ class SteppedApplication:
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
         for camera in shown:
-            self._link.send([StepCommand(camera.service, now, (), show=True)])
+            self._link.send(camera.service, Show(awaits=True, announces=False))
             while self._link.result(camera.service) is None:
                 if self._stopped():
                     return
                 if self._left <= 0:
-                    self._link.clear()
                     raise ApplicationSilent(self._sentence(f"no reader waited for a picture of '{camera.service}'"))
-                self._link.pump(SLICE_S)
+                self._link.pump(SLICE_S, [camera.service])
                 self._check_flood()
                 again = self._repeat_first(again)
+            self._link.drain()  # what the application has sent before it can see the picture
             self.answers.seen()
+            self._link.send(camera.service, Show(awaits=False, announces=True))
         if not self.answers.is_expected:
             self._reading = {camera.service for camera in shown}
-            self._link.send([StepCommand(camera.service, now, (), show=True) for camera in shown])
+            for camera in shown:
+                self._link.send(camera.service, Show(awaits=True, announces=False))
         self._shown, self._own_wait = time.monotonic(), own_wait_s()
 
     def await_answer(self, until: int = 0) -> None:
@@ -188,7 +188,7 @@ class SteppedApplication:
             if self._left <= 0:
                 where = f"; the test is on CID {self._cid}" if self._cid and self.answers.is_silent else ""
                 raise ApplicationSilent(f"{self._sentence(self._missing)}{where}")
-            self._link.pump(self._left)
+            self._link.pump(self._left, self._reading)
             self._check_flood()
         before, self._answered = self._answered, time.monotonic()
         spent = self._answered - self._began

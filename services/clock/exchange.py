@@ -1,122 +1,95 @@
-"""Commands of the clock to the services of a test: repeated until each is answered; and how a test can end.
+"""Commands of the clock to the services of a test, and how a test can end.
 
-Commands and results go over the bus and past it.
+They and their results go over the channel; the application's messages come on the bus.
 """
 
 import select
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple, Protocol
+from pathlib import Path
+from typing import Protocol
 
 from dodo_dsl.opendlv.address import LINES, Address
-from dodo_dsl.opendlv.envelope import Envelope, FrameError
-from dodo_dsl.opendlv.message_set import MessageError
-from dodo_dsl.opendlv.numbers import is_whole, whole
+from dodo_dsl.opendlv.channel import Channel, Done, Listener, Show, Step
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
-from services.base.clock_link import STEP, STEP_DONE, ClockChannel, EncodedEnvelope, Reassembly, decode, split
 from services.base.members import SENDER, SenderTable, World
-
-REPEAT_S = 0.2
-_SLICE = 0.05
-_BURST = 2
-
-
-class StepCommand(NamedTuple):
-    """What a service has to do: go on to ``time`` (us) with these messages, or show its new pictures."""
-
-    service: str
-    time: int
-    messages: tuple[EncodedEnvelope, ...] = ()
-    show: bool = False
-
-
-class StepResult(NamedTuple):
-    """A service's step: what it sent, its number of memories and new pictures, and when these were sampled."""
-
-    service: str
-    sent: tuple[EncodedEnvelope, ...] = ()
-    memories: int = 0
-    pictures: int = 0
-    sampled: int = 0
-    ended: bool = False
-    next: int = 0
-    consumes: frozenset[int] = frozenset()
-    """Ids of the messages that it handles; empty where unknown."""
-
-
-@dataclass
-class _Pending:
-    """A command that is not answered yet."""
-
-    number: int
-    messages: list[Any]
-    repeat: float = 0.0
 
 
 class Exchange:
-    """Commands the services; messages of all others on the bus go to ``take``, if ``senders`` let them send those."""
+    """Commands the ``services``; messages of all others on the bus go to ``take``, if ``senders`` let them send those.
+
+    It listens at ``path`` until all services have connected.
+    """
 
     def __init__(
         self,
         session: Session,
-        channel: ClockChannel,
+        path: Path,
+        services: Iterable[str],
         take: Callable[[Envelope], None],
         senders: SenderTable | None = None,
     ) -> None:
-        self._session, self._channel, self._take_other = session, channel, take
+        """Raises OSError."""
+        self._session, self._take_other = session, take
         self._senders = senders or SenderTable(session.messages)
         self._world = World.load(session.messages)
-        self._step = session.messages.type(STEP)
-        self._step_id, self._done_id = session.messages.id(STEP), session.messages.id(STEP_DONE)
         self._sender_id = session.messages.id(SENDER)
         self._printing: Address | None = None
         """From where the runner sends what the application prints; the first one that proves it."""
-        self._number = 0
-        self._pending: dict[str, _Pending] = {}
-        self._results: dict[str, StepResult] = {}
-        self._reassembly: dict[str, Reassembly] = {}
-        self._addresses: dict[str, Address] = {}
+        self._listener = Listener(path, {*services})
+        self._channels: dict[str, Channel] = {}
+        self._unsent: dict[str, Step | Show] = {}
+        self._expected: dict[str, int] = {}
+        """How many results of each service are to come, of which the last counts."""
         self._own: set[Address] = set()
-        self._channel_poll, self._poll = select.poll(), select.poll()
-        for poll in (self._channel_poll, self._poll):
-            poll.register(channel, select.POLLIN)
-        self._poll.register(session, select.POLLIN)
 
-    def send(self, commands: Iterable[StepCommand]) -> None:
-        """Send commands; ``pump`` repeats them."""
-        for command in commands:
-            self._number += 1
-            self._pending[command.service] = _Pending(self._number, self._messages(command))
-        self._repeat()
+    def send(self, service: str, command: Step | Show) -> None:
+        """Command a service, as soon as it has connected."""
+        self._expected[service] = self._expected.get(service, 0) + 1
+        if service in self._channels:
+            self._channels[service].send(command)
+        else:
+            self._unsent[service] = command
 
-    def result(self, service: str) -> StepResult | None:
-        """A service's answer to its command, once."""
-        return self._results.pop(service, None)
+    def result(self, service: str, timeout: float = 0.0) -> Done | None:
+        """A service's answer to its last command within ``timeout`` seconds, once."""
+        if self._listener.is_open:
+            self._accept(0.0 if service in self._channels else timeout)
+        if service not in self._channels:
+            time.sleep(0.0 if self._listener.is_open else timeout)
+            return None
+        try:
+            done = self._channels[service].receive(timeout)
+        except EOFError:  # the runner says why it has ended
+            del self._channels[service]
+            return None
+        if not isinstance(done, Done):
+            return None
+        self._expected[service] -= 1
+        if done.about is not None:
+            self._own.add(done.about.address)
+        return done if not self._expected[service] else self.result(service, timeout)
 
-    def clear(self) -> None:
-        """Stop repeating commands."""
-        self._pending.clear()
+    def _accept(self, timeout: float) -> None:
+        for name, channel in self._listener.accept(timeout).items():
+            self._channels[name] = channel
+            if name in self._unsent:
+                channel.send(self._unsent.pop(name))
 
-    def pump(self, timeout: float, bus: bool = True) -> None:
-        """Take what comes within ``timeout`` seconds on the channel, and on the ``bus``.
+    def pump(self, timeout: float, services: Collection[str] = ()) -> None:
+        """Take the next message of the bus, unless one of the ``services`` answers before, within ``timeout`` s."""
+        if not self._take_from_bus():
+            channels = [self._channels[name].fileno() for name in services if name in self._channels]
+            select.select([self._session.fileno(), *channels], [], [], max(0.0, min(timeout, SLICE_S)))
 
-        Of the bus it takes one message only, as the order of results and the application's messages counts.
-        """
-        received = self._channel.receive()
-        if received is not None:
-            self._take(*received)
-        elif not (bus and self._take_from_bus()):
-            poll = self._poll if bus else self._channel_poll
-            if not poll.poll(max(0.0, min(timeout, _SLICE)) * 1000):
-                self._repeat()
-
-    def repeat_on_bus(self, messages: Iterable[EncodedEnvelope]) -> None:
+    def repeat_on_bus(self, messages: Iterable[Envelope]) -> None:
         """Send messages of services on the bus again, but for those that are not for the application."""
-        for each in messages:
-            if not self._world.holds(each.envelope):
-                self._session.send_envelope(each.envelope)
+        for envelope in messages:
+            if not self._world.holds(envelope):
+                self._session.send_envelope(envelope)
 
     def drain(self) -> None:
         """Take everything that is on the bus already."""
@@ -132,13 +105,7 @@ class Exchange:
 
     def hear(self, envelope: Envelope, source: Address) -> None:
         """Take a message from the bus; the addresses of all services are known."""
-        if envelope.data_type in (self._step_id, self._done_id):
-            if not self._channel.believes(envelope):
-                name = STEP if envelope.data_type == self._step_id else STEP_DONE
-                self._senders.report(f"the application sent {name}, which only services of the test may send")
-            elif envelope.data_type == self._done_id:
-                self._take(envelope, None)
-        elif envelope.data_type == self._sender_id:
+        if envelope.data_type == self._sender_id:
             if self._printing is None and self._senders.is_of(LINES, envelope, source):
                 self._printing = source
         elif source not in self._own and self._senders.is_of_runner(envelope):
@@ -150,47 +117,13 @@ class Exchange:
 
     def ignore_services(self, ids: Iterable[int]) -> None:
         """Not be woken by messages with these ids that services send on the bus: all of them are known now."""
-        self._session.hear_only((self._step_id, self._done_id), ids, self._own)
+        self._session.hear_only((), ids, self._own)
 
-    def _repeat(self) -> None:
-        """Each time begins with other parts, as a receive buffer may hold only a few of them."""
-        now = time.monotonic()
-        for name, pending in self._pending.items():
-            if now >= pending.repeat:
-                pending.repeat = now + REPEAT_S
-                for message in pending.messages:
-                    self._channel.send(message, self._addresses.get(name))
-                pending.messages = [*pending.messages[_BURST:], *pending.messages[:_BURST]]
-
-    def _messages(self, command: StepCommand) -> list[Any]:
-        parts = split(encoded.frame for encoded in command.messages)
-        facts = {"number": self._number, "service": command.service, "time": command.time, "show": command.show}
-        return [self._step(part=part, parts=len(parts), frames=data, **facts) for part, data in enumerate(parts)]
-
-    def _take(self, envelope: Envelope, address: Address | None) -> None:
-        """Part of a result; those of a service that ends are acknowledged, because it waits for that."""
-        if envelope.data_type != self._done_id:
-            return
-        try:
-            done: Any = self._session.messages.decode(envelope.data_type, envelope.payload)
-            if done.ended and address is not None:
-                self._channel.send(self._step(number=done.number, service=done.service), address)
-            pending = self._pending.get(done.service)
-            if pending is None or pending.number != done.number:
-                return
-            if address is not None:
-                self._addresses.setdefault(done.service, address)  # a repeated answer is not the service's
-                self._own.add((address[0], done.port))
-            data = self._reassembly.setdefault(done.service, Reassembly()).take(
-                done.number, done.part, done.parts, done.frames
-            )
-            if data is not None:
-                consumes = frozenset(whole(word) for word in done.hears.split(",") if is_whole(word))
-                facts = (done.memories, done.pictures, done.sampled, done.ended, done.next, consumes)
-                self._results[done.service] = StepResult(done.service, tuple(decode(data)), *facts)
-                del self._pending[done.service]
-        except (FrameError, MessageError):
-            return  # not from a service of this test
+    def close(self) -> None:
+        """Close the connections of all services."""
+        self._listener.close()
+        for channel in self._channels.values():
+            channel.close()
 
 
 SLICE_S = 0.05
@@ -230,11 +163,10 @@ class TimeOver(TestEnded):
 class ServiceLink(Protocol):
     """Commands to the services and their results, as Exchange implements it."""
 
-    def send(self, commands: Iterable[StepCommand]) -> None: ...
-    def result(self, service: str) -> StepResult | None: ...
-    def clear(self) -> None: ...
-    def pump(self, timeout: float, bus: bool = True) -> None: ...
-    def repeat_on_bus(self, messages: Iterable[EncodedEnvelope]) -> None: ...
+    def send(self, service: str, command: Step | Show) -> None: ...
+    def result(self, service: str, timeout: float = 0.0) -> Done | None: ...
+    def pump(self, timeout: float, services: Collection[str] = ()) -> None: ...
+    def repeat_on_bus(self, messages: Iterable[Envelope]) -> None: ...
     def drain(self) -> None: ...
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Protocol
 
+from dodo_dsl.opendlv.channel import Done, Step
 from dodo_dsl.opendlv.envelope import Envelope
-from services.base.clock_link import EncodedEnvelope, encode
 from services.base.lockstep_clock import EPOCH
 from services.clock.exchange import (
     SLICE_S,
@@ -17,8 +17,6 @@ from services.clock.exchange import (
     Roles,
     ServiceLink,
     ServiceSilent,
-    StepCommand,
-    StepResult,
     TimeOver,
 )
 
@@ -45,8 +43,8 @@ class Application(Protocol):
     def begin(self, now: int) -> None: ...
     def pause(self) -> None: ...
     def expect_at(self, now: int) -> None: ...
-    def remember(self, messages: Iterable[EncodedEnvelope]) -> None: ...
-    def show(self, shown: Sequence[StepResult], now: int) -> None: ...
+    def remember(self, messages: Iterable[Envelope]) -> None: ...
+    def show(self, shown: Sequence[Done], now: int) -> None: ...
     def await_answer(self, until: int) -> None: ...
     def collect(self) -> list[Envelope]: ...
 
@@ -71,7 +69,7 @@ class Stepper:
     _judging: list[str] = field(default_factory=list)
     _watching: list[str] = field(default_factory=list)
     _judging_at: int = EPOCH
-    _backlog: dict[str, list[EncodedEnvelope]] = field(default_factory=dict)
+    _backlog: dict[str, list[Envelope]] = field(default_factory=dict)
     _consumed: dict[str, frozenset[int]] = field(default_factory=dict)
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
@@ -95,12 +93,12 @@ class Stepper:
     def connect(self) -> None:
         """Find all services and what they consume, before time begins; raises ServiceSilent."""
         results = self._go(self.roles.all, EPOCH - 1)
-        self._memories = sum(result.memories for result in results)
-        self._consumed = {result.service: result.consumes for result in results if result.consumes}
+        self._memories = sum(result.about.memories for result in results if result.about)
+        self._consumed = {r.service: frozenset(r.about.consumes) for r in results if r.about and r.about.consumes}
 
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
-        self._deliver([encode(begin)], "")
+        self._deliver([begin], "")
         self.application.begin(self.now)
         while not self.stopped():
             self.application.pause()
@@ -121,7 +119,7 @@ class Stepper:
                 self._watch()
             if self.now - EPOCH >= self.timeout and not self._is_over():
                 raise TimeOver
-            self._deliver([encode(envelope) for envelope in self.application.collect()], "")
+            self._deliver(self.application.collect(), "")
             self._go_on()
 
     def _judge(self) -> None:
@@ -155,53 +153,49 @@ class Stepper:
             self.reached = self._judging_at
         return set(self.roles.judge) <= self._ended
 
-    def _go_each(self, names: Sequence[str]) -> list[StepResult]:
+    def _go_each(self, names: Sequence[str]) -> list[Done]:
         """Let services go on to this step, one after the other; raises ServiceSilent."""
         return [result for name in names for result in self._go((name,), self.now)]
 
-    def _go(self, names: Sequence[str], until: int) -> list[StepResult]:
+    def _go(self, names: Sequence[str], until: int) -> list[Done]:
         """Let services go on to a time (us); raises ServiceSilent."""
         running = [name for name in names if name not in self._ended]
         self._send(running, until)
         return self._await(running)
 
     def _send(self, names: Sequence[str], until: int) -> None:
-        self.link.send([StepCommand(name, until, self._undelivered(name)) for name in names])
+        for name in names:
+            messages, self._backlog[name] = self._backlog[name], []
+            self.link.send(name, Step(until, messages))
 
-    def _await(self, names: Sequence[str]) -> list[StepResult]:
-        results: list[StepResult] = []
+    def _await(self, names: Sequence[str]) -> list[Done]:
+        results: list[Done] = []
         began = time.monotonic()
         for name in names:
             patience = SERVICE_PATIENCE * (FIRST_TIMES if self.waits_for_start and name not in self._next else 1)
-            while (result := self.link.result(name)) is None:
+            while (result := self.link.result(name, SLICE_S)) is None:
                 if self.stopped():
                     return results
                 if time.monotonic() - began > patience:
                     raise ServiceSilent(f"service '{name}' did not answer the clock within {patience:g} s")
-                self.link.pump(SLICE_S, bus=False)
             self._take(result)
             results.append(result)
         self._spent[" and ".join(names)] += time.monotonic() - began
         return results
 
-    def _take(self, result: StepResult) -> None:
-        self.application.remember(result.sent)
-        self._deliver(result.sent, result.service)
+    def _take(self, result: Done) -> None:
+        self.application.remember(result.messages)
+        self._deliver(result.messages, result.service)
         self._next[result.service] = result.next
         if result.ended:
             self._ended.add(result.service)
 
-    def _undelivered(self, name: str) -> tuple[EncodedEnvelope, ...]:
-        """Messages that a service has not got yet."""
-        messages, self._backlog[name] = self._backlog[name], []
-        return tuple(messages)
-
-    def _deliver(self, messages: Sequence[EncodedEnvelope], sender: str) -> None:
+    def _deliver(self, messages: Sequence[Envelope], sender: str) -> None:
         """Give messages of one service to the others with their next step."""
         for name, backlog in self._backlog.items():
             if name != sender and name not in self._ended:
                 consumed = self._consumed.get(name)
-                backlog.extend(m for m in messages if consumed is None or m.envelope.data_type in consumed)
+                backlog.extend(m for m in messages if consumed is None or m.data_type in consumed)
 
     def _following(self) -> Fraction:
         """The time of the next step: a period later, or the earliest that a source announced."""

@@ -5,7 +5,8 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from dodo_dsl.opendlv.address import Address
@@ -14,7 +15,6 @@ from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
-from services.base.clock_link import ClockChannel
 from services.base.lockstep_clock import EPOCH
 from services.base.members import SENDER, SenderTable
 from services.base.service import Service
@@ -32,7 +32,7 @@ A short test needs them closer, because what was measured by the wall clock is p
 """
 _SLICE = 0.05
 _MOST_EARLY = 1000
-CONSUMED = ("dodo.TestBegin", "dodo.Step", "dodo.StepDone", SENDER)
+CONSUMED = ("dodo.TestBegin", SENDER)
 """What the clock consumes besides the application's answers."""
 
 _log = logging.getLogger(__name__)
@@ -51,15 +51,18 @@ class ClockService(Service):
     def __init__(
         self,
         session: Session,
-        channel: ClockChannel,
+        path: Path,
         roles: Roles,
         answers: Answers | SentMessages,
         timing: Timing,
         senders: SenderTable | None = None,
         own_time: OwnTime | None = None,
     ) -> None:
-        """With ``own_time`` the application's time is the test's, and ``answers`` are SentMessages."""
-        self._session, self._channel = session, channel
+        """Services connect at ``path``. With ``own_time`` the application's time is the test's.
+
+        Then ``answers`` are SentMessages.
+        """
+        self._session = session
         self._begin_id = session.messages.id("dodo.TestBegin")
         self._senders = senders or SenderTable(session.messages)
         answering = (each.data_type for each in answers.filters)
@@ -67,7 +70,7 @@ class ClockService(Service):
         self._guarded = self._senders.ids | {session.messages.id(name) for name in CONSUMED}
         self._early: list[tuple[Envelope, Address]] = []
         self._answers = answers
-        self._exchange = exchange = Exchange(session, channel, self._take, self._senders)
+        self._exchange = exchange = Exchange(session, path, roles.all, self._take, self._senders)
         self._application: SteppedApplication | VirtualApplication
         if isinstance(answers, SentMessages):
             assert own_time is not None, "the program gives it"
@@ -88,6 +91,10 @@ class ClockService(Service):
 
     def _drive(self, stopped: Callable[[], bool]) -> None:
         self._stopped = stopped
+        with closing(self._exchange):
+            self._step()
+
+    def _step(self) -> None:
         begin = self._await_begin()
         if begin is None:
             return
@@ -105,8 +112,6 @@ class ClockService(Service):
             kind, reason = problem.kind, str(problem)
         spent = sorted(((n, s) for n, s in self._stepper.spent.items() if n), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
-        if self._channel.foreign:
-            _log.warning("%d datagrams to the clock were not from services of the test", self._channel.foreign)
         if facts := self._application.facts():
             self._report("response", **facts)
         self._report_time(last=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
-from services.base.clock_link import EncodedEnvelope
 from services.clock.answers import MessageFilter
 from services.clock.exchange import (
     SLICE_S,
@@ -27,8 +27,6 @@ from services.clock.exchange import (
     Patience,
     ServiceLink,
     ServiceSilent,
-    StepCommand,
-    StepResult,
 )
 from services.clock.processor_time import ApplicationProcesses
 
@@ -276,6 +274,7 @@ class VirtualApplication:
         self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
         self._names, self._note = names, note
         self._noted: set[str] = set()
+        self._has_shown: set[str] = set()
         self._shown_at = self._until = 0
 
     def facts(self) -> dict[str, Any]:
@@ -297,10 +296,10 @@ class VirtualApplication:
     def expect_at(self, now: int) -> None:
         """Without cameras, nothing is to be expected."""
 
-    def remember(self, messages: Iterable[EncodedEnvelope]) -> None:
+    def remember(self, messages: Iterable[Envelope]) -> None:
         """What services have sent is not said again: the application has had time to begin."""
 
-    def show(self, shown: Sequence[StepResult], now: int) -> None:
+    def show(self, shown: Sequence[Done], now: int) -> None:
         """Let it take what services have sent by ``now`` (us), then show it new pictures, whether it waits or not.
 
         For the first ones it has to wait; raises ApplicationSilent, ApplicationFloods and ServiceSilent.
@@ -309,9 +308,11 @@ class VirtualApplication:
         self._shown_at = now
         self._run(now)
         self.answers.expect(camera.sampled for camera in shown)
-        self._link.send([StepCommand(camera.service, now, (), show=True) for camera in shown])
+        for camera in shown:
+            self._link.send(camera.service, Show(awaits=camera.service not in self._has_shown, announces=True))
         for camera in shown:
             self._await_camera(camera.service)
+            self._has_shown.add(camera.service)
 
     def await_answer(self, until: int) -> None:
         """Let it go on to ``until`` (us); raises ApplicationSilent, ApplicationFloods and ServiceSilent."""
@@ -324,15 +325,13 @@ class VirtualApplication:
 
     def _await_camera(self, camera: str) -> None:
         began = time.monotonic()
-        while self._link.result(camera) is None and not self._stopped():
+        while self._link.result(camera, SLICE_S) is None and not self._stopped():
             if self.frames == 1 and time.monotonic() - began > READER_PATIENCE_S:
-                self._link.clear()
                 raise ApplicationSilent(
                     f"no reader waited for a picture of '{camera}' within {SPARE_S} s of the application's own time"
                 )
             if time.monotonic() - began > AGENT_PATIENCE_S:
                 raise ServiceSilent(f"service '{camera}' did not show its picture within {AGENT_PATIENCE_S:g} s")
-            self._link.pump(SLICE_S, bus=False)
 
     def _run(self, until: int) -> None:
         began = time.monotonic()
@@ -348,8 +347,6 @@ class VirtualApplication:
                 raise ApplicationSilent("the application destroyed the page that gives it the test's time")
             elif isinstance(report, Busy):
                 self._refuse_busy(report)
-            else:
-                self._link.pump(0.0, bus=False)
             if time.monotonic() - began > max(AGENT_PATIENCE_S, WALL_FACTOR * self._limit):
                 raise ApplicationSilent(
                     f"the application did not come to {(until - self._shown_at) / 1e6:g} s "

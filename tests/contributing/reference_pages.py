@@ -82,6 +82,7 @@ INPUTS = {
 }  # fmt: skip
 """What templates for GitLab hand from an input to a job: set the input."""
 SERVICES = {
+    "DODO_CHANNEL": "in lockstep: the folder where services meet the clock, which the application does not have",
     "DODO_CLOCK": "`lockstep`, or `recording` for `dodo judge`; without it real time",
     "DODO_KEY": "key by which services prove who they are; a service removes it before anything else can read it",
     "DODO_ODVD": "files of further messages, separated by `:`",

@@ -16,8 +16,8 @@ PAGE = ROOT / "docs" / "reference" / "applications.md"
 BEGIN, END = "<!-- the table of scripts/make-heard begins -->", "<!-- and ends -->"
 CAR = ("opendlv.proxy.", "opendlv.system.", "opendlv.device.")
 """What a car's bus carries."""
-DODO_S_OWN = {"dodo.Step/0", "dodo.StepDone/0", "dodo.Sender/0"}
-"""These carry steps, times and addresses, and nothing that only a simulation knows."""
+DODO_S_OWN = {"dodo.Sender/0"}
+"""It carries addresses, and nothing that only a simulation knows."""
 TESTS = sorted(path.name.partition(".")[0] for path in ROOT.glob("tests_registry/*/*.dodo.yml"))
 TESTS_IN = {"lockstep": [name for name in TESTS if not name.startswith("hil-")], "realtime": TESTS}
 

@@ -4,6 +4,8 @@ import asyncio
 import contextlib
 import functools
 import os
+import shutil
+import tempfile
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -98,7 +100,10 @@ class ProcessBackend:
 
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
-        needed = needed_paths(self.plan, self._folder, self.report)
+        channel = await asyncio.to_thread(tempfile.mkdtemp, prefix="dodo-channel-", dir=self.slot.work)
+        self.slot = replace(self.slot, channel=channel)
+        self._commands = replace(self._commands, slot=self.slot)
+        needed = [*needed_paths(self.plan, self._folder, self.report), Path(channel)]
         if self.plan.clock == VIRTUAL:
             time = await asyncio.to_thread(application_time.built)
             self._commands = replace(self._commands, time=time)
@@ -337,6 +342,7 @@ class ProcessBackend:
         if keep and (pid := self._sandbox.pid):
             return self._kept(pid)
         await self._sandbox.close()
+        shutil.rmtree(self.slot.channel, ignore_errors=True)
         for output in self._outputs.values():
             output.close()
         await asyncio.gather(*self._exits, return_exceptions=True)

@@ -10,6 +10,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, 
 from dodo_dsl.application.model import OFFSCREEN
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import TIME, TIME_FOLDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, ApplicationService, Flag, Plan, PlannedService
@@ -68,6 +69,7 @@ class Commands:
             "DODO_SERVICE": service.name,
             "DODO_READY_FILE": ready_file(self.slot.name, service.name),
             SLOT_VARIABLE: self.slot.name,
+            CHANNEL_VARIABLE: self.slot.channel,
             "DODO_ODVD": os.pathsep.join(str(self.folder / FILES / path) for path in self.plan.messages),
             **self.plan.variables,
             KEY_VARIABLE: self.slot.key.hex(),

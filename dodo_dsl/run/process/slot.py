@@ -8,6 +8,7 @@ import json
 import os
 import secrets
 import sys
+import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,7 +31,7 @@ def new_key() -> bytes:
 class Slot:
     """A CID, a name, a prefix of shared memory, the descriptors of the leases, and the key of the test.
 
-    Name and prefix are given only on the host.
+    Name and prefix are given only on the host. ``channel`` is the folder in ``work`` where the test's services meet.
     """
 
     cid: int
@@ -38,6 +39,8 @@ class Slot:
     memory_prefix: str = ""
     descriptors: tuple[int, ...] = ()
     key: bytes = field(default_factory=new_key, repr=False)
+    work: Path = field(default_factory=lambda: Path(tempfile.gettempdir()))
+    channel: str = ""
 
 
 _FLAG = "--enter="

@@ -39,6 +39,6 @@ def test_without_a_key_nothing_needs_a_proof() -> None:
 
 def test_the_proof_is_a_field_of_the_message() -> None:
     messages = MessageSet.standard()
-    step, id_ = messages.type("dodo.Step")(number=7, service="pose", frames=b"frames"), messages.id("dodo.Step")
-    read = messages.decode(id_, with_proof(b"key", id_, messages.encode(step)))
-    assert (read.number, read.service, read.frames, len(read.proof)) == (7, "pose", b"frames", 16)  # type: ignore[attr-defined]
+    begin, id_ = messages.type("dodo.TestBegin")(seed=7, application="1,2"), messages.id("dodo.TestBegin")
+    read = messages.decode(id_, with_proof(b"key", id_, messages.encode(begin)))
+    assert (read.seed, read.application, len(read.proof)) == (7, "1,2", 16)  # type: ignore[attr-defined]

@@ -1,6 +1,5 @@
-"""The same way whatever the application's manners, its speed and the losses on the way."""
+"""The same way whatever the application's manners and its speed."""
 
-import random
 import threading
 import time
 from fractions import Fraction
@@ -8,13 +7,11 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.opendlv.session import Session
-from services.base import clock_link
 from services.base.lockstep_clock import EPOCH, AnnouncedMemory
-from services.clock import exchange, model
+from services.clock import model
 from services.clock.exchange import ApplicationSilent, Patience, ServiceSilent, TimeOver
 from services.clock.model import Stepper
-from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Forger, Mover, ToyEvaluator, Toys, Watcher
+from tests.services.clock.toys import BOX, DRIVE, STEP, Eye, Film, Filter, Mover, Toys, Watcher
 
 Way = list[tuple[int, float]]
 
@@ -82,51 +79,6 @@ def test_who_watches_sees_each_picture(toys: Toys, monkeypatch: pytest.MonkeyPat
     toys.run(toys.application())
     steps = [EPOCH + number * STEP for number in range(21)]
     assert watcher.seen[:20] == [(now, now) for now in steps[:20]]
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.thorough
-def test_lost_doubled_and_late_datagrams_change_nothing(toys: Toys, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    """A third of what clock and services tell each other is lost, some comes twice, some after the next."""
-    chance = random.Random(seed)
-    plain, held = clock_link.ClockChannel.send, []
-
-    def send(self: clock_link.ClockChannel, message: Any, to: Any) -> None:
-        fate = chance.random()
-        if fate < 0.3:
-            return
-        if fate < 0.4:
-            held.append((self, message, to))
-            return
-        for _ in range(2 if fate < 0.5 else 1):
-            plain(self, message, to)
-        while held:
-            late, what, whom = held.pop()
-            if late._socket.fileno() >= 0:
-                plain(late, what, whom)
-
-    monkeypatch.setattr(clock_link.ClockChannel, "send", send)
-    monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
-    monkeypatch.setattr(exchange, "_SLICE", 0.01)
-    monkeypatch.setattr(clock_link, "SLICE_MS", 10)
-    way, stepper = toys.run(toys.application())
-    assert close(way, expected(21))
-    assert stepper.application.frames == 21
-
-
-@pytest.mark.parametrize("key", [b"", b"another key"])
-def test_who_has_not_the_key_changes_nothing(toys: Toys, key: bytes, capsys: pytest.CaptureFixture[str]) -> None:
-    way, _ = toys.run(toys.application(), Forger(toys.cid, key))
-    assert close(way, expected(21))
-    said = capsys.readouterr().out
-    for name in ("Step", "StepDone"):
-        assert said.count(f"the application sent dodo.{name}, which only services of the test may send") == 1
-
-
-def test_answers_larger_than_a_datagram(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.base.clock_link.PART_BYTES", 100)
-    way, _ = toys.run(toys.application())
-    assert close(way, expected(21))
 
 
 @pytest.mark.thorough
@@ -209,28 +161,6 @@ def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest
         toys.run(toys.application())
 
 
-@pytest.mark.slow
-def test_pieces_arrive_however_few_the_receiver_holds(toys: Toys, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each burst the first three get through only, as where the receive buffer is small."""
-    plain, sent = clock_link.ClockChannel.send, dict[int, tuple[float, int]]()
-
-    def send(self: clock_link.ClockChannel, message: Any, to: Any) -> None:
-        began, count = sent.get(id(self), (0.0, 0))
-        now = time.monotonic()
-        began, count = (began, count + 1) if now - began < 0.003 else (now, 1)
-        sent[id(self)] = began, count
-        if count <= 3:
-            plain(self, message, to)
-
-    monkeypatch.setattr("services.base.clock_link.PART_BYTES", 150)
-    monkeypatch.setattr(clock_link.ClockChannel, "send", send)
-    monkeypatch.setattr(exchange, "REPEAT_S", 0.01)
-    monkeypatch.setattr(exchange, "_SLICE", 0.01)
-    toys.evaluator = ToyEvaluator(0.5)
-    way, _ = toys.run(toys.application())
-    assert close(way, expected(6))
-
-
 @pytest.mark.thorough
 def test_silence_is_named_with_frame_and_message(toys: Toys) -> None:
     toys.patience = Patience(0.5, 0.2)
@@ -260,16 +190,3 @@ def test_the_stepper_goes_to_the_time_that_a_source_tells() -> None:
     stepper._next = {"a": 1140, "b": 1130, "c": 900, "gone": 1001}
     stepper._go_on()
     assert stepper.now == 1130
-
-
-@pytest.mark.thorough
-def test_messages_on_the_channel_wake_nobody_else(cid: int) -> None:
-    with Session(cid) as other:
-        ours, theirs = (clock_link.ClockChannel(cid, other.messages) for _ in range(2))
-        address = ("127.0.0.1", theirs._socket.getsockname()[1])
-        ours.send(other.messages.type("dodo.Step")(number=3), address)
-        assert other.receive(0.2) is None
-        came = theirs.receive()
-        assert came is not None and came[0].data_type == 2902
-        for each in (ours, theirs):
-            each.close()

@@ -50,7 +50,7 @@ class Late:
     def is_complete(self) -> bool:
         return self._time.now > self._at
 
-    def pump(self, timeout: float, bus: bool = True) -> None:
+    def pump(self, timeout: float, services: object = ()) -> None:
         assert timeout > 0
         self._time.now += max(min(timeout, 0.01), 1e-6)
 

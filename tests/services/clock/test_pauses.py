@@ -29,7 +29,7 @@ class Bus:
     def monotonic(self) -> float:
         return self.now
 
-    def pump(self, timeout: float, bus: bool = True) -> None:
+    def pump(self, timeout: float, services: object = ()) -> None:
         self.now += max(min(timeout, min([*self.coming[:1], self.now + 0.05]) - self.now), 1e-6)
         self.drain()
 

@@ -2,7 +2,10 @@
 
 import json
 import math
+import tempfile
+from contextlib import closing
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +14,6 @@ from dodo_dsl.opendlv.authentication import with_proof
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
-from services.base.clock_link import ClockChannel, encode
 from services.base.members import Producers, SenderTable
 from services.clock import model
 from services.clock.answers import Answers, MessageFilter
@@ -22,11 +24,11 @@ STEP = Fraction(100_000)
 
 
 def driven(session: Session, roles: Roles, stopped: bool = False) -> None:
-    channel = ClockChannel(session.cid, session.messages)
-    service = ClockService(session, channel, roles, Answers(()), Timing(STEP, 1_000_000, Patience(1.0, 1.0)))
-    assert service.drive is not None
-    service.drive(lambda: stopped)
-    channel.close()
+    with tempfile.TemporaryDirectory() as folder:
+        timing = Timing(STEP, 1_000_000, Patience(1.0, 1.0))
+        service = ClockService(session, Path(folder, "clock"), roles, Answers(()), timing)
+        assert service.drive is not None
+        service.drive(lambda: stopped)
 
 
 def test_a_service_that_does_not_answer_is_reported_with_the_progress(
@@ -76,16 +78,15 @@ def test_the_begin_comes_to_its_own_address_and_nothing_else_does(
 
 
 def test_what_an_application_that_starts_late_must_not_hear_is_not_sent_again(
-    cid: int, monkeypatch: pytest.MonkeyPatch
+    cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DODO_WORLD", "pose")
     monkeypatch.setenv("DODO_TRUTH", "opendlv.logic.perception.DetectionBoundingBox/0")
     reading = "opendlv.proxy.DistanceReading"
     names = ("opendlv.sim.Frame", "opendlv.logic.perception.DetectionBoundingBox", reading)
     with Session(cid) as session, Session(cid) as application:
-        channel = ClockChannel(cid, session.messages)
-        Exchange(session, channel, lambda _: None).repeat_on_bus(encode(enveloped(name)) for name in names)
-        channel.close()
+        with closing(Exchange(session, tmp_path / "clock", (), lambda _: None)) as exchange:
+            exchange.repeat_on_bus(map(enveloped, names))
         envelope = application.receive(5.0)
         assert envelope is not None and envelope.data_type == session.messages.id(reading)
         assert application.receive(0.0) is None
@@ -106,16 +107,17 @@ def said(session: Session, address: Address, key: bytes, service: str = LINES) -
     return Envelope(id_, with_proof(key, id_, session.messages.encode(message)), 1, 0, 1, 0)
 
 
-def test_an_answer_that_is_printed_comes_from_the_runner_alone(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_answer_that_is_printed_comes_from_the_runner_alone(
+    cid: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     key, runner, other = b"a key of this test", ("10.0.0.1", 40_000), ("10.0.0.1", 40_001)
     with Session(cid) as session:
         ids = session.messages.id(STEERING), session.messages.id("opendlv.sim.Frame")
         table = {(ids[0], 0): Producers(f"{STEERING}/0", (LINES,)), (ids[1], 0): Producers("F", ("pose",))}
         taken: list[int] = []
-        channel = ClockChannel(cid, session.messages, key)
-        exchange = Exchange(
-            session, channel, lambda e: taken.append(e.sample_time), SenderTable(session.messages, key, table)
-        )
+        senders = SenderTable(session.messages, key, table)
+        exchange = Exchange(session, tmp_path / "clock", (), lambda e: taken.append(e.sample_time), senders)
+        exchange.close()  # its bus stays
         for envelope, source in (
             (said(session, other, b""), other),
             (said(session, runner, key), other),
@@ -128,7 +130,6 @@ def test_an_answer_that_is_printed_comes_from_the_runner_alone(cid: int, capsys:
         assert (taken, capsys.readouterr().out) == ([5], "")
         exchange.hear(Envelope(ids[0], b"", 1, 0, 6, 0), other)
         exchange.hear(Envelope(ids[1], b"", 1, 0, 7, 0), runner)
-        channel.close()
     assert taken == [5]
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
         f"the application sent {STEERING}/0, which it declares to print (x-dodo: lines)",
@@ -137,16 +138,15 @@ def test_an_answer_that_is_printed_comes_from_the_runner_alone(cid: int, capsys:
 
 
 def test_a_number_of_the_application_that_is_not_finite_is_reported_once(
-    cid: int, capsys: pytest.CaptureFixture[str]
+    cid: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of what services take, and of no other message or sender stamp; the answer counts as before."""
     with Session(cid) as session:
         steering, pedal = (session.messages.id(name) for name in (STEERING, "opendlv.proxy.PedalPositionRequest"))
         answers = Answers((MessageFilter(STEERING, steering, 0),), (MessageFilter("pedal", pedal),))
-        channel = ClockChannel(cid, session.messages)
-        clock = ClockService(
-            session, channel, Roles(("vehicle",), (), ("track",)), answers, Timing(STEP, 1, Patience(1, 1))
-        )
+        roles = Roles(("vehicle",), (), ("track",))
+        clock = ClockService(session, tmp_path / "clock", roles, answers, Timing(STEP, 1, Patience(1, 1)))
+        clock._exchange.close()
         clock._stepper._consumed = {"track": frozenset({steering}), "vehicle": frozenset({steering})}
         clock._stepper.now += 700_000
         answers.expect([5])
@@ -156,7 +156,6 @@ def test_a_number_of_the_application_that_is_not_finite_is_reported_once(
             setattr(message, message.DESCRIPTOR.fields[0].name, value)
             clock._take(Envelope(id_, session.messages.encode(message), 5, 0, 5, stamp))
         assert answers.is_complete
-        channel.close()
     assert [json.loads(line)["reason"] for line in capsys.readouterr().out.splitlines()] == [
         f"the application sent {STEERING}/0 to 'vehicle' and 'track' after 0.70 s: "
         "groundSteering is -inf, not a finite number"

@@ -63,10 +63,10 @@ class Link:
         self.drain = on_drain
         self.sent: list[Any] = []
 
-    def send(self, commands: Any) -> None:
-        self.sent += commands
+    def send(self, service: str, command: Any) -> None:
+        self.sent.append((service, command))
 
-    def result(self, service: str) -> Any:
+    def result(self, service: str, timeout: float = 0.0) -> Any:
         return service
 
     def __getattr__(self, _name: str) -> Callable[..., None]:

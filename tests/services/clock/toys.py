@@ -2,19 +2,20 @@
 
 import os
 import struct
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from dodo_dsl.opendlv.envelope import Envelope, encode_frame
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base import Service, Verdict
-from services.base.clock_link import ClockChannel
+from services.base.clock_link import ClockClient
 from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, filters
@@ -25,7 +26,6 @@ from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
-KEY = b"the key of the test"
 BOX = "opendlv.logic.perception.DetectionBoundingBox"
 
 
@@ -185,34 +185,6 @@ class Filter:
                     session.send(request(groundSteering=1.5 - message.x), envelope.sample_time)
 
 
-@dataclass
-class Forger:
-    """An application that steps services and answers for them, on the bus and at all ports, under some key."""
-
-    cid: int
-    key: bytes = b""
-
-    def run(self, stopped: Callable[[], bool]) -> None:
-        with Session(self.cid) as session:
-            channel = ClockChannel(self.cid, session.messages, self.key)
-            step, done = (session.messages.type(f"dodo.{name}") for name in ("Step", "StepDone"))
-            frames = encode_frame(Envelope(session.messages.id(PLACE), b"", 0, 0, EPOCH, 0))
-            lines = Path("/proc/net/udp").read_text().splitlines()[1:]
-            ports = sorted({int(line.split()[1].rpartition(":")[2], 16) for line in lines})
-            for number in range(1, 400):
-                if stopped():
-                    break
-                for name in ("judge", "mover"):
-                    time_ = EPOCH + 60_000_000
-                    for forged in (
-                        step(number=number + 50, service=name, time=time_, parts=1, frames=frames),
-                        done(number=number, service=name, parts=1, frames=frames, ended=name == "judge"),
-                    ):
-                        for to in (None, *(("127.0.0.1", port) for port in ports)):
-                            channel.send(forged, to)
-            channel.close()
-
-
 class Runs(Protocol):
     """A program, in a thread."""
 
@@ -256,28 +228,26 @@ class Toys:
         stop = threading.Event()
         apps = [threading.Thread(target=each.run, args=(stop.is_set,)) for each in applications]
         started: list[threading.Thread] = []
+        makers: dict[str, Maker] = {**self.cast, "judge": lambda _session, _memory: self.evaluator}
         try:
-            with self._services(stop), Session(self.cid) as session:
-                for app in apps:
-                    app.start()
-                    started.append(app)
-                channel = ClockChannel(self.cid, session.messages, KEY)
+            with Session(self.cid) as session, ExitStack() as resources:
+                path = Path(resources.enter_context(tempfile.TemporaryDirectory()), "clock")
                 ids = {name: session.messages.id(name) for name in session.messages.names()}
                 answers: Answers | SentMessages = Answers(filters(self.answers, ids), filters(self.relayed, ids))
                 if self.agent:
                     answers = SentMessages(answers.filters)
-                exchange = Exchange(session, channel, answers.take)
+                exchange = resources.enter_context(closing(Exchange(session, path, makers, answers.take)))
                 advance = tuple(name for name in self.cast if name == "mover")
                 sense = tuple(name for name in self.cast if name not in (*advance, *self.watch))
                 roles = Roles(advance, sense, ("judge",), self.watch)
                 application = self._under_test(answers, exchange, stop.is_set)
                 stepper = Stepper(roles, STEP, self.timeout, application, exchange, stop.is_set)
-                try:
+                with self._services(stop, makers, path):
+                    for app in apps:
+                        app.start()
+                        started.append(app)
                     stepper.connect()
                     stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
-                finally:
-                    stop.set()
-                    channel.close()
         finally:
             for app in started:  # the services have removed the memory that it waits for
                 app.join()
@@ -289,10 +259,9 @@ class Toys:
         return SteppedApplication(answers, self.patience, link, stopped, ResponseTimes())
 
     @contextmanager
-    def _services(self, stop: threading.Event) -> Iterator[None]:
-        makers: dict[str, Maker] = {**self.cast, "judge": lambda _session, _memory: self.evaluator}
+    def _services(self, stop: threading.Event, makers: dict[str, Maker], path: Path) -> Iterator[None]:
         with ExitStack() as resources:
-            loops = [self._loop(name, maker, resources) for name, maker in makers.items()]
+            loops = [self._loop(name, maker, path, resources) for name, maker in makers.items()]
             threads = [threading.Thread(target=loop.run, args=(stop.is_set,)) for loop in loops]
             for thread in threads:
                 thread.start()
@@ -303,8 +272,9 @@ class Toys:
                 for thread in threads:
                     thread.join()
 
-    def _loop(self, name: str, maker: Maker, resources: ExitStack) -> Loop:
+    def _loop(self, name: str, maker: Maker, path: Path, resources: ExitStack) -> Loop:
         session = resources.enter_context(Session(self.cid))
-        clock = LockstepClock(session, name, self.readers, key=KEY, is_virtual=self.agent is not None)
+        client = ClockClient(session, name, path)
+        clock = LockstepClock(session, name, self.readers, client, is_virtual=self.agent is not None)
         service = maker(session, lambda: resources.enter_context(clock.memory(self.memory_name(name), 8)))
         return Loop(name, service, session, clock, 0)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv.channel import Done, Step
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
-from services.base.clock_link import STEP_DONE
 from services.base.evaluator import UnjudgeableError
 from services.base.lockstep_clock import EPOCH, Observer, StepMarks
 from services.base.recorded_clock import RecordedSteps, read_steps
@@ -74,9 +74,9 @@ def test_a_service_does_not_hear_itself(tmp_path: Path) -> None:
     marks, own = StepMarks(MESSAGES), sent("own")
     first, second = marks.of(EPOCH, [sent("a")]), marks.of(EPOCH + STEP, [own, sent("b"), own])
     source = RecordedSteps(write(tmp_path / "test.rec", [*first, *second]), MESSAGES)
-    assert source.next_step(False, lambda _: None) == (1, EPOCH, False, [sent("a")])
-    source.answer([MESSAGES.type(STEP_DONE)(frames=encode_frame(own._replace(sent=77)))])
-    assert source.next_step(False, lambda _: None) == (2, EPOCH + STEP, False, [sent("b"), own])
+    assert source.next(False, lambda _: None) == Step(EPOCH, [sent("a")])
+    source.answer(Done("judge", [own._replace(sent=77)]))
+    assert source.next(False, lambda _: None) == Step(EPOCH + STEP, [sent("b"), own])
     assert not source.is_over
-    assert source.next_step(False, lambda _: None) is None
+    assert source.next(False, lambda _: None) is None
     assert source.is_over

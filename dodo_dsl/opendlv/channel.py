@@ -1,0 +1,182 @@
+"""What DoDo's services say to each other past the bus: typed messages over a Unix socket in a folder of DoDo's own.
+
+The folder is in the sandbox of no application. In lockstep the clock listens there, and each service of the test
+connects and gives its name before it is ready, so before the application starts.
+"""
+
+import contextlib
+import select
+import socket
+import time
+from pathlib import Path
+from typing import Self
+
+import msgspec
+from msgspec import Struct
+
+from dodo_dsl.opendlv.address import Address
+from dodo_dsl.opendlv.envelope import Envelope
+
+CLOCK_SOCKET = "clock"
+
+
+class Hello(Struct, tag=True, array_like=True):
+    """The first message: which service of the test it is."""
+
+    service: str
+
+
+class Step(Struct, tag=True, array_like=True):
+    """The clock lets a service go on to a time (us) with all that it has not heard yet; Done follows."""
+
+    time: int
+    messages: list[Envelope]
+
+
+class Show(Struct, tag=True, array_like=True):
+    """The service ``awaits`` readers of its new pictures, ``announces`` these, or does both; Done follows."""
+
+    awaits: bool
+    announces: bool
+
+
+class About(Struct, array_like=True):
+    """Of a service that has built its model: from where it sends on the bus, and its number of shared memories."""
+
+    address: Address
+    memories: int
+    consumes: list[int]
+    """Ids of the messages that it handles; empty for all."""
+
+
+class Done(Struct, tag=True, array_like=True):
+    """A service has done what it was to do, and sent these messages meanwhile; ``about`` is in the first one alone.
+
+    ``pictures`` are new ones, ``sampled`` is when the newest was (us), and ``next`` when it has something to say next,
+    0 when it does not know.
+    """
+
+    service: str
+    messages: list[Envelope]
+    pictures: int = 0
+    sampled: int = 0
+    next: int = 0
+    ended: bool = False
+    about: About | None = None
+
+
+Message = Hello | Step | Show | Done
+PACKET = 1 << 16
+_LAST, _MORE = b"\0", b"\1"
+_AGAIN_S = 0.005
+_encode = msgspec.msgpack.Encoder().encode
+_decode = msgspec.msgpack.Decoder(Message).decode
+
+
+class Channel:
+    """One end of a connection. A message longer than a packet takes several, of which the first byte says so."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._socket = connection
+        self._poll = select.poll()
+        self._poll.register(connection, select.POLLIN)
+
+    @classmethod
+    def connect(cls, path: Path) -> Self:
+        """Connects as soon as somebody listens."""
+        while True:
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            try:
+                connection.connect(str(path))
+            except (FileNotFoundError, ConnectionRefusedError):
+                connection.close()
+                time.sleep(_AGAIN_S)
+            else:
+                return cls(connection)
+
+    def send(self, message: Message) -> None:
+        """Sends a message; it is lost where the other end has gone."""
+        data = _encode(message)
+        with contextlib.suppress(OSError):
+            while len(data) > PACKET:
+                self._socket.send(_MORE + data[:PACKET])
+                data = data[PACKET:]
+            self._socket.send(_LAST + data)
+
+    def receive(self, timeout: float) -> Message | None:
+        """The next message within ``timeout`` seconds; raises EOFError when the other end has gone."""
+        if not self._poll.poll(timeout * 1000):
+            return None
+        data, kind = b"", _MORE
+        while kind == _MORE:
+            try:
+                packet = self._socket.recv(PACKET + 1)
+            except ConnectionError:
+                packet = b""
+            if not packet:
+                raise EOFError
+            kind, data = packet[:1], data + packet[1:]
+        message: Message = _decode(data)
+        return message
+
+    def fileno(self) -> int:
+        """The file descriptor to poll for reading."""
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+
+class Listener:
+    """The end to which services connect, each of ``services`` once; others are turned away."""
+
+    def __init__(self, path: Path, services: set[str]) -> None:
+        """Raises OSError."""
+        self._path, self._missing = path, set(services)
+        self._unnamed: list[Channel] = []
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        path.unlink(missing_ok=True)
+        self._socket.bind(str(path))
+        self._socket.listen(socket.SOMAXCONN)
+        self._socket.setblocking(False)
+
+    def accept(self, timeout: float) -> dict[str, Channel]:
+        """The services that have connected and given their names within ``timeout`` seconds; closes behind the last."""
+        sources = [self._socket.fileno(), *(channel.fileno() for channel in self._unnamed)]
+        if not select.select(sources, [], [], timeout)[0]:
+            return {}
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                connection, _ = self._socket.accept()
+                self._unnamed.append(Channel(connection))
+        found: dict[str, Channel] = {}
+        for channel in list(self._unnamed):
+            try:
+                message = channel.receive(0.0)
+            except (EOFError, msgspec.DecodeError):
+                message = Done("", [])
+            if message is None:
+                continue
+            self._unnamed.remove(channel)
+            if isinstance(message, Hello) and message.service in self._missing:
+                self._missing.remove(message.service)
+                found[message.service] = channel
+            else:
+                channel.close()
+        if not self._missing:
+            self.close()
+        return found
+
+    @property
+    def is_open(self) -> bool:
+        """Whether services are missing."""
+        return bool(self._missing)
+
+    def close(self) -> None:
+        """Nobody else can connect."""
+        self._socket.close()
+        self._path.unlink(missing_ok=True)
+        for channel in self._unnamed:
+            channel.close()
+        self._unnamed.clear()
