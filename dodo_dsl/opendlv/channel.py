@@ -5,9 +5,11 @@ connects and gives its name before it is ready, so before the application starts
 """
 
 import contextlib
+import os
 import select
 import socket
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
@@ -73,6 +75,16 @@ _encode = msgspec.msgpack.Encoder().encode
 _decode = msgspec.msgpack.Decoder(Message).decode
 
 
+@contextlib.contextmanager
+def _short(path: Path) -> Iterator[str]:
+    """The path of a socket in a form that an address can hold, however long the folder's is."""
+    folder = os.open(path.parent, os.O_PATH)
+    try:
+        yield f"/proc/self/fd/{folder}/{path.name}"
+    finally:
+        os.close(folder)
+
+
 class Channel:
     """One end of a connection. A message longer than a packet takes several, of which the first byte says so."""
 
@@ -87,7 +99,8 @@ class Channel:
         while True:
             connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             try:
-                connection.connect(str(path))
+                with _short(path) as address:
+                    connection.connect(address)
             except (FileNotFoundError, ConnectionRefusedError):
                 connection.close()
                 time.sleep(_AGAIN_S)
@@ -137,7 +150,9 @@ class Listener:
         self._unnamed: list[Channel] = []
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         path.unlink(missing_ok=True)
-        self._socket.bind(str(path))
+        with _short(path) as address:
+            self._socket.bind(address)
+        path.chmod(0o666)
         self._socket.listen(socket.SOMAXCONN)
         self._socket.setblocking(False)
 
