@@ -86,7 +86,7 @@ def running(programs: dict[str, list[str]], folder: Path) -> Iterator[Processes]
     try:
         for name, flags in programs.items():
             own = ["-m", f"services.{name}"] if (ROOT / "services" / name).is_dir() else [f"examples/kiwi/{name}.py"]
-            environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_READY_FILE": str(folder / f"ready-{name}")}
+            environment = {**os.environ, "PYTHONPATH": str(ROOT)}
             processes[name] = subprocess.Popen(
                 [sys.executable, *own, f"--cid={CID}", *flags], cwd=ROOT, env=environment, stdout=subprocess.PIPE
             )

@@ -34,7 +34,7 @@ Defaults = Mapping[str, Mapping[str, str]]
 
 _NOTES = {
     "DODO_CLOCK": "Services take the time from dodo-clock, which steps the test, and not from the machine.",
-    CHANNEL_VARIABLE: "Where services meet the clock; the application has no such folder.",
+    CHANNEL_VARIABLE: "Where services meet, and say that they are ready; the application has no such folder.",
     "DODO_READERS": "How many programs of the application read each frame; it comes when all are waiting.",
     "DODO_SENDERS": "Who alone may send a message, as message=services; with none behind =, nobody.",
     "DODO_WORLD": "The services that get what the application must not hear.",
@@ -67,14 +67,13 @@ class Variable:
 class Container:
     """What the layer template needs of a service beyond what its layer has in common.
 
-    ``ready_tries`` is how often its ready file is checked, twice a second. ``groups`` are those that may open devices.
+    ``ready_tries`` is how often its entry is looked for, twice a second. ``groups`` are those that may open devices.
     """
 
     name: str
     image: str
     command: tuple[str, ...]
     volumes: tuple[str | Mapping[str, Any], ...]
-    ready_file: str
     ready_tries: int
     environment: tuple[Variable, ...]
     devices: tuple[str, ...]
@@ -101,14 +100,13 @@ def containers(plan: Plan, layer: str, defaults: Defaults = NO_DEFAULTS) -> Laye
     if plan.isolation == "network":
         after.insert(0, ("sandbox", "service_started"))
     messages = ":".join(f"{FILES}/{path}" for path in plan.messages)
-    shared = {**plan.variables, "DODO_ODVD": messages, CHANNEL_VARIABLE: CHANNEL if plan.lockstep else ""}
+    shared = {**plan.variables, "DODO_ODVD": messages, CHANNEL_VARIABLE: CHANNEL}
     found = tuple(
         Container(
             service.name,
             service.image,
             tuple(_word(flag) for flag in _written(plan, service, defaults)),
             _volumes(plan, service),
-            f"/tmp/dodo-ready-{service.name}",
             math.ceil(_TRIES_A_SECOND * (READY_S + service.setup_s)),
             _environment(service),
             service.devices,
@@ -199,7 +197,7 @@ def _shared_mount(name: str) -> Mapping[str, Any]:
 def _common(plan: Plan) -> list[str]:
     """The volumes of all services."""
     tmp = "tmp:/tmp" if plan.isolation == "network" else "/tmp:/tmp"
-    return [tmp, f"dodo-channel:{CHANNEL}"] if plan.lockstep else [tmp]
+    return [tmp, f"dodo-channel:{CHANNEL}"]
 
 
 def _volumes(plan: Plan, service: PlannedService) -> tuple[str | Mapping[str, Any], ...]:

@@ -12,7 +12,7 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.application.model import FILES
-from dodo_dsl.emit.containers import NO_DEFAULTS, READY_TRIES, Defaults, Variable, containers, copy_command
+from dodo_dsl.emit.containers import CHANNEL, NO_DEFAULTS, READY_TRIES, Defaults, Variable, containers, copy_command
 from dodo_dsl.emit.pipeline import CHILD, Pipeline
 from dodo_dsl.emit.pipeline_jobs import SPARE_MINUTES
 from dodo_dsl.plan.added_services import RECORDER, TIME, TIME_MOUNT, agent_flags
@@ -183,6 +183,7 @@ def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
                 layer=layer,
                 common=containers(plan, layer, defaults),
                 ready_tries=READY_TRIES,
+                channel=CHANNEL,
                 recorder=RECORDER,
                 own_network=own_network,
                 sandbox=own_network and layer == LAYERS[0],

@@ -16,10 +16,10 @@ POSE = ("opendlv.sim.Frame", "opendlv.sim.KinematicState")
 """Those that carry where the vehicle truly is, or how it moves."""
 
 LINES = "dodo-lines"
-"""The sender, among a test's services, of what its application prints: the runner, from its own address."""
+"""The sender, among a test's services, of what its application prints: the runner."""
 
 CHANNEL_VARIABLE = "DODO_CHANNEL"
-"""Environment variable of DoDo's services in lockstep: the folder where they meet the clock."""
+"""Environment variable of DoDo's services: the folder where they meet, which the application does not have."""
 
 
 def group(cid: int) -> Address:

@@ -9,7 +9,7 @@ import os
 import select
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Self
 
@@ -19,7 +19,7 @@ from msgspec import Struct
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.opendlv.envelope import Envelope
 
-CLOCK_SOCKET = "clock"
+CLOCK_SOCKET = ".clock"
 
 
 class Hello(Struct, tag=True, array_like=True):
@@ -70,7 +70,7 @@ class Done(Struct, tag=True, array_like=True):
 Message = Hello | Step | Show | Done
 PACKET = 1 << 16
 _LAST, _MORE = b"\0", b"\1"
-_AGAIN_S = 0.005
+_AGAIN_S, _HELLO_S = 0.005, 1.0
 _encode = msgspec.msgpack.Encoder().encode
 _decode = msgspec.msgpack.Decoder(Message).decode
 
@@ -144,54 +144,35 @@ class Channel:
 class Listener:
     """The end to which services connect, each of ``services`` once; others are turned away."""
 
-    def __init__(self, path: Path, services: set[str]) -> None:
+    def __init__(self, path: Path, services: Iterable[str]) -> None:
         """Raises OSError."""
-        self._path, self._missing = path, set(services)
-        self._unnamed: list[Channel] = []
+        self._path = path
+        self.missing = set(services)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         path.unlink(missing_ok=True)
         with _short(path) as address:
             self._socket.bind(address)
         path.chmod(0o666)
         self._socket.listen(socket.SOMAXCONN)
-        self._socket.setblocking(False)
 
-    def accept(self, timeout: float) -> dict[str, Channel]:
-        """The services that have connected and given their names within ``timeout`` seconds; closes behind the last."""
-        sources = [self._socket.fileno(), *(channel.fileno() for channel in self._unnamed)]
-        if not select.select(sources, [], [], timeout)[0]:
-            return {}
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                connection, _ = self._socket.accept()
-                self._unnamed.append(Channel(connection))
-        found: dict[str, Channel] = {}
-        for channel in list(self._unnamed):
-            try:
-                message = channel.receive(0.0)
-            except (EOFError, msgspec.DecodeError):
-                message = Done("", [])
-            if message is None:
-                continue
-            self._unnamed.remove(channel)
-            if isinstance(message, Hello) and message.service in self._missing:
-                self._missing.remove(message.service)
-                found[message.service] = channel
-            else:
-                channel.close()
-        if not self._missing:
+    def accept(self, timeout: float) -> tuple[str, Channel] | None:
+        """A service that connects within ``timeout`` seconds, with its name; nobody can behind the last one."""
+        if not select.select([self._socket], [], [], timeout)[0]:
+            return None
+        channel = Channel(self._socket.accept()[0])
+        try:
+            hello = channel.receive(_HELLO_S)
+        except (EOFError, msgspec.DecodeError):
+            hello = None
+        if not isinstance(hello, Hello) or hello.service not in self.missing:
+            channel.close()
+            return None
+        self.missing.remove(hello.service)
+        if not self.missing:
             self.close()
-        return found
-
-    @property
-    def is_open(self) -> bool:
-        """Whether services are missing."""
-        return bool(self._missing)
+        return hello.service, channel
 
     def close(self) -> None:
         """Nobody else can connect."""
         self._socket.close()
         self._path.unlink(missing_ok=True)
-        for channel in self._unnamed:
-            channel.close()
-        self._unnamed.clear()

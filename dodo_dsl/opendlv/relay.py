@@ -1,21 +1,29 @@
-"""Sends frames on a session's bus that others hand over, all from one address.
+"""Sends datagrams for the runner, all from one address, to a session's bus and to services.
 
-As a program, ``relay CID`` prints its host and port, and then sends the frames that it reads. Imports the standard
-library alone, as sandboxes load it and start often.
+As a program, ``relay CID`` prints a line, and then sends what it reads: lines of names and data in hexadecimal. Imports
+the standard library alone, as sandboxes load it and start often.
 """
 
+import contextlib
+import os
 import socket
 import sys
-from typing import BinaryIO, TextIO
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TextIO
 
-from dodo_dsl.opendlv.address import HEADER_BYTES, Address, FrameError, body_length, group
+from dodo_dsl.opendlv import address_book
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE, Address, group
+
+BUS = "*"
+"""Stands for all on the bus, as does a service that has not entered its address."""
 
 
 class Relay:
-    """A sender on the bus; ``address`` is where its datagrams come from. Raises OSError if there is no route."""
+    """A sender on the bus, which enters its address in the test's folder; raises OSError, as if there is no route."""
 
-    def __init__(self, cid: int) -> None:
-        self._bus = group(cid)
+    def __init__(self, cid: int, folder: Path, name: str = address_book.RUNNER) -> None:
+        self._bus, self._book = group(cid), address_book.AddressBook(folder)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
@@ -24,31 +32,31 @@ class Relay:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
                 probe.connect(self._bus)
                 host = str(probe.getsockname()[0])
+            address_book.enter(folder, name, (host, int(self._socket.getsockname()[1])))
         except OSError:
             self._socket.close()
             raise
-        self.address: Address = (host, int(self._socket.getsockname()[1]))
 
-    def send(self, frame: bytes) -> None:
-        """Sends one frame; raises OSError."""
-        self._socket.sendto(frame, self._bus)
+    def send(self, data: bytes, to: Iterable[str] = (BUS,)) -> None:
+        """Sends to services by their names; who cannot be reached misses it."""
+        self._book.read()
+        addresses: set[Address] = {self._book.addresses.get(name, self._bus) for name in to}
+        for address in addresses:
+            with contextlib.suppress(OSError):
+                self._socket.sendto(data, address)
 
     def close(self) -> None:
         self._socket.close()
 
 
-def serve(relay: Relay, frames: BinaryIO, stdout: TextIO) -> int:
-    """Sends what comes until its end; 1 for what is not a frame, because nothing behind it can be recognised."""
-    host, port = relay.address
-    print(f"{host} {port}", file=stdout, flush=True)
-    while header := frames.read(HEADER_BYTES):
-        try:
-            frame = header + frames.read(body_length(header))
-        except FrameError:
-            return 1
-        relay.send(frame)
+def serve(relay: Relay, lines: TextIO, stdout: TextIO) -> int:
+    """Sends what comes until its end."""
+    print("ready", file=stdout, flush=True)
+    for each in lines:
+        *to, data = each.split()
+        relay.send(bytes.fromhex(data), to)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(serve(Relay(int(sys.argv[1])), sys.stdin.buffer, sys.stdout))
+    sys.exit(serve(Relay(int(sys.argv[1]), Path(os.environ[CHANNEL_VARIABLE])), sys.stdin, sys.stdout))

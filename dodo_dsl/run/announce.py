@@ -2,33 +2,30 @@
 
 import asyncio
 import contextlib
-import logging
-import socket
 import time
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncIterator, Iterable
+from pathlib import Path
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.address import Address, group
-from dodo_dsl.opendlv.authentication import with_proof
+from dodo_dsl.opendlv.address_book import HEARTBEAT
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.relay import BUS, Relay
 from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.plan.model import Plan
 
 ALIVE_S = 1.0
 TEST_BEGIN = "dodo.TestBegin"
 
-_log = logging.getLogger(__name__)
 
-
-def begin_frame(seed: int, application: Iterable[int] = (), key: bytes = b"") -> bytes:
-    """``dodo.TestBegin`` as a datagram, with the current time as its sample time, proven by the test's key.
+def begin_frame(seed: int, application: Iterable[int] = ()) -> bytes:
+    """``dodo.TestBegin`` as a datagram, with the current time as its sample time.
 
     ``application`` are the process ids of the application's services, where the test's services see them.
     """
     begin = MessageSet.standard().type(TEST_BEGIN)
-    return frame_of(begin(seed=seed, application=",".join(map(str, application))), key=key)
+    return frame_of(begin(seed=seed, application=",".join(map(str, application))))
 
 
 def frame_of(
@@ -36,54 +33,38 @@ def frame_of(
     messages: MessageSet | None = None,
     sampled: int | None = None,
     stamp: int = 0,
-    key: bytes | None = None,
 ) -> bytes:
-    """A message as a datagram of now, sampled at a time in us, by default now too; with a ``key`` it proves itself."""
+    """A message as a datagram of now, sampled at a time in us, by default now too."""
     known, now = messages or MessageSet.standard(), time.time_ns() // 1000
-    id_, payload = known.id(message), known.encode(message)
-    payload = payload if key is None else with_proof(key, id_, payload)
-    return encode_frame(Envelope(id_, payload, now, 0, now if sampled is None else sampled, stamp))
+    sample_time = now if sampled is None else sampled
+    return encode_frame(Envelope(known.id(message), known.encode(message), now, 0, sample_time, stamp))
 
 
-def that_hear(plan: Plan) -> list[str]:
-    """The services that say where they hear the start; those of the deployment need not."""
-    return [CLOCK] if plan.lockstep else [word for word in plan.world if "?=" not in word]
-
-
-def hearers(plan: Plan, cid: int, addresses: Mapping[str, Address]) -> list[Address]:
-    """Where to announce the start: to the services that take it, by the ``addresses`` that they said.
-
-    Where one has not said any, or the application declares to take it, on the bus as well.
-    """
+def hearers(plan: Plan) -> list[str]:
+    """To whom the start is announced: the services that take it, and all where the application declares to take it."""
     names = [CLOCK] if plan.lockstep else [service.name for service in plan.services]
     is_told = any(word.partition("/")[0] == TEST_BEGIN for word in plan.told)
-    on_the_bus = is_told or any(name not in addresses for name in names)
-    return [*(addresses[name] for name in names if name in addresses), *([group(cid)] if on_the_bus else [])]
-
-
-def send_on_host(frame: bytes, to: Iterable[Address]) -> None:
-    """Sends a datagram to addresses on this machine's own network; raises OSError."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        for address in to:
-            sender.sendto(frame, address)
+    return [*names, BUS] if is_told else names
 
 
 @contextlib.asynccontextmanager
-async def heartbeat(cid: int, key: bytes = b"") -> AsyncIterator[None]:
-    """Within the block, sends ``dodo.Alive`` each second to a session of this machine, proven by the test's key."""
-    task = asyncio.ensure_future(_beat(cid, key))
+async def heartbeat(cid: int, channel: Path) -> AsyncIterator[None]:
+    """Within the block, sends ``dodo.Alive`` each second to a session of this machine; raises OSError.
+
+    Services know by the folder ``channel`` from where it comes.
+    """
+    relay = Relay(cid, channel, HEARTBEAT)
+    task = asyncio.ensure_future(_beat(relay))
     try:
         yield
     finally:
         task.cancel()
+        relay.close()
 
 
-async def _beat(cid: int, key: bytes) -> None:
+async def _beat(relay: Relay) -> None:
     kind = MessageSet.standard().type("dodo.Alive")
     while True:
-        try:
-            now = time.time_ns() // 1000
-            send_on_host(frame_of(kind(time=now), sampled=now, key=key), [group(cid)])
-        except OSError as error:
-            _log.warning("cannot send a sign of life to CID %d: %s", cid, error)
+        now = time.time_ns() // 1000
+        relay.send(frame_of(kind(time=now), sampled=now))
         await asyncio.sleep(ALIVE_S)

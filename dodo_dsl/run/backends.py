@@ -14,7 +14,7 @@ from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import own_modules
 from dodo_dsl.run.process.fork_server_client import ForkServer, serving
-from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.process.slot import Slot, meeting_place
 from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.permission import refuse_unattended
 from dodo_dsl.run.rigs.session import RigSession, attended
@@ -122,18 +122,19 @@ class Processes:
         plan = self._session.at_home(job.plan) if self._session else job.plan
         refuse_unattended(plan)
         isolation = "host" if plan.is_real else self._isolation or plan.isolation
-        if isolation == "network":
-            if self._problem:
-                raise BackendError(self._problem)
-            slot = Slot(plan.cid, descriptors=self._descriptors, work=job.work)
-            yield ProcessBackend(plan, job.folder, job.report, isolation, slot, self._fork_server)
-            return
-        async with (
-            self._exclusively(plan),
-            host_isolation.host_slot(
-                plan, () if plan.is_real else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
-            ) as leased,
-            attended(plan, leased, say, self._roots, self._session) as descriptors,
-        ):
-            slot = replace(leased, descriptors=(*descriptors, *self._descriptors), work=job.work)
-            yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)
+        if isolation == "network" and self._problem:
+            raise BackendError(self._problem)
+        with meeting_place(job.work, keep) as channel:
+            if isolation == "network":
+                slot = Slot(plan.cid, descriptors=self._descriptors, channel=channel)
+                yield ProcessBackend(plan, job.folder, job.report, isolation, slot, self._fork_server)
+                return
+            async with (
+                self._exclusively(plan),
+                host_isolation.host_slot(
+                    plan, () if plan.is_real else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
+                ) as leased,
+                attended(plan, replace(leased, channel=channel), say, self._roots, self._session) as descriptors,
+            ):
+                slot = replace(leased, descriptors=(*descriptors, *self._descriptors), channel=channel)
+                yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)

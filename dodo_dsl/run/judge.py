@@ -73,7 +73,6 @@ def _started(service: PlannedService, command: Command, recording: TestRecording
         **kept,
         "DODO_CLOCK": "recording",
         "DODO_RECORDING": str(recording.path.resolve()),
-        "DODO_READY_FILE": str(work / f"{service.name}.ready"),
     }
     with (work / f"{service.name}.out").open("w+b") as output, (work / f"{service.name}.log").open("w+b") as log:
         process = subprocess.Popen(

@@ -34,7 +34,7 @@ from dodo_dsl.run.process import host_isolation, leftovers, namespaces
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import needed_paths, own_modules
 from dodo_dsl.run.process.fork_server_client import ForkServer, serving
-from dodo_dsl.run.process.slot import Entered, Slot
+from dodo_dsl.run.process.slot import Entered, Slot, meeting_place
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Unmatched
 from dodo_dsl.run.rigs.session import attended
 from dodo_dsl.spec.model import VIRTUAL
@@ -70,12 +70,12 @@ class ApplicationCompose(Compose):
     def _own_images(self) -> set[str]:
         return set()
 
-    def document(self, key: bytes) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         """With the containers that DoDo adds, which have programs of this machine; nothing waits for DoDo's services.
 
         Mounts lie over the folders in ``/tmp`` where DoDo's processes have theirs: so no container removes them.
         """
-        made = super().document(key)
+        made = super().document()
         compiled = yaml.load((self.folder / f"{LAYERS[0]}.compose.yml").read_bytes(), yaml.CSafeLoader)
         services = {name: made["services"][name] for name in self.services}
         own: dict[str, Any] = {}
@@ -91,7 +91,8 @@ class ApplicationCompose(Compose):
             if self.plan.clock == VIRTUAL:
                 place = escaped(str(application_time.built().library.parent))
                 volumes[TIME] = {"driver_opts": {"type": "none", "o": "bind", "device": place}}
-        shown = Entered.with_own(0, *needed_paths(self.plan, self.folder, self.report)).shown if SANDBOX in own else ()
+        needed = [*needed_paths(self.plan, self.folder, self.report), Path(self.channel)]
+        shown = Entered.with_own(0, *needed).shown if SANDBOX in own else ()
         mounts = covers(shown)
         for service in services.values():
             after = service.get("depends_on") or {}
@@ -196,7 +197,7 @@ class MixedBackend:
         await self._processes.open(self._containers.process)
 
     async def start(self, layer: str) -> dict[str, bool]:
-        if layer == _APPLICATION and self._containers.lines:
+        if layer == _APPLICATION:
             await self._processes.connect(self._containers.lines)
         return await (self._containers if layer == _APPLICATION else self._processes).start(layer)
 
@@ -280,15 +281,19 @@ class Mixed:
         plan = job.plan
         if plan.isolation == "network" and not may_enter():
             raise BackendError(NOT_ROOT)
-        with self._containers.project(ApplicationContainers, job, say, b"") as containers:
+        with (
+            meeting_place(job.work, keep) as channel,
+            self._containers.project(ApplicationContainers, job, say, channel) as containers,
+        ):
             if plan.isolation == "network":
-                yield self._backend(job, containers, Slot(plan.cid, descriptors=self._descriptors, work=job.work))
+                slot = Slot(plan.cid, descriptors=self._descriptors, channel=channel)
+                yield self._backend(job, containers, slot)
                 return
             async with (
                 host_isolation.host_slot(plan, (plan.cid,), say, keep, alone=True) as leased,
-                attended(plan, leased, say, self._roots) as descriptors,
+                attended(plan, replace(leased, channel=channel), say, self._roots) as descriptors,
             ):
-                slot = replace(leased, descriptors=(*descriptors, *self._descriptors), work=job.work)
+                slot = replace(leased, descriptors=(*descriptors, *self._descriptors), channel=channel)
                 yield self._backend(job, containers, slot)
 
     def _backend(self, job: Job, containers: ApplicationContainers, slot: Slot) -> MixedBackend:

@@ -1,14 +1,13 @@
 """What an application prints and declares as messages: lines become envelopes, which the runner sends for it.
 
-They come from one address in the test, which proves by the test's key that it is the runner's: the application can
-send none of them itself. What matches nothing is log.
+They come from the runner's address in the test: the application can send none of them itself. What matches nothing is
+log.
 """
 
 import difflib
 import math
 import re
 import struct
-import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,6 @@ from typing import Any, NamedTuple
 
 from dodo_dsl.application.printed_lines import SAMPLE_TIME, compiled
 from dodo_dsl.emit.output_folder import FILES
-from dodo_dsl.opendlv.address import LINES, Address
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import INTEGER_BITS, integer_range
 from dodo_dsl.plan.model import Line, Plan
@@ -217,16 +215,13 @@ class PrintedLines:
             for name, lines in declared.items()
         }
         self._send: Callable[[bytes], None] = lambda _: None
-        self._key, self._address = b"", ("", 0)
-        self._told_s = -math.inf
 
     def __bool__(self) -> bool:
         return bool(self.services)
 
-    def connect(self, send: Callable[[bytes], None], address: Address, key: bytes) -> None:
-        """``send`` sends a frame on the test's bus, from ``address``; says there that it is the runner's."""
-        self._send, self._address, self._key = send, address, key
-        self._tell()
+    def connect(self, send: Callable[[bytes], None]) -> None:
+        """``send`` sends a frame on the test's bus."""
+        self._send = send
 
     def take(self, service: str, line: bytes) -> None:
         """A line that a service printed, without its end."""
@@ -236,15 +231,7 @@ class PrintedLines:
                 what = f"makes a message of more than {MAX_FRAME} bytes, which is not sent"
                 self.services[service].say_once(what, what, self._note)
                 continue
-            if time.monotonic() - self._told_s > _AGAIN_S:
-                self._tell()
             self._send(frame)
-
-    def _tell(self) -> None:
-        self._told_s = time.monotonic()
-        host, port = self._address
-        message = self._messages.type("dodo.Sender")(service=LINES, host=host, port=port)
-        self._send(frame_of(message, self._messages, key=self._key))
 
     def unmatched(self, unfinished: Mapping[str, bytes]) -> tuple[Unmatched, ...]:
         """Of each service what it printed since its last match; ``unfinished`` are their last lines without an end."""

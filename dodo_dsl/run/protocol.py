@@ -4,7 +4,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from dodo_dsl.opendlv.address import Address
 from dodo_dsl.outcome import Check, Response, Verdict
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
@@ -12,10 +11,7 @@ from dodo_dsl.run.machine_load.snapshot import Snapshot
 
 @dataclass(frozen=True)
 class Ready:
-    """A service is ready; ``address`` is where it hears what the bus must not carry, None if it did not say."""
-
     service: str
-    address: Address | None = None
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,11 @@
 
 import json
 import math
-import re
 from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
 
-from dodo_dsl.opendlv.address import Address
 from dodo_dsl.outcome import Evidence, Response, with_margin
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.run.protocol import (
@@ -33,7 +31,6 @@ from dodo_dsl.run.protocol import (
 JUDGED = b'{"dodo": "judged"'
 _STOPS = ("unanswered", "stuck", "timedout")
 _MAX_TEXT = 2000
-_ADDRESS = re.compile(r"(?P<host>[0-9]{1,3}(\.[0-9]{1,3}){3}):(?P<port>[0-9]{1,5})", re.ASCII)
 
 
 def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
@@ -51,7 +48,7 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return None
     kind = message.get("dodo")
     if kind == "ready":
-        return Ready(service, _address(message.get("address")))
+        return Ready(service)
     if kind == "end-of-input":
         return InputEnded(service)
     if kind in ("note", "foreign", "taken"):
@@ -65,12 +62,6 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
     if kind == "flood" and service == RECORDER:
         return _flood(service, message)
     return _clock_event(kind, message) if service == CLOCK else None
-
-
-def _address(text: object) -> Address | None:
-    """An IPv4 address with a port, None if it is none."""
-    found = _ADDRESS.fullmatch(text) if isinstance(text, str) else None
-    return (found["host"], int(found["port"])) if found and 0 < int(found["port"]) < 1 << 16 else None
 
 
 def _told(service: str, message: dict[str, Any]) -> Event | None:

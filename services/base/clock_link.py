@@ -1,6 +1,5 @@
 """A service's link to the clock of a test in lockstep, beside the bus, which only a service that observes it hears."""
 
-import os
 import select
 import time
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.channel import CLOCK_SOCKET, Channel, Done, Hello, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
+from services.base.members import channel
 
 SLICE_S = 0.1
 _MEANWHILE = 0.003
@@ -18,9 +18,9 @@ _MEANWHILE = 0.003
 
 def socket_path() -> Path:
     """Where the clock listens; raises ValueError where the environment names no folder."""
-    if not os.environ.get(CHANNEL_VARIABLE):
+    if (folder := channel()) is None:
         raise ValueError(f"{CHANNEL_VARIABLE} names no folder where services meet the clock")
-    return Path(os.environ[CHANNEL_VARIABLE], CLOCK_SOCKET)
+    return folder / CLOCK_SOCKET
 
 
 class ClockClient:

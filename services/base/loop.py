@@ -187,8 +187,6 @@ class Loop:
 
     def receive(self, timeout: float) -> Envelope | None:
         """For the clock: the next envelope within ``timeout`` seconds."""
-        if self.members is not None:
-            self.members.ask_for_missing()
         return self.session.receive(timeout)
 
     @property

@@ -1,25 +1,24 @@
-"""The services of a test: their key, their addresses, who may send what, and what the application must not hear.
+"""The services of a test: their addresses, who may send what, and what the application must not hear.
 
-In real time each says its address, with a proof that it has the key: DoDo's services alone have it, the application
-never. From there it sends, and there it gets what the application must not hear. The table of who may send which
-message is made by the compiler, of the wiring.
+Each enters its address in a folder that the application does not have. From there it sends, and there it gets, in real
+time, what the application must not hear. The table of who may send which message is the compiler's, of the wiring.
 """
 
-import ctypes
 import json
 import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Self
+from pathlib import Path
+from typing import Self
 
 from google.protobuf.message import Message
 
-from dodo_dsl.opendlv.address import LINES, Address, is_of_the_world
-from dodo_dsl.opendlv.authentication import KEY_VARIABLE, is_proven, with_proof
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE, LINES, Address, is_of_the_world
+from dodo_dsl.opendlv.address_book import HEARTBEAT, RUNNER, AddressBook
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
 
@@ -29,8 +28,8 @@ VARIABLE = "DODO_SENDERS"
 ``my-pose?`` is a service that may not say from where it sends. Without a sender stamp all of them are meant.
 """
 END_OF_INPUT, NOT_SHOWN = "dodo.EndOfInput", "dodo.NotShown"
-RUNNER_ONLY = ("dodo.TestBegin", "dodo.Alive")
-"""Messages of the runner, which prove themselves."""
+RUNNER_ONLY = {"dodo.TestBegin": RUNNER, "dodo.Alive": HEARTBEAT}
+"""Messages of the runner, with the name of the address from which they come."""
 _MOST_NAMED = 3
 
 
@@ -61,8 +60,8 @@ class SenderTable:
     """The producers by message; reports, once for each message, that the application has sent one of theirs."""
 
     messages: MessageSet
-    key: bytes = b""
     by_message: dict[tuple[int, int | None], Producers] = field(default_factory=dict)
+    book: AddressBook = field(default_factory=lambda: AddressBook(channel()))
     _reported: set[str] = field(default_factory=set)
     _of_runner: dict[int, str] = field(init=False)
 
@@ -70,42 +69,30 @@ class SenderTable:
         self._of_runner = {self.messages.id(name): name for name in RUNNER_ONLY}
 
     @classmethod
-    def load(cls, messages: MessageSet, key: bytes) -> Self:
+    def load(cls, messages: MessageSet) -> Self:
         """The table that the environment names, empty without one; raises ValueError for words that make none."""
-        return cls(messages, key, dict(_entries(os.environ.get(VARIABLE, ""), messages)))
+        return cls(messages, dict(_entries(os.environ.get(VARIABLE, ""), messages)))
 
     @property
     def ids(self) -> frozenset[int]:
         """Ids of all messages that not everybody may send."""
         return frozenset([*self._of_runner, *(id_ for id_, _ in self.by_message)])
 
-    @property
-    def services(self) -> frozenset[str]:
-        """All services in the table."""
-        return frozenset(name for each in self.by_message.values() for name in each.services)
-
     def producers(self, envelope: Envelope) -> Producers | None:
         """Those of a message; None for one that anybody may send."""
         of_stamp = self.by_message.get((envelope.data_type, envelope.sender_stamp))
         return of_stamp or self.by_message.get((envelope.data_type, None))
 
-    def is_of_runner(self, envelope: Envelope) -> bool:
-        """Whether a message of the runner proves itself, which the others need not; reports one that does not."""
+    def is_of_runner(self, envelope: Envelope, source: Address) -> bool:
+        """Whether the runner sent a message that only it may send, True for all others; reports one that it did not."""
         name = self._of_runner.get(envelope.data_type)
-        if name is None or is_proven(self.key, envelope.data_type, envelope.payload):
+        if name is None:
+            return True
+        self.book.read()
+        if source == self.book.addresses.get(RUNNER_ONLY[name]):
             return True
         self.report(f"the application sent {name}, which only the runner may send")
         return False
-
-    def is_of(self, service: str, envelope: Envelope, source: Address) -> bool:
-        """Whether a message of the type SENDER proves that its ``source`` is this service's address."""
-        if not is_proven(self.key, envelope.data_type, envelope.payload):
-            return False
-        try:
-            said: Any = self.messages.decode(envelope.data_type, envelope.payload)
-        except MessageError:
-            return False
-        return said.service == service and (said.host, said.port) == source
 
     def check_numbers(self, message: Message, stamp: int, takers: Sequence[str], elapsed: int | None) -> None:
         """Report a number of the application's that is not finite, for services, ``elapsed`` us after the start."""
@@ -216,66 +203,46 @@ def _keys_of(envelope: Envelope) -> tuple[Key, Key]:
     return (envelope.data_type, envelope.sender_stamp), (envelope.data_type, None)
 
 
-SENDER = "dodo.Sender"
-_AGAIN_S = 0.1
-_MISSING_S = 0.5
 _UNATTENDED_S = 10.0
 """After which services count as ready where no runner reports it."""
 
 
 class Members:
-    """Learns the addresses of the test's services, and separates their messages from the application's.
+    """Separates the messages of the test's services from the application's, and sends to them alone.
 
-    A service says its address before it is ready, and again when another asks. The application starts when all are
-    ready, so that it comes too late to be taken for one of them, even if there is no key, as without a runner.
+    A service enters its address before it sends, and the application starts when all are ready.
     """
 
     def __init__(self, session: Session, name: str, table: SenderTable, world: World | None = None) -> None:
-        self._session, self._name, self._table = session, name, table
+        self._session, self._name, self._table, self._book = session, name, table, table.book
         self._world = world or World()
         self._overheard: set[int] = set()
         """Messages of the world that had to come to the bus."""
-        self._silent_from: float | None = None if table.key else time.monotonic() + _UNATTENDED_S
-        """When services that have not said their address are known to be others than DoDo's; None before the start."""
-        self._id, self._type = session.messages.id(SENDER), session.messages.type(SENDER)
-        self._ids = table.ids | {self._id}
-        self._addresses: dict[str, Address | None] = {}
-        """None for a service that has left: another program may have got its port."""
-        self._known: frozenset[Address] = frozenset()
-        self._others: list[Address] = []
-        self._asked = 0.0
-
-    def join(self) -> None:
-        """Say from where this service sends, and ask the others."""
-        self._asked = time.monotonic()
-        self._say(asks=True)
-
-    def leave(self) -> None:
-        """Nothing more will come from this service."""
-        self._say(self._others, leaves=True)
+        self._silent_from = time.monotonic() + _UNATTENDED_S
+        """When services that have not entered their address are known to be others than DoDo's."""
 
     def admits(self, envelope: Envelope) -> bool:
         """Whether the message that the session received last counts; reports one that must not be to the runner."""
-        is_stranger = self._session.was_direct and self._session.source not in self._known
-        if envelope.data_type not in self._ids:
-            return not is_stranger
-        if envelope.data_type == self._id:
-            self._learn(envelope)
-            return False
-        if not self._table.is_of_runner(envelope):
+        source = self._session.source
+        if envelope.data_type not in self._table.ids:
+            return not self._session.was_direct or self._book.knows(source, envelope.received)
+        if not self._table.is_of_runner(envelope, source):
             return False
         producers = self._table.producers(envelope)
         if producers is None:
             return True
-        if LINES in producers.services or self._session.source != self._addresses.get(LINES):
-            return self._session.source in self._known or self._is_excused(producers)
-        self._table.report(producers.reason)  # printed, and of a service of the test
+        is_known, addresses = self._book.knows(source, envelope.received), self._book.addresses
+        is_possible = LINES in producers.services or source != addresses.get(RUNNER)
+        if is_possible and (is_known or any(name not in addresses for name in producers.silent)):
+            return True
+        self._table.report(producers.reason)
         return False
 
     def check_numbers(self, envelope: Envelope, message: Message, elapsed: int | None) -> None:
         """Report the message that the session received last if the application sent it, and a number is not finite."""
         producers = self._table.producers(envelope)
-        if self._session.source not in self._known if producers is None else LINES in producers.services:
+        is_known = self._book.knows(self._session.source, envelope.received)
+        if not is_known if producers is None else LINES in producers.services:
             self._table.check_numbers(message, envelope.sender_stamp, [self._name], elapsed)
 
     def send(self, envelope: Envelope) -> None:
@@ -284,9 +251,11 @@ class Members:
         From the start of the test on, what a service of the deployment consumes that does not say where it listens
         comes to the bus.
         """
-        silent = [name for name in self._world.awaited_by(envelope) if name not in self._addresses]
-        if not silent or self._silent_from is None or time.monotonic() < self._silent_from:
-            self._session.send_directly(envelope, self._others)
+        self._book.read()
+        silent = [name for name in self._world.awaited_by(envelope) if name not in self._book.addresses]
+        if not silent or time.monotonic() < self._silent_from:
+            own = self._session.address
+            self._session.send_directly(envelope, [other for other in self._book.present if other != own])
             return
         if envelope.data_type not in self._overheard:
             self._overheard.add(envelope.data_type)
@@ -296,72 +265,11 @@ class Members:
         self._session.send_envelope(envelope)
 
     def begin(self) -> None:
-        """The test begins: all of its services are ready, and have said their addresses if they ever do."""
-        self._silent_from = self._silent_from or time.monotonic()
-
-    def ask_for_missing(self) -> None:
-        """Ask now and then for the addresses of services that have not said theirs: a message may be lost."""
-        missing = self._world.services - self._addresses.keys() - {self._name}
-        if missing and time.monotonic() - self._asked > _MISSING_S:
-            self.join()
-
-    def _is_excused(self, producers: Producers) -> bool:
-        """A message from an unknown address: counts if it may be of a service that does not say its own.
-
-        It is the application's as soon as all addresses are known from which it may come.
-        """
-        unknown = [name for name in producers.services if name not in self._addresses]
-        if unknown:
-            if time.monotonic() - self._asked > _AGAIN_S:
-                self.join()
-            return not producers.silent.isdisjoint(unknown)
-        self._table.report(producers.reason)
-        return False
-
-    def _say(self, to: Sequence[Address] = (), asks: bool = False, leaves: bool = False) -> None:
-        """To these addresses, where the application does not hear it; else on the bus."""
-        host, port = self._session.address
-        message = self._type(service=self._name, host=host, port=port, asks=asks, leaves=leaves)
-        payload = with_proof(self._table.key, self._id, self._session.messages.encode(message))
-        now = time.time_ns() // 1000
-        envelope = Envelope(self._id, payload, now, 0, now, 0)
-        if to and self._world:
-            self._session.send_directly(envelope, to)
-        else:
-            self._session.send_envelope(envelope)
-
-    def _learn(self, envelope: Envelope) -> None:
-        """The first address of a service counts, until it leaves: that of the application would come later."""
-        if not is_proven(self._table.key, self._id, envelope.payload):
-            return
-        try:
-            said: Any = self._session.messages.decode(self._id, envelope.payload)
-        except MessageError:
-            return
-        source = self._session.source
-        if (said.host, said.port) != source:
-            return
-        if said.asks:
-            self._say([source])
-        if said.service not in self._table.services and not self._is_of_the_world(said.service):
-            return
-        if self._addresses.setdefault(said.service, source) == source and said.leaves:
-            self._addresses[said.service] = None
-        self._known = frozenset(address for address in self._addresses.values() if address is not None)
-        self._others = sorted(self._known)
-
-    def _is_of_the_world(self, service: str) -> bool:
-        return service in self._world.services or service in self._world.silent
+        """The test begins: all of its services are ready, and have entered their addresses if they ever do."""
+        self._silent_from = min(self._silent_from, time.monotonic())
 
 
-def take_key() -> bytes:
-    """The key that the runner gave this process, empty if there is none; raises ValueError for one that is none.
-
-    Afterwards neither the processes that this one starts find it nor those that read ``/proc/PID/environ``.
-    """
-    libc = ctypes.CDLL(None)
-    libc.getenv.restype = ctypes.c_void_p
-    place = libc.getenv(KEY_VARIABLE.encode())
-    if place:
-        ctypes.memset(place, ord("0"), len(ctypes.string_at(place)))
-    return bytes.fromhex(os.environ.pop(KEY_VARIABLE, ""))
+def channel() -> Path | None:
+    """The folder where the test's services meet; None outside of tests."""
+    folder = os.environ.get(CHANNEL_VARIABLE)
+    return Path(folder) if folder else None

@@ -21,6 +21,7 @@ from typing import Any
 
 from google.protobuf.message import Message
 
+from dodo_dsl.opendlv import address_book
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.session import Session, SessionError
@@ -28,7 +29,7 @@ from dodo_dsl.opendlv.shared_memory import MemoryTakenError
 from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, help_text, load_manifest, parse
 from services.base.loop import Loop
-from services.base.members import Members, SenderTable, World, take_key
+from services.base.members import Members, SenderTable, World, channel
 from services.base.service import Build, Context, Service, undeclared_checks
 
 _OURS = ("dodo_dsl.", "services.")
@@ -176,31 +177,31 @@ def _serve(
 ) -> int:
     name = manifest["name"]
     role = os.environ.get("DODO_SERVICE") or name
-    ready = Path(os.environ.get("DODO_READY_FILE") or f"/tmp/dodo-ready-{role}")
     code = USAGE
     try:
-        ready.unlink(missing_ok=True)  # left by one that was killed
+        place = channel()
+        if place:
+            address_book.remove(place, role)  # of one that was killed
         with ExitStack() as resources:
             session = resources.enter_context(_session(flags["cid"], _messages(manifest, folder)))
             world = World.load(session.messages)
             resources.enter_context(published(session, flags["log-id"]))
-            key = take_key()
             if clock is None:
                 with interruptible():  # it waits for the clock service
                     clock = _clock(session, role)
             on_rig = bool(os.environ.get("DODO_RIG"))
-            service = build(Context(name, flags, session.messages, resources, clock, session, key, on_rig))
+            service = build(Context(name, flags, session.messages, resources, clock, session, on_rig))
             code = BROKEN
-            if world and (service.drive or not os.environ.get("DODO_CLOCK")):
+            if place and (service.drive or not os.environ.get("DODO_CLOCK")):
                 session.hear_directly()
-            members = resources.enter_context(_membership(session, role, key, world))
+            members = _membership(session, role, world)
             stamp = flags["id"] if isinstance(flags["id"], int) else 0  # its own list gives each message one
             loop = Loop(role, service, session, clock, stamp, members)
-            resources.enter_context(_readiness(ready, session))
+            resources.enter_context(_readiness(place, role, session))
             try:
                 (service.drive or loop.run)(stop)
             finally:
-                if key or _recording():  # by hand nobody reads it
+                if place or _recording():  # by hand nobody reads it
                     _print_record(service)
             if service.verdict is not None:
                 if undeclared := undeclared_checks(service.verdict, manifest.get("checks")):
@@ -260,32 +261,25 @@ def _clock(session: Session, role: str) -> Clock:
     return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1), is_virtual=is_virtual)
 
 
-@contextmanager
-def _membership(session: Session, role: str, key: bytes, world: World) -> Iterator[Members | None]:
-    """The test's services in real time, as long as this is one of them; in lockstep the clock knows them."""
-    senders = SenderTable.load(session.messages, key)
+def _membership(session: Session, role: str, world: World) -> Members | None:
+    """The test's services in real time; in lockstep the clock knows them."""
+    senders = SenderTable.load(session.messages)
     if os.environ.get("DODO_CLOCK") or not (senders.by_message or world):
-        yield None
-        return
-    members = Members(session, role, senders, world)
-    members.join()
-    yield members
-    members.leave()
+        return None
+    return Members(session, role, senders, world)
 
 
 @contextmanager
-def _readiness(file: Path, session: Session) -> Iterator[None]:
-    """Report that the service is ready, and where it listens; the ready file exists as long as it is.
-
-    Raises OSError for a link in its place: its folder may be the application's, too.
-    """
-    address = {"address": f"{session.address[0]}:{session.port}"} if session.hears_directly else {}
-    os.close(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666))
+def _readiness(folder: Path | None, role: str, session: Session) -> Iterator[None]:
+    """Report that the service is ready, and where it is, as long as it is; raises OSError."""
+    if folder:
+        address_book.enter(folder, role, session.address)
     try:
-        print(json.dumps({"dodo": "ready", **address}), flush=True)
+        print(json.dumps({"dodo": "ready"}), flush=True)
         yield
     finally:
-        file.unlink(missing_ok=True)
+        if folder:
+            address_book.leave(folder, role, session.address)
 
 
 @contextlib.contextmanager

@@ -181,8 +181,6 @@ class Context:
     clock: Clock = field(default_factory=RealTimeClock)
     session: Session | None = None
     """The bus itself; only for a service with ``drive``."""
-    key: bytes = field(default=b"", repr=False)
-    """The key of the test; empty if there is no runner."""
     on_rig: bool = False
     """Whether the test runs on a rig, where a service that vanishes may have been unplugged."""
 

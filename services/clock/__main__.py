@@ -12,7 +12,7 @@ from services.base.members import SenderTable
 from services.base.service import period_of
 from services.clock.answers import Answers, filters
 from services.clock.exchange import Patience, Roles, Timing
-from services.clock.service import CONSUMED, ClockService, OwnTime
+from services.clock.service import ClockService, OwnTime
 from services.clock.virtual import SentMessages, TimeAgent
 
 
@@ -27,9 +27,9 @@ def build(context: Context) -> Service:
         answers = SentMessages(answers.filters)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"
-    senders = SenderTable.load(context.messages, context.key)
+    senders = SenderTable.load(context.messages)
     answering = (each.data_type for each in answers.filters)
-    context.session.hear_only([*answering, *senders.ids, *(ids[name] for name in CONSUMED)])
+    context.session.hear_only([*answering, *senders.ids])
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])
     timing = Timing(period_of(flags["freq"]), timeout, patience, flags["max-response"])

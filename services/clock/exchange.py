@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Protocol
 
 from dodo_dsl.opendlv.address import LINES, Address
+from dodo_dsl.opendlv.address_book import RUNNER
 from dodo_dsl.opendlv.channel import Channel, Done, Listener, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
-from services.base.members import SENDER, SenderTable, World
+from services.base.members import SenderTable, World
 
 
 class Exchange:
@@ -36,10 +37,7 @@ class Exchange:
         self._session, self._take_other = session, take
         self._senders = senders or SenderTable(session.messages)
         self._world = World.load(session.messages)
-        self._sender_id = session.messages.id(SENDER)
-        self._printing: Address | None = None
-        """From where the runner sends what the application prints; the first one that proves it."""
-        self._listener = Listener(path, {*services})
+        self._listener = Listener(path, services)
         self._channels: dict[str, Channel] = {}
         self._unsent: dict[str, Step | Show] = {}
         self._expected: dict[str, int] = {}
@@ -56,10 +54,10 @@ class Exchange:
 
     def result(self, service: str, timeout: float = 0.0) -> Done | None:
         """A service's answer to its last command within ``timeout`` seconds, once."""
-        if self._listener.is_open:
+        if self._listener.missing:
             self._accept(0.0 if service in self._channels else timeout)
         if service not in self._channels:
-            time.sleep(0.0 if self._listener.is_open else timeout)
+            time.sleep(0.0 if self._listener.missing else timeout)
             return None
         try:
             done = self._channels[service].receive(timeout)
@@ -74,7 +72,8 @@ class Exchange:
         return done if not self._expected[service] else self.result(service, timeout)
 
     def _accept(self, timeout: float) -> None:
-        for name, channel in self._listener.accept(timeout).items():
+        if accepted := self._listener.accept(timeout):
+            name, channel = accepted
             self._channels[name] = channel
             if name in self._unsent:
                 channel.send(self._unsent.pop(name))
@@ -105,15 +104,16 @@ class Exchange:
 
     def hear(self, envelope: Envelope, source: Address) -> None:
         """Take a message from the bus; the addresses of all services are known."""
-        if envelope.data_type == self._sender_id:
-            if self._printing is None and self._senders.is_of(LINES, envelope, source):
-                self._printing = source
-        elif source not in self._own and self._senders.is_of_runner(envelope):
+        if source not in self._own and self._senders.is_of_runner(envelope, source):
             producers = self._senders.producers(envelope)
-            if producers is None or (LINES in producers.services and source == self._printing):
+            if producers is None or (LINES in producers.services and source == self._runner()):
                 self._take_other(envelope)
             else:
                 self._senders.report(producers.reason)
+
+    def _runner(self) -> Address | None:
+        self._senders.book.read()
+        return self._senders.book.addresses.get(RUNNER)
 
     def ignore_services(self, ids: Iterable[int]) -> None:
         """Not be woken by messages with these ids that services send on the bus: all of them are known now."""

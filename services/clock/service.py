@@ -16,7 +16,7 @@ from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
 from services.base.lockstep_clock import EPOCH
-from services.base.members import SENDER, SenderTable
+from services.base.members import SenderTable
 from services.base.service import Service
 from services.clock.answers import Answers
 from services.clock.application import ResponseTimes, SteppedApplication
@@ -32,7 +32,7 @@ A short test needs them closer, because what was measured by the wall clock is p
 """
 _SLICE = 0.05
 _MOST_EARLY = 1000
-CONSUMED = ("dodo.TestBegin", SENDER)
+BEGIN = "dodo.TestBegin"
 """What the clock consumes besides the application's answers."""
 
 _log = logging.getLogger(__name__)
@@ -63,11 +63,10 @@ class ClockService(Service):
         Then ``answers`` are SentMessages.
         """
         self._session = session
-        self._begin_id = session.messages.id("dodo.TestBegin")
+        self._begin_id = session.messages.id(BEGIN)
         self._senders = senders or SenderTable(session.messages)
         answering = (each.data_type for each in answers.filters)
-        self._heard = frozenset([*answering, *self._senders.ids, session.messages.id(SENDER)])
-        self._guarded = self._senders.ids | {session.messages.id(name) for name in CONSUMED}
+        self._heard = frozenset([*answering, *self._senders.ids])
         self._early: list[tuple[Envelope, Address]] = []
         self._answers = answers
         self._exchange = exchange = Exchange(session, path, roles.all, self._take, self._senders)
@@ -144,18 +143,18 @@ class ClockService(Service):
         """The start that the runner announces; one of its own where DODO_RUNNER says that there is none."""
         if os.environ.get("DODO_RUNNER") == "":
             self._stepper.waits_for_start = True
-            begin = self._session.messages.type("dodo.TestBegin")()
+            begin = self._session.messages.type(BEGIN)()
             return Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)
         while not self._stopped():
             envelope = self._session.receive(_SLICE)
             if envelope is None:
                 continue
-            if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope):
+            if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope, self._session.source):
                 self._session.hear_directly(False)
                 return envelope
             if self._session.was_direct:
                 continue
-            if envelope.data_type in self._guarded and len(self._early) < _MOST_EARLY:
+            if envelope.data_type in self._senders.ids and len(self._early) < _MOST_EARLY:
                 self._early.append((envelope, self._session.source))
         return None
 

@@ -82,12 +82,10 @@ INPUTS = {
 }  # fmt: skip
 """What templates for GitLab hand from an input to a job: set the input."""
 SERVICES = {
-    "DODO_CHANNEL": "in lockstep: the folder where services meet the clock, which the application does not have",
+    "DODO_CHANNEL": "the folder where services meet, each by a link of its name; no application has it",
     "DODO_CLOCK": "`lockstep`, or `recording` for `dodo judge`; without it real time",
-    "DODO_KEY": "key by which services prove who they are; a service removes it before anything else can read it",
     "DODO_ODVD": "files of further messages, separated by `:`",
     "DODO_READERS": "processes of the application that wait for each frame",
-    "DODO_READY_FILE": "the file that the service makes when it is ready",
     "DODO_RECORDING": "the recording that is judged again",
     "DODO_RIG": "the rig on which the test runs",
     "DODO_RUNNER": "empty if there is no runner, as with `docker compose up`",

@@ -23,6 +23,7 @@ from tests.run.helpers import READY, STARTED, WAIT, Bench, Recorded
 
 IMAGE = f"dodo/base:{__version__}"
 SANDBOX_IMAGE = f"dodo/sandbox:{__version__}"
+MEMORY = {"type": "tmpfs", "device": "tmpfs", "o": "mode=1777"}
 SUBNETS = [f"10.213.{third}.{fourth}/28" for third in range(240, 256) for fourth in range(0, 256, 16)]
 
 
@@ -78,7 +79,8 @@ class Crate:
 
     def _compose(self, plan: Plan) -> dict[str, Any]:
         camera, judge = (self._service(plan, name) for name in ("camera", "judge"))
-        camera["volumes"].append("report:/dodo/report")
+        camera["volumes"] += ["report:/dodo/report", "channel:/dodo/channel"]
+        camera["environment"] = {"DODO_CHANNEL": "/dodo/channel"}
         sandbox = {
             "image": SANDBOX_IMAGE,
             "command": ["sleep", "infinity"],
@@ -89,7 +91,7 @@ class Crate:
         return {
             "services": {"camera": camera, "judge": judge, "sandbox": sandbox},
             "networks": {"default": {"ipam": {"config": [{"subnet": "${DODO_SUBNET:-10.213.240.0/28}"}]}}},
-            "volumes": {"tmp": {}, "report": {}},
+            "volumes": {"tmp": {}, "report": {}, "channel": {"driver_opts": MEMORY}},
         }
 
     def run(self, *jobs: Job) -> dict[str, Outcome]:

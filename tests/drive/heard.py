@@ -16,8 +16,6 @@ PAGE = ROOT / "docs" / "reference" / "applications.md"
 BEGIN, END = "<!-- the table of scripts/make-heard begins -->", "<!-- and ends -->"
 CAR = ("opendlv.proxy.", "opendlv.system.", "opendlv.device.")
 """What a car's bus carries."""
-DODO_S_OWN = {"dodo.Sender/0"}
-"""It carries addresses, and nothing that only a simulation knows."""
 TESTS = sorted(path.name.partition(".")[0] for path in ROOT.glob("tests_registry/*/*.dodo.yml"))
 TESTS_IN = {"lockstep": [name for name in TESTS if not name.startswith("hil-")], "realtime": TESTS}
 
@@ -59,7 +57,7 @@ def heard(folder: Path, clock: str, tests: Iterable[str], *words: str) -> Heard:
 
 def strangers(found: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
     """Of what was heard, that which neither a car nor DoDo's own exchange has, by test."""
-    named = {test: [n for n in names if not n.startswith(CAR) and n not in DODO_S_OWN] for test, names in found.items()}
+    named = {test: [n for n in names if not n.startswith(CAR)] for test, names in found.items()}
     return {test: names for test, names in named.items() if names}
 
 

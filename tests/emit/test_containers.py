@@ -9,6 +9,8 @@ from dodo_dsl.emit.containers import FILES_MOUNT, Defaults, Variable, containers
 from dodo_dsl.plan.model import Flag, Place, Plan, PlannedService
 from tests.run.helpers import Bench
 
+MEET = "dodo-channel:/dodo/channel"
+
 
 @pytest.fixture
 def plan(tmp_path: Path) -> Plan:
@@ -29,8 +31,8 @@ def plan(tmp_path: Path) -> Plan:
 def test_paths_and_dollars_of_a_command(plan: Plan) -> None:
     (camera,) = containers(plan, "environment").services
     assert camera.command == ("--map=/dodo/files/a/$$b.json", "--rec=/dodo/report/x.rec", "--cid=130")
-    assert camera.volumes == ("tmp:/tmp", FILES_MOUNT, "report:/dodo/report")
-    assert (camera.ready_file, camera.ready_tries) == ("/tmp/dodo-ready-camera", 125)
+    assert camera.volumes == ("tmp:/tmp", MEET, FILES_MOUNT, "report:/dodo/report")
+    assert camera.ready_tries == 125
 
 
 @pytest.mark.parametrize(
@@ -39,19 +41,21 @@ def test_paths_and_dollars_of_a_command(plan: Plan) -> None:
 def test_each_layer_waits_for_those_before_it(plan: Plan, layer: str, earlier: list[str]) -> None:
     waits = [(name, "service_healthy") for name in earlier]
     found = containers(plan, layer)
-    assert (found.after, found.volumes) == ((("sandbox", "service_started"), *waits), ("tmp:/tmp",))
+    assert (found.after, found.volumes) == ((("sandbox", "service_started"), *waits), ("tmp:/tmp", MEET))
     on_host = containers(replace(plan, isolation="host"), layer)
-    assert (on_host.after, on_host.volumes) == (tuple(waits), ("/tmp:/tmp",))
+    assert (on_host.after, on_host.volumes) == (tuple(waits), ("/tmp:/tmp", MEET))
     assert on_host.services[0].volumes[0] == "/tmp:/tmp"
 
 
 def test_environment_has_what_has_a_value(plan: Plan) -> None:
     layer = containers(plan, "action")
-    assert (layer.environment, layer.services[0].environment) == ((), (Variable("DODO_SERVICE", "vehicle"),))
+    meet = Variable("DODO_CHANNEL", "/dodo/channel")
+    assert (layer.environment, layer.services[0].environment) == ((meet,), (Variable("DODO_SERVICE", "vehicle"),))
     layer = containers(replace(plan, messages=("a.odvd", "b.odvd"), rig="desk"), "action")
     assert {each.name: each.value for each in layer.environment} == {
         "DODO_ODVD": "/dodo/files/a.odvd:/dodo/files/b.odvd",
         "DODO_RIG": "desk",
+        "DODO_CHANNEL": "/dodo/channel",
     }
     assert FILES_MOUNT in layer.services[0].volumes, "the messages are there"
 
@@ -100,4 +104,4 @@ def test_a_service_sees_the_shared_files_of_its_own_paths(plan: Plan) -> None:
     map_, other = f"{'0' * 64}-b.json", f"{'1' * 64}-other.rec"
     (camera,) = containers(replace(plan, shared={"a/$b.json": map_, "a/$b.json2": other}), "environment").services
     mount = {**FILES_MOUNT, "source": f"../_files/{map_}", "target": f"/_files/{map_}"}
-    assert camera.volumes == ("tmp:/tmp", FILES_MOUNT, mount, "report:/dodo/report")
+    assert camera.volumes == ("tmp:/tmp", MEET, FILES_MOUNT, mount, "report:/dodo/report")

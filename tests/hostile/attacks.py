@@ -407,10 +407,8 @@ def locks_memory() -> object:
 
 @attack
 def secrets_in_its_arguments_neighbours() -> object:
-    """A key of the test in any command line that it sees."""
-    return [
-        p for p in filter(str.isdigit, os.listdir("/proc")) if b"DODO_KEY" in Path(f"/proc/{p}/environ").read_bytes()
-    ]
+    """Where the test's services meet, in any environment that it sees."""
+    return [path for path in Path("/proc").glob("[0-9]*/environ") if b"DODO_CHANNEL" in path.read_bytes()]
 
 
 @attack
@@ -441,11 +439,12 @@ def sees_names_of_the_machines_folders() -> object:
 
 
 @attack
-def removes_the_services_ready_files() -> object:
+def removes_the_services_entries() -> object:
+    """Where they meet."""
     gone = []
-    for name in os.listdir("/tmp"):
-        if name.startswith("dodo-ready-"):
-            os.unlink(f"/tmp/{name}")
+    for folder, _, names in [*os.walk("/tmp"), *os.walk("/dodo")]:
+        for name in names if "channel" in folder else []:
+            os.unlink(f"{folder}/{name}")
             gone.append(name)
     return gone
 

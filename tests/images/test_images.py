@@ -41,9 +41,10 @@ def run(reference: str, *words: str, flags: tuple[str, ...] = HARDENED) -> str:
 @contextlib.contextmanager
 def started(reference: str, volume: str, service: str, *words: str, flags: tuple[str, ...] = ()) -> Iterator[str]:
     """A service in a container as the compiled files start it; taken away at the end."""
-    ready = f"test -f /tmp/dodo-ready-{service}"
+    ready = f"test -L /dodo/channel/{service}"
     health = ("--health-cmd", ready, "--health-interval", "500ms", "--health-retries", "1200")
     command = ["run", "--detach", "--init", *HARDENED, *health, "--env", f"DODO_SERVICE={service}"]
+    command += ["--env", "DODO_CHANNEL=/dodo/channel", "--tmpfs", "/dodo/channel:mode=1777"]
     container = docker(*command, "--volume", f"{volume}:/tmp", *flags, reference, *words)
     try:
         yield container

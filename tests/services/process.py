@@ -1,6 +1,5 @@
 """Services of ours as processes, for tests that talk to them over the bus."""
 
-import os
 import subprocess
 import sys
 import time
@@ -33,7 +32,6 @@ def launch(module: str, folder: Path, *flags: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", f"services.{module}", *flags],
         cwd=ROOT,
-        env={**os.environ, "DODO_READY_FILE": str(folder / f"ready-{module}")},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -43,7 +43,7 @@ def start(words: list[str], folder: Path) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         [sys.executable, *words[1:]],
         cwd=ROOT,
-        env={"PATH": "/usr/bin:/bin", "DODO_READY_FILE": str(folder / "ready")},
+        env={"PATH": "/usr/bin:/bin"},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -12,19 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
-from dodo_dsl.opendlv.address import Address
-from dodo_dsl.opendlv.relay import Relay
 from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
 from dodo_dsl.run import service_protocol
-from dodo_dsl.run.announce import hearers, that_hear
+from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.application_time import PAGE_DESTROYED
 from dodo_dsl.run.docker import shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
 from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerProcesses, ContainerUse
-from dodo_dsl.run.docker.events import EventWatch, announce_begin
+from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, copy_into
 from dodo_dsl.run.docker.pulls import Pulls, Say
 from dodo_dsl.run.machine_load.service_use import Used
@@ -42,8 +40,6 @@ _MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
 
 _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
-_ADDRESS_TURNS, _ADDRESS_TURN_S = 40, 0.05
-"""How often, and how long each time, the addresses of services are awaited: they come by their logs."""
 _HOST_TURNS, _HOST_TURN_S = 20, 0.05
 """How often, and how long each time, a container's process is looked for on this machine."""
 
@@ -65,11 +61,10 @@ class DockerBackend:
         project: str,
         subnets: Iterable[str],
         say: Say,
-        key: bytes,
+        channel: str = "",
     ) -> None:
-        """``key`` is that of the test."""
+        """``channel`` is the folder where services meet, if they and the runner are on this host."""
         self.plan = plan
-        self._key = key
         self.cid = plan.cid
         self.report = report
         self.project = project
@@ -79,17 +74,15 @@ class DockerBackend:
         self._subnets = subnets
         self._say = say
         self._events: asyncio.Queue[Event] = asyncio.Queue()
-        self._compose = self.compose_kind(plan, folder, report, project, say)
+        self._compose = self.compose_kind(plan, folder, report, project, say, channel)
         self._application = tuple(service.name for service in plan.application.services)
         self._containers: dict[str, Any] = {}
         self._processes = ContainerProcesses({})
         self._use = ContainerUse({})
         self.lines = PrintedLines(plan, folder, lambda text: self._events.put_nowait(Noted(text)))
         """What the application's containers print."""
-        self._relay: Relay | ContainerRelay | None = None
+        self._relay: ContainerRelay | None = None
         self._outputs: dict[str, ServiceOutput] = {}
-        self._addresses: dict[str, Address] = {}
-        """Where services of the test hear what the bus must not carry."""
         self._out_of_memory: set[str] = set()
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
@@ -115,7 +108,7 @@ class DockerBackend:
         await self._pulls.once("docker compose", self._compose.require_plugin)
         await self._require_files()
         await self._compose.provide_images(self._pulls)
-        await self._compose.create(self._subnets, self._key)
+        await self._compose.create(self._subnets)
         await self._start_watching()
 
     async def _require_files(self) -> None:
@@ -255,9 +248,7 @@ class DockerBackend:
         names = [s.name for s in self.plan.layer(layer)]
         if layer == "application":
             names = [name for name in self._application if name in self._containers]
-            await self._wait_for_copies()
-            if self.lines:
-                await self._connect()
+            await asyncio.gather(self._wait_for_copies(), self._connect())
         evaluators = {s.name for s in self.plan.services if s.judge}
         for name in names:
             self._outputs[name] = ServiceOutput(
@@ -273,17 +264,15 @@ class DockerBackend:
         return {name: name in ready for name in names}
 
     async def _connect(self) -> None:
-        """Lets the lines that containers print be sent on the test's bus; raises BackendError."""
+        """Lets the runner send to services, and on the test's bus; raises BackendError."""
         from docker.errors import DockerException
 
         try:
-            if self.is_on_host:
-                self._relay = Relay(self.cid)
-            else:
-                self._relay = await asyncio.to_thread(ContainerRelay, self._containers[RECORDER], self.cid)
+            own = self._containers.get(RECORDER) or self._containers[self.plan.services[0].name]
+            self._relay = await asyncio.to_thread(ContainerRelay, own, self.cid)
         except (DockerException, OSError, ValueError) as error:
-            raise BackendError(f"what the application prints cannot be sent: {engine_error(error)}") from error
-        self.lines.connect(self._relay.send, self._relay.address, self._key)
+            raise BackendError(f"nothing can be sent to the test's services: {engine_error(error)}") from error
+        self.lines.connect(self._relay.send)
 
     def _prints(self, name: str) -> bool:
         """Whether what a container prints becomes messages."""
@@ -319,8 +308,6 @@ class DockerBackend:
             if layer == "application" and self._prints(name):
                 self.lines.take(name, line)
             event = None if layer == "application" else service_protocol.read_line(name, name in evaluators, line)
-            if isinstance(event, Ready) and event.address:
-                self._addresses[name] = event.address
             if event is not None:
                 self._events.put_nowait(event)
             return event is not None
@@ -385,12 +372,8 @@ class DockerBackend:
 
     async def begin(self) -> None:
         await self.require_own_host()
-        for _ in range(_ADDRESS_TURNS):
-            if self._addresses.keys() >= {*that_hear(self.plan)}:
-                break
-            await asyncio.sleep(_ADDRESS_TURN_S)
-        to = hearers(self.plan, self.cid, self._addresses)
-        await announce_begin(self.plan.seed, to, self._containers.get(SANDBOX), self._key)
+        assert self._relay is not None, "the application was started"
+        self._relay.send(begin_frame(self.plan.seed), hearers(self.plan))
 
     async def load(self) -> Snapshot | None:
         return await asyncio.to_thread(self._processes.load)

@@ -21,8 +21,8 @@ from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.host_paths import holds_port, is_port, is_rule_for_port
 from dodo_dsl.application.interpolation import EnvironmentProblem, interpolate
 from dodo_dsl.application.model import FILES
+from dodo_dsl.emit.containers import CHANNEL
 from dodo_dsl.emit.output_folder import PLAN_FILE
-from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
@@ -65,12 +65,14 @@ class Compose:
     layers: Sequence[str] = [layer for layer in LAYERS if layer != "application"]
     """Those whose compiled files have a part in it."""
 
-    def __init__(self, plan: Plan, folder: Path, report: Path, project: str, say: Say) -> None:
+    def __init__(self, plan: Plan, folder: Path, report: Path, project: str, say: Say, channel: str = "") -> None:
+        """``channel`` is the folder where services meet, if they and the runner are on this host."""
         self.plan = plan
         self.folder = folder
         self.report = report
         self.project = project
         self.services: dict[str, Any] = {}
+        self.channel = channel
         self._application = plan.application.compose
         self._say = say
         self._paths = application_paths(plan.application, folder)
@@ -181,14 +183,14 @@ class Compose:
             raise BackendError(f"the application's images cannot be built: {problem}; see {where}")
         return ""
 
-    async def create(self, subnets: Iterable[str], key: bytes) -> None:
+    async def create(self, subnets: Iterable[str]) -> None:
         """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError."""
         code, problem = 1, "no subnet is free"
         try:
-            document = await asyncio.to_thread(self.document, key)
+            document = await asyncio.to_thread(self.document)
         except OSError as error:
             raise BackendError(f"the tests' files cannot be hidden from the application: {error}") from error
-        with tempfile.TemporaryDirectory(prefix="dodo-key-") as folder:
+        with tempfile.TemporaryDirectory(prefix="dodo-compose-") as folder:
             own = Path(folder) / "application.compose.json"
             _write(own, document)
             files = [*(f"{layer}.compose.yml" for layer in self.layers), str(own)]
@@ -199,15 +201,13 @@ class Compose:
         if code:
             raise BackendError(f"docker compose cannot create the test: {traced(self.plan, problem)}")
 
-    def document(self, key: bytes) -> dict[str, Any]:
-        """A compose file with the application, and what DoDo's services get beside their layers; raises OSError.
-
-        That is the ``key``, which is in no variable, as any could be named in the application's file.
-        """
+    def document(self) -> dict[str, Any]:
+        """A compose file with the application, and where DoDo's services meet on this host; raises OSError."""
         hidden, empty = self._hidden(), self.folder / _EMPTY_FILE
         if any(path.is_file() for path in hidden):
             empty.touch()
-        services: dict[str, Any] = {s.name: {"environment": {KEY_VARIABLE: key.hex()}} for s in self.plan.services}
+        meets = {"volumes": [{"type": "bind", "source": escaped(self.channel), "target": CHANNEL}]}
+        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel}
         for name, mounted in self._binds.items():
             lie_over = masks(mounted, hidden, empty) + absent(mounted, self._paths, always=name == FILES)
             service = {key: value for key, value in self.services.get(name, {}).items() if key != "build"}

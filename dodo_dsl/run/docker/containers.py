@@ -19,7 +19,7 @@ from dodo_dsl.run.docker.backend import DockerBackend, other_subnets
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.process import host_isolation
-from dodo_dsl.run.process.slot import new_key
+from dodo_dsl.run.process.slot import meeting_place
 from dodo_dsl.run.protocol import Backend, BackendError
 from dodo_dsl.run.rigs.permission import refuse_unattended
 from dodo_dsl.run.rigs.session import attended
@@ -71,21 +71,26 @@ class Containers:
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
-        plan, key = job.plan, new_key()
+        plan = job.plan
         refuse_rpicam(plan)
-        with self.project(DockerBackend, job, say, key) as backend:
-            if plan.isolation == "network" and not plan.is_real:
+        if plan.isolation == "network" and not plan.is_real:
+            with self.project(DockerBackend, job, say) as backend:
                 yield backend
-            else:
-                async with (
-                    host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
-                    attended(plan, replace(slot, key=key), say, self._roots),
-                ):
-                    yield backend
+            return
+        with meeting_place(job.work, keep) as channel, self.project(DockerBackend, job, say, channel) as backend:
+            Path(channel).chmod(0o777)  # for users of images; the folder around it is closed
+            async with (
+                host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
+                attended(plan, replace(slot, channel=channel), say, self._roots),
+            ):
+                yield backend
 
     @contextlib.contextmanager
-    def project(self, kind: type[_Kind], job: Job, say: Say, key: bytes) -> Iterator[_Kind]:
-        """A backend of a kind with its own project, and the project's lease; raises BackendError."""
+    def project(self, kind: type[_Kind], job: Job, say: Say, channel: str = "") -> Iterator[_Kind]:
+        """A backend of a kind with its own project, and the project's lease; raises BackendError.
+
+        ``channel`` is the folder where services meet, if they and the runner are on this host.
+        """
         if self._client is None or self._pulls is None:
             raise BackendError(self._problem)
         plan = job.plan
@@ -94,7 +99,7 @@ class Containers:
         lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"
         subnets = other_subnets(plan.subnet, self._subnets)
-        backend = kind(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say, key)
+        backend = kind(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say, channel)
         try:
             yield backend
         finally:

@@ -1,11 +1,12 @@
-"""What containers print, as it comes, and a sender of lines in a test's network: a program next to its recorder."""
+"""What containers print, as it comes, and a sender in a test's network: a program next to its recorder."""
 
 import contextlib
 import os
 import socket
+from collections.abc import Iterable
 from typing import Any
 
-from dodo_dsl.opendlv.address import Address
+from dodo_dsl.opendlv.relay import BUS
 
 _COMMAND = ("python", "-m", "dodo_dsl.opendlv.relay")
 _START_S = 30.0
@@ -32,7 +33,7 @@ def copy_into(stream: socket.socket, writer: int) -> None:
 class ContainerRelay:
     """``Relay`` in the network of a container that has DoDo's programs.
 
-    Raises DockerException, and OSError or ValueError where the program does not say its address.
+    Raises DockerException, and OSError or ValueError where the program does not start.
     """
 
     def __init__(self, container: Any, cid: int) -> None:
@@ -41,28 +42,23 @@ class ContainerRelay:
         self._stream = _socket(api.exec_start(self._exec, socket=True))
         self._stream.settimeout(_START_S)
         try:
-            self.address: Address = self._said()
+            self._await_start()
         except (OSError, ValueError):
             self._stream.close()
             raise
 
-    def _said(self) -> Address:
+    def _await_start(self) -> None:
         data = b""
-        while not data.endswith(b"\n"):
-            header = self._stream.recv(_HEADER_BYTES, socket.MSG_WAITALL)
-            if not header:
-                break
+        while not data.endswith(b"\n") and (header := self._stream.recv(_HEADER_BYTES, socket.MSG_WAITALL)):
             data += self._stream.recv(int.from_bytes(header[4:], "big"), socket.MSG_WAITALL)
         said = " ".join(data.decode("utf-8", "replace").split())
-        host, _, port = said.partition(" ")
-        if not port.isdecimal():
+        if said != "ready":
             raise ValueError(f"the program that sends it says '{said[:200]}'")
-        return host, int(port)
 
-    def send(self, frame: bytes) -> None:
-        """Sends one frame, or loses it where the program has ended."""
+    def send(self, data: bytes, to: Iterable[str] = (BUS,)) -> None:
+        """Sends a datagram to services by their names, or loses it where the program has ended."""
         with contextlib.suppress(OSError):
-            self._stream.sendall(frame)
+            self._stream.sendall(" ".join([*to, f"{data.hex()}\n"]).encode())
 
     def close(self) -> None:
         self._stream.close()

@@ -4,9 +4,7 @@ import asyncio
 import contextlib
 import functools
 import os
-import shutil
-import tempfile
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ from typing import Any
 import msgspec
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.opendlv.address import Address
+from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run import application_time, service_protocol
@@ -75,8 +73,6 @@ class ProcessBackend:
         self._events: asyncio.Queue[Event] = asyncio.Queue() if events is None else events
         self._lines = PrintedLines(plan, folder, self._note)
         self._outputs: dict[str, ServiceOutput] = {}
-        self._addresses: dict[str, Address] = {}
-        """Where services of the test hear what the bus must not carry."""
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._conditions = Conditions(plan.application.services, has_health=False)
@@ -100,10 +96,7 @@ class ProcessBackend:
 
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
-        channel = await asyncio.to_thread(tempfile.mkdtemp, prefix="dodo-channel-", dir=self.slot.work)
-        self.slot = replace(self.slot, channel=channel)
-        self._commands = replace(self._commands, slot=self.slot)
-        needed = [*needed_paths(self.plan, self._folder, self.report), Path(channel)]
+        needed = [*needed_paths(self.plan, self._folder, self.report), Path(self.slot.channel)]
         if self.plan.clock == VIRTUAL:
             time = await asyncio.to_thread(application_time.built)
             self._commands = replace(self._commands, time=time)
@@ -158,7 +151,7 @@ class ProcessBackend:
         self._conditions.ended(exited, code)
 
     async def start(self, layer: str) -> dict[str, bool]:
-        if layer == "application" and self._lines:
+        if layer == "application":
             await self.connect(self._lines)
         if layer == "application" and self.plan.clock == VIRTUAL:
             await self._start_time()
@@ -199,15 +192,13 @@ class ProcessBackend:
             raise BackendError(f"the application cannot be given the test's time: {said}")
 
     async def connect(self, lines: PrintedLines) -> None:
-        """Lets ``lines`` send on the test's bus; raises BackendError."""
-        address = await self._ask("relay", cid=self.slot.cid)
-        if address is None:
-            raise BackendError("what the application prints cannot be sent: the sandbox does not reach the test's bus")
-        lines.connect(
-            lambda frame: self._sandbox.send({"do": "line", "data": frame.hex()}),
-            (str(address[0]), int(address[1])),
-            self.slot.key,
-        )
+        """Lets the runner, and ``lines``, send on the test's bus; raises BackendError."""
+        if not await self._ask("relay", cid=self.slot.cid, folder=self.slot.channel):
+            raise BackendError("nothing can be sent to the test's services: the sandbox does not reach its bus")
+        lines.connect(self._send)
+
+    def _send(self, data: bytes, to: Sequence[str] = (BUS,)) -> None:
+        self._sandbox.send({"do": "send", "to": to, "data": data.hex()})
 
     def _note(self, text: str) -> None:
         self._events.put_nowait(Noted(text))
@@ -238,8 +229,6 @@ class ProcessBackend:
                 self._has_time = True
                 self._time_ready.set()
                 return True
-            if isinstance(event, Ready) and event.address:
-                self._addresses[command.name] = event.address
             if event is not None:
                 self._events.put_nowait(event)
             return event is not None
@@ -282,6 +271,7 @@ class ProcessBackend:
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
         confined = confinement(command.folder, self.isolation, self.cid, limits, hidden)
+        confined = replace(confined, channel=self.slot.channel if self.is_on_host else "")
         if self._has_time:
             confined = replace(confined, time=self._commands.time_folder)
         return asdict(replace(confined, masked=command.masked))
@@ -302,9 +292,7 @@ class ProcessBackend:
         if pids:
             await asyncio.wait(pids, timeout=PIDS_PATIENCE_S)
         application = [pid.result() for pid in pids if pid.done() and not pid.cancelled()]
-        frame = begin_frame(self.plan.seed, application, self.slot.key)
-        to = hearers(self.plan, self.slot.cid, self._addresses)
-        self._sandbox.send({"do": "send", "to": to, "data": frame.hex()})
+        self._send(begin_frame(self.plan.seed, application), hearers(self.plan))
 
     async def load(self) -> Snapshot | None:
         """What the sandbox sees of its processes; None when it does not answer."""
@@ -342,7 +330,6 @@ class ProcessBackend:
         if keep and (pid := self._sandbox.pid):
             return self._kept(pid)
         await self._sandbox.close()
-        shutil.rmtree(self.slot.channel, ignore_errors=True)
         for output in self._outputs.values():
             output.close()
         await asyncio.gather(*self._exits, return_exceptions=True)

@@ -11,7 +11,6 @@ from dodo_dsl.application.model import OFFSCREEN
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
-from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.added_services import TIME, TIME_FOLDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths, variables_of
@@ -67,12 +66,10 @@ class Commands:
             **base_environment(self.plan.application.access.passed),
             "PYTHONPATH": package_path(() if is_module else import_paths(self.plan, self.folder)),
             "DODO_SERVICE": service.name,
-            "DODO_READY_FILE": ready_file(self.slot.name, service.name),
             SLOT_VARIABLE: self.slot.name,
             CHANNEL_VARIABLE: self.slot.channel,
             "DODO_ODVD": os.pathsep.join(str(self.folder / FILES / path) for path in self.plan.messages),
             **self.plan.variables,
-            KEY_VARIABLE: self.slot.key.hex(),
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         hidden = tuple(masked(self.plan, service))
@@ -171,11 +168,6 @@ def own_module(process: Sequence[str]) -> str:
     package, _, name = process[2].partition(".")
     is_ours = package == "services" and name.isidentifier()
     return process[2] if is_ours and (package_data.root() / package / name / "__main__.py").is_file() else ""
-
-
-def ready_file(slot: str, service: str) -> str:
-    """Path of a service's ready file; on the host, files that begin with the slot's name are removed at the end."""
-    return f"/tmp/{slot}ready-{service}" if slot else f"/tmp/dodo-ready-{service}"
 
 
 def changes(base: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str | None]:

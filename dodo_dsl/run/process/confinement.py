@@ -36,6 +36,8 @@ class Confinement:
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     masked: tuple[str, ...] = ()
+    channel: str = ""
+    """On the host: the folder where services meet, which it must not see."""
     time: str = ""
     """The folder by which it gets the test's time, where it may write into the page and wake its threads."""
 
@@ -98,7 +100,8 @@ def sandbox_words(
     always = [PROGRAM, "--unshare-pid", "--die-with-parent"]
     chdir = ["--chdir", confined.folder]
     if mounts is None:
-        return [*always, "--dev-bind", "/", "/", *_masked(confined.masked), "--proc", "/proc", *chdir, "--"]
+        masked = [*_masked(confined.masked), *(["--tmpfs", confined.channel] if confined.channel else [])]
+        return [*always, "--dev-bind", "/", "/", *masked, "--proc", "/proc", *chdir, "--"]
     seen = _seen(confined, mounts, program)
     filtered = ["--seccomp", str(filter_fd)]
     unshared = ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try"]

@@ -74,9 +74,6 @@ def remove_memories(prefix: str) -> int:
     if SLOT_NAME.fullmatch(prefix):
         shutil.rmtree(application_time.folder_of(prefix), ignore_errors=True)
     for token in [p for p in Path("/tmp").glob(f"{prefix}*") if p.is_file() and not p.is_symlink()]:
-        if token.name.startswith(f"{prefix}ready-"):
-            token.unlink(missing_ok=True)
-            continue
         with contextlib.suppress(SharedMemoryError):
             SharedMemory.create(token.name, 1).close()  # creating replaces what a dead creator left
             removed += 1

@@ -8,14 +8,14 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
-                        {"do": "close"}; {"do": "probe"}; {"do": "send", "to", "data"}; {"do": "load"};
-                        {"do": "relay", "cid"}; {"do": "line", "data"}; {"do": "listeners"};
+                        {"do": "close"}; {"do": "probe"}; {"do": "load"}; {"do": "listeners"};
+                        {"do": "relay", "cid", "folder"}; {"do": "send", "to": [name, ...], "data"};
                         {"do": "use", "names": [service, ...]};
                         {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
                         {"load": snapshot or null};
-                        {"relay": [host, port] of what sends lines, or null};
+                        {"relay": whether it can send};
                         {"listeners": names of what listens on a bus, or null};
                         {"use": {service: [seconds on processors, bytes of memory]} or null};
                         {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
@@ -164,21 +164,14 @@ class Sandbox:
         why = confined_process.confinement_problem()
         self.send(probe=why, missing=confined_process.missing() if why else "")
 
-    def _do_send(self, _descriptors: list[int], to: list[tuple[str, int]], data: str) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            for host, port in to:
-                with contextlib.suppress(OSError):
-                    sender.sendto(bytes.fromhex(data), (host, port))
-
-    def _do_relay(self, _descriptors: list[int], cid: int) -> None:
+    def _do_relay(self, _descriptors: list[int], cid: int, folder: str) -> None:
         with contextlib.suppress(OSError):
-            self.relay = Relay(cid)
-        self.send(relay=self.relay and self.relay.address)
+            self.relay = Relay(cid, Path(folder))
+        self.send(relay=self.relay is not None)
 
-    def _do_line(self, _descriptors: list[int], data: str) -> None:
-        with contextlib.suppress(OSError):
-            if self.relay is not None:
-                self.relay.send(bytes.fromhex(data))
+    def _do_send(self, _descriptors: list[int], to: list[str], data: str) -> None:
+        if self.relay is not None:
+            self.relay.send(bytes.fromhex(data), to)
 
     def _do_load(self, _descriptors: list[int]) -> None:
         """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""

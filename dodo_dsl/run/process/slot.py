@@ -4,42 +4,46 @@ A sandbox enters its own namespaces, or those of a container, which the applicat
 services and sandboxes.
 """
 
+import contextlib
 import json
 import os
-import secrets
+import shutil
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
 from dodo_dsl import package_data
-from dodo_dsl.opendlv.authentication import KEY_BYTES
 from dodo_dsl.run.process import namespaces
 
 SLOT_VARIABLE = "DODO_SLOT"
 """Environment variable of a test's processes on the host: the name of its slot, by which leftovers are found."""
 
 
-def new_key() -> bytes:
-    """The key of a test, which its services have and the application has not."""
-    return secrets.token_bytes(KEY_BYTES)
+@contextlib.contextmanager
+def meeting_place(work: Path, keep: bool) -> Iterator[str]:
+    """A folder in ``work`` where the services of a test meet; ``keep`` leaves it."""
+    folder = tempfile.mkdtemp(prefix="channel-", dir=work)
+    try:
+        yield folder
+    finally:
+        if not keep:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A CID, a name, a prefix of shared memory, the descriptors of the leases, and the key of the test.
+    """A CID, a name, a prefix of shared memory, the descriptors of the leases, and where the test's services meet.
 
-    Name and prefix are given only on the host. ``channel`` is the folder in ``work`` where the test's services meet.
+    Name and prefix are given only on the host.
     """
 
     cid: int
     name: str = ""
     memory_prefix: str = ""
     descriptors: tuple[int, ...] = ()
-    key: bytes = field(default_factory=new_key, repr=False)
-    work: Path = field(default_factory=lambda: Path(tempfile.gettempdir()))
     channel: str = ""
 
 

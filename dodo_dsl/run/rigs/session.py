@@ -138,5 +138,5 @@ async def attended(
         if session:
             session.fit.discard(plan.rig)
         await examine(plan, say, (*slot.descriptors, *more), is_fit)
-        await stack.enter_async_context(heartbeat(slot.cid, slot.key))
+        await stack.enter_async_context(heartbeat(slot.cid, Path(slot.channel)))
         yield (*slot.descriptors, *more)

@@ -122,19 +122,25 @@ def unrecorded(app: Application, number: int) -> None:
     app.send("cluon.data.RecorderCommand", command=2)
 
 
+def places() -> set[Path]:
+    """Folders where services may meet: known ones, and what other processes have."""
+    found = {Path("/dodo/channel"), *Path("/tmp").glob("dodo-run-*/channel-*"), *Path("/tmp").glob("channel-*")}
+    for environment in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            words = environment.read_bytes().split(b"\0")
+            found |= {Path(os.fsdecode(word[13:])) for word in words if word.startswith(b"DODO_CHANNEL=")}
+    return found
+
+
 def join(app: Application, number: int) -> None:
     """The application says that it is the service with the vehicle's pose, and then sends poses."""
     host, port = app.session.address
-    app.send("dodo.Sender", service="pose", host=host, port=port, asks=True)
-    finish(app, number)
-
-
-def join_again(app: Application, number: int) -> None:
-    """It repeats what services said of themselves, from its own address."""
-    app.send("dodo.Sender", service="stranger", asks=True)
-    for envelope, _ in app.heard:
-        if envelope.data_type == app.messages.id("dodo.Sender"):
-            app.session.send_envelope(envelope)
+    for folder in places():
+        for name in ("pose", "dodo-runner"):
+            with contextlib.suppress(OSError):
+                (folder / name).unlink(missing_ok=True)
+                (folder / name).symlink_to(f"{host}:{port}:")
+                print(f"entered {folder / name}", flush=True)
     finish(app, number)
 
 
@@ -191,18 +197,11 @@ def ports() -> list[int]:
     return sorted({int(line.split()[1].rpartition(":")[2], 16) for line in lines})
 
 
-def sockets() -> set[Path]:
-    """Where the clock may listen: all sockets of this network with its name, and those in known places."""
-    lines = Path("/proc/net/unix").read_text().splitlines()
-    found = {Path(line.split()[-1]) for line in lines if line.endswith("/clock")}
-    return found | {Path("/dodo/channel/clock"), *Path("/tmp").glob("dodo-run-*/*/clock")}
-
-
 def channel(app: Application, number: int) -> None:
     """It says to the clock that it is the vehicle's pose, or the evaluator, which has ended."""
     if number not in (0, LATER):
         return
-    for path in sockets():
+    for path in (folder / ".clock" for folder in places()):
         for service in ("pose", "track"):
             with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as clock:
                 try:
@@ -213,23 +212,6 @@ def channel(app: Application, number: int) -> None:
                     with contextlib.suppress(OSError):
                         clock.send(b"\0" + msgspec.msgpack.encode(message))
                 print(f"told {path} that it is {service}", flush=True)
-
-
-def spy(app: Application, number: int) -> None:
-    """It looks for the key of the test where variables and command lines can be read."""
-    if number not in (0, LATER):
-        return
-    if "DODO_KEY" in os.environ:
-        sys.exit("found the key in its own variables")
-    for process in Path("/proc").iterdir():
-        for name in ("environ", "cmdline"):
-            try:
-                content = (process / name).read_bytes()
-            except OSError:
-                continue
-            _, found, value = content.partition(b"DODO_KEY=")
-            if found and value.split(b"\0")[0].strip(b"0"):
-                sys.exit(f"found the key in {process}/{name}")
 
 
 def echo(app: Application, number: int) -> None:
@@ -259,7 +241,7 @@ def easy(app: Application, number: int) -> None:
 
 ATTACKS = {name.replace("_", "-"): function for name, function in list(globals().items()) if name in (
     "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "nan_once", "unrecorded", "join",
-    "join_again", "disguise", "channel", "spy",
+    "disguise", "channel",
     "echo", "boxes", "easy", "directly", "true_pose", "true_pose_curve",
 )}  # fmt: skip
 

@@ -32,33 +32,31 @@ def joined(path: Path, name: str) -> Channel:
 def accepted(listener: Listener, *names: str) -> dict[str, Channel]:
     found: dict[str, Channel] = {}
     while set(found) != {*names}:
-        found |= listener.accept(5.0)
+        if accepted := listener.accept(5.0):
+            found[accepted[0]] = accepted[1]
     return found
 
 
 def test_who_is_none_of_the_services_or_comes_twice_is_turned_away(path: Path, listener: Listener) -> None:
     with closing(joined(path, "pose")) as pose, closing(joined(path, "nobody")) as nobody:
         ours = accepted(listener, "pose")
-        with (
-            closing(joined(path, "pose")) as again,
-            closing(joined(path, "track")) as track,
-            socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as other,
-        ):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as other, closing(joined(path, "pose")) as again:
             other.connect(str(path))
             other.send(b"\0not a message")
-            ours |= accepted(listener, "track")
-            for stranger in (nobody, again):
-                with pytest.raises(EOFError):
-                    stranger.receive(5.0)
-            assert other.recv(1) == b""
-            assert not (listener.is_open or path.exists()), "all are there"
-            for name, service in (("pose", pose), ("track", track)):
-                service.send(Done(name, []))
-                assert ours[name].receive(5.0) == Done(name, [])
-                ours[name].close()
-                with pytest.raises(EOFError):
-                    service.receive(5.0)
-                service.send(Done(name, []))  # lost
+            with closing(joined(path, "track")) as track:
+                ours |= accepted(listener, "track")
+                for stranger in (nobody, again):
+                    with pytest.raises(EOFError):
+                        stranger.receive(5.0)
+                assert other.recv(1) == b""
+                assert not (listener.missing or path.exists()), "all are there"
+                for name, service in (("pose", pose), ("track", track)):
+                    service.send(Done(name, []))
+                    assert ours[name].receive(5.0) == Done(name, [])
+                    ours[name].close()
+                    with pytest.raises(EOFError):
+                        service.receive(5.0)
+                    service.send(Done(name, []))  # lost
 
 
 @pytest.mark.parametrize("size", [0, PACKET - 20, PACKET, 10 * PACKET + 7])

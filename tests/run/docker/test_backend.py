@@ -4,6 +4,7 @@ import asyncio
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import pytest
 from docker.errors import APIError
@@ -18,7 +19,7 @@ NOBODY: Any = None
 
 def test_a_crash_upon_the_end_is_reported(tmp_path: Path) -> None:
     async def ends() -> list[Event]:
-        backend = DockerBackend(plan("t"), tmp_path, tmp_path, NOBODY, NOBODY, "dodo-t", [], print, b"")
+        backend = DockerBackend(plan("t"), tmp_path, tmp_path, NOBODY, NOBODY, "dodo-t", [], print)
         backend._is_closing = True
         for code in (0, 1, 134, 137, 139, 143):
             backend._take(f"app{code}", "die", {"exitCode": str(code)})
@@ -52,10 +53,11 @@ def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] 
 
     async def started() -> tuple[dict[str, bool], list[Event]]:
         tested = plan("t", application=Application(".", services))
-        backend = DockerBackend(tested, folder, folder, NOBODY, NOBODY, "dodo-t", [], print, b"")
+        backend = DockerBackend(tested, folder, folder, NOBODY, NOBODY, "dodo-t", [], print)
         backend._containers = {"app": Container(), "db": Container(), **others}
         backend._compose.services = {name: {"healthcheck": CHECK} for name in ("app", "db")}
-        waits = await backend.start("application")
+        with mock.patch.object(backend, "_connect"):  # nobody is to be told of the begin
+            waits = await backend.start("application")
         for name, status in statuses:
             backend._take(name, f"health_status: {status}", {})
         await asyncio.wait(backend._turns)

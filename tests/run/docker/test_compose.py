@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 import yaml
 
-from dodo_dsl.opendlv.authentication import KEY_VARIABLE
 from dodo_dsl.plan.model import ApplicationService, Plan
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.pulls import Pulls
@@ -59,7 +58,7 @@ def read(made: Plan, folder: Path, kind: type[Compose] = Compose) -> Compose:
 
 
 def volumes(*mounts: Any, folder: Path, **more: Any) -> list[Any]:
-    document = read(planned({"app": {"volumes": [*mounts]}}, **more), folder).document(b"")
+    document = read(planned({"app": {"volumes": [*mounts]}}, **more), folder).document()
     return list(document["services"]["app"]["volumes"])
 
 
@@ -111,10 +110,13 @@ def test_what_leads_elsewhere_since(services: Any, more: Any, said: str, folder:
         read(planned({"app": services}, **more), folder)
 
 
-def test_only_services_of_dodo_have_the_key(folder: Path) -> None:
-    document = read(planned({"app": {"image": "a"}}), folder).document(b"\1")
-    having = {name for name, service in document["services"].items() if KEY_VARIABLE in service.get("environment", {})}
-    assert having == {"camera", "track"}
+def test_only_services_of_dodo_meet_on_the_host(folder: Path) -> None:
+    compose = read(planned({"app": {"image": "a"}}), folder)
+    assert compose.document()["services"].keys() == {"app"}
+    compose.channel = "/tmp/channel"
+    services = compose.document()["services"]
+    meet = {"type": "bind", "source": "/tmp/channel", "target": "/dodo/channel"}
+    assert {name for name, service in services.items() if meet in service.get("volumes", ())} == {"camera", "track"}
 
 
 def test_a_docker_command_that_cannot_compose(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,7 +160,7 @@ def test_a_run_builds_from_a_copy_and_replaces_no_image(folder: Path, monkeypatc
     }
     test = read(planned(services), folder)
     asyncio.run(test.provide_images(Pulls(None)))
-    made = {name: service["image"] for name, service in test.document(b"")["services"].items() if name in services}
+    made = {name: service["image"] for name, service in test.document()["services"].items() if name in services}
     assert made["a"] == made["b"] != made["c"]
     assert pulled == [{"c", f"p@sha256:{'0' * 64}"}]
     program = folder.parents[2] / f"{folder.parents[1].name}-bin" / "docker"
@@ -183,7 +185,7 @@ def test_nothing_waits_for_services_that_are_processes(folder: Path) -> None:
     (folder / "environment.compose.yml").write_text(yaml.safe_dump(compiled))
     services = {"app": {"image": "a", "depends_on": {"track": on, "sandbox": on, "db": on}}, "db": {"image": "d"}}
     made = planned(services, copies={"files-0": "../../gone"}, volumes={"files-0": {}})
-    document = read(made, folder, ApplicationCompose).document(b"\1")
+    document = read(made, folder, ApplicationCompose).document()
     assert document["services"].keys() == {"app", "db", "sandbox", "dodo-files"}
     assert document["services"]["app"]["depends_on"] == {"sandbox": on, "db": on}
     assert document["services"]["sandbox"]["entrypoint"][1:] == ["infinity"]
@@ -192,4 +194,3 @@ def test_nothing_waits_for_services_that_are_processes(folder: Path) -> None:
     usr = {"source": "/usr", "target": "/usr", "type": "bind", "read_only": True}
     assert usr in document["services"]["sandbox"]["volumes"]
     assert document["volumes"].keys() == {"files-0", "tmp"}
-    assert KEY_VARIABLE not in json.dumps(document)

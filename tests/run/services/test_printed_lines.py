@@ -13,8 +13,6 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.printed_lines import PatternError, compiled
-from dodo_dsl.opendlv.address import LINES
-from dodo_dsl.opendlv.authentication import is_proven
 from dodo_dsl.opendlv.envelope import Envelope, decode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.plan.model import Line
@@ -24,7 +22,6 @@ from tests.run.helpers import Bench
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
 GROUP_06 = Line("group_[0-9]+;(?P<sample_time>[0-9]+);(?P<groundSteering>[-+.0-9eE]+)", STEERING)
-KEY = b"a key of this test"
 TYPES = """
 message t.Inner [id = 5101] { int32 a [id = 1]; }
 message t.All [id = 5100] {
@@ -49,15 +46,14 @@ class Desk:
         self.sent: list[Envelope] = []
         self.messages = MessageSet.load(*([folder / "files" / "own.odvd"] if messages else []))
         self.lines = PrintedLines(plan, folder, self.said.append)
-        self.lines.connect(lambda frame: self.sent.append(decode_frame(frame)), ("10.0.0.1", 40_000), KEY)
+        self.lines.connect(lambda frame: self.sent.append(decode_frame(frame)))
 
     def print(self, *lines: bytes) -> list[tuple[int, int, dict[str, object]]]:
         """Sample time, sender stamp and fields of what lines made."""
         del self.sent[:]
         for line in lines:
             self.lines.take("app", line)
-        sender = self.messages.id("dodo.Sender")
-        return [(e.sample_time, e.sender_stamp, fields(self.messages, e)) for e in self.sent if e.data_type != sender]
+        return [(e.sample_time, e.sender_stamp, fields(self.messages, e)) for e in self.sent]
 
     def silence(self, unfinished: bytes = b"") -> str:
         (found,) = self.lines.unmatched({"app": unfinished})
@@ -122,14 +118,6 @@ def test_a_pattern_may_know_the_colours(tmp_path: Path, match: str) -> None:
     assert [found for _, _, found in Desk(tmp_path, Line(match, STEERING)).print(b"\x1b[32m0.5\x1b[m")] == [
         {"groundSteering": 0.5}
     ]
-
-
-def test_the_sender_proves_that_it_is_the_runners(desk: Desk) -> None:
-    (said,) = desk.sent
-    assert is_proven(KEY, said.data_type, said.payload)
-    assert not is_proven(b"another key", said.data_type, said.payload)
-    told = desk.messages.decode(said.data_type, said.payload)
-    assert (told.service, told.host, told.port, told.leaves) == (LINES, "10.0.0.1", 40_000, False)
 
 
 def test_without_a_sample_time_it_is_of_now(tmp_path: Path) -> None:
@@ -251,7 +239,7 @@ def fuzz(folder: Path, count: int, terminal: bool) -> tuple[int, int]:
         if envelope.data_type == steering:
             made["valid"] += fields(messages, envelope) == {"groundSteering": 0.5}
 
-    plan_lines.lines.connect(count_frame, ("10.0.0.1", 1), KEY)
+    plan_lines.lines.connect(count_frame)
 
     async def scene() -> int:
         output = ServiceOutput(folder / "app.log", lambda line: bool(plan_lines.lines.take("app", line)), terminal)

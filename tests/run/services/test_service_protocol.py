@@ -34,21 +34,6 @@ def line(**changes: object) -> bytes:
     return json.dumps({"dodo": "verdict", "outcome": "passed", "reason": "done", "checks": [CHECK], **changes}).encode()
 
 
-@pytest.mark.parametrize(
-    ("said", "expected"),
-    [
-        ({}, None),
-        ({"address": "10.1.0.2:40000"}, ("10.1.0.2", 40000)),
-        ({"address": "10.1.0.2:0"}, None),
-        ({"address": "10.1.0.2:70000"}, None),
-        ({"address": "here"}, None),
-        ({"address": 7}, None),
-    ],
-)
-def test_where_a_service_listens(said: dict[str, object], expected: tuple[str, int] | None) -> None:
-    assert read_line("camera", False, json.dumps({"dodo": "ready", **said}).encode()) == Ready("camera", expected)
-
-
 def test_a_complete_verdict_is_taken_from_an_evaluator() -> None:
     assert read_line("track", True, line()) == VerdictEvent("track", True, "done", (JUDGED,))
     assert read_line("track", True, line(outcome="failed")) == VerdictEvent("track", False, "done", (JUDGED,))

@@ -20,7 +20,7 @@ class Process:
     What it says of updates that came late is left out: they are the machine's.
     """
 
-    def __init__(self, argv: list[str], environment: dict[str, str]) -> None:
+    def __init__(self, argv: list[str], **environment: str) -> None:
         self.process = subprocess.Popen(
             argv,
             cwd=ROOT,
@@ -64,18 +64,13 @@ Start = Callable[..., Process]
 
 
 @pytest.fixture
-def ready_file(tmp_path: Path) -> Path:
-    return tmp_path / "ready"
-
-
-@pytest.fixture
-def start(cid: int, ready_file: Path) -> Iterator[Start]:
+def start(cid: int) -> Iterator[Start]:
     """Starts the tiny service on the session of the test."""
     processes: list[Process] = []
 
     def start_one(*flags: str, **environment: str) -> Process:
         argv = [sys.executable, str(Path(__file__).with_name("tiny") / "__main__.py"), f"--cid={cid}", *flags]
-        processes.append(Process(argv, {"DODO_READY_FILE": str(ready_file), **environment}))
+        processes.append(Process(argv, **environment))
         return processes[-1]
 
     yield start_one

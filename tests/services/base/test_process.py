@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.opendlv import address_book
+from dodo_dsl.opendlv.address_book import AddressBook
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
-from services.base.process import _readiness
 from tests.services.base.conftest import ROOT, Process, Start
 
 MESSAGES = MessageSet.standard()
@@ -33,27 +34,19 @@ def heard(session: Session, data_type: int) -> Envelope:
             return envelope
 
 
-def test_ready_means_that_session_and_memory_are_there(start: Start, ready_file: Path) -> None:
-    name = f"dodo-test-{uuid.uuid4().hex}"
-    ready_file.touch()  # left by one that was killed
-    service = start("--role=echo", f"--name={name}")
+def test_ready_means_that_session_and_memory_are_there(start: Start, tmp_path: Path) -> None:
+    name, book = f"dodo-test-{uuid.uuid4().hex}", AddressBook(tmp_path)
+    address_book.enter(tmp_path, "tiny", ("10.0.0.1", 1))  # of one that was killed
+    service = start("--role=echo", f"--name={name}", DODO_SERVICE="tiny", DODO_CHANNEL=str(tmp_path))
     assert service.line() == READY
-    assert ready_file.exists()
+    book.read()
+    assert book.present == {book.addresses["tiny"]} != {("10.0.0.1", 1)}
     with SharedMemory.attach(name) as memory:
         assert memory.size == 100
     service.stop()
     assert service.end() == (0, "", "")
-    assert not ready_file.exists()
-    assert not Path("/tmp", name).exists()
-
-
-def test_a_link_in_the_place_of_the_ready_file_is_not_followed(tmp_path: Path, cid: int) -> None:
-    """The application may put it there as soon as the service has removed an old one."""
-    link, target = tmp_path / "ready", tmp_path / "target"
-    link.symlink_to(target)
-    with Session(cid) as session, pytest.raises(OSError, match="symbolic links"), _readiness(link, session):
-        pass
-    assert not target.exists()
+    book.read()
+    assert not (book.present or Path("/tmp", name).exists())
 
 
 def test_steps_are_even_and_stamped_with_test_time(start: Start, cid: int) -> None:
@@ -113,8 +106,8 @@ def test_a_message_decides(start: Start, cid: int) -> None:
     assert service.end() == (0, "", "")
 
 
-def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, cid: int) -> None:
-    """Where there is a runner, whose key the service has; else, as above, nobody reads it."""
+def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, cid: int, tmp_path: Path) -> None:
+    """In a test, whose folder the service has; else, as above, nobody reads it."""
     about = {
         "series": "Distance",
         "unit": "m",
@@ -125,7 +118,7 @@ def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, 
         "band": None,
     }
     with Session(cid) as session:
-        service = start("--role=judge", DODO_KEY="00" * 16)
+        service = start("--role=judge", DODO_CHANNEL=str(tmp_path))
         assert service.line() == READY
         session.send(DISTANCE(distance=1.5), sample_time=7)
         assert service.line() == {"dodo": "judged", **about}
@@ -133,7 +126,7 @@ def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, 
         assert (samples["samples"], samples["zero"], samples["marks"]) == ("Distance", 7, "Ag==")
         assert [service.line()["dodo"] for _ in range(2)] == ["note", "verdict"]
         assert service.end() == (0, "", "")
-        stopped = start("--role=judge", DODO_KEY="00" * 16)
+        stopped = start("--role=judge", DODO_CHANNEL=str(tmp_path))
         assert stopped.line() == READY
         stopped.stop()
         assert stopped.line() == {"dodo": "judged", **about}
@@ -145,7 +138,7 @@ def test_a_source_that_runs_out_ends_the_judge(start: Start, cid: int) -> None:
     with Session(cid) as session:
         judge = start("--role=judge", "--verbose")
         assert judge.line() == READY
-        source = start("--role=source", DODO_SERVICE="beacons", DODO_READY_FILE="")
+        source = start("--role=source", DODO_SERVICE="beacons")
         voltages = [MESSAGES.decode(VOLTAGE, heard(session, VOLTAGE).payload).voltage for _ in range(3)]
         assert voltages == [1.0, 2.0, 3.0]
         assert MESSAGES.decode(2901, heard(session, 2901).payload).source == "beacons"
@@ -201,7 +194,7 @@ FIELD = "opendlv.proxy.GroundSteeringRequest has no field 'steering'; it has gro
         ("unjudgeable", "UnjudgeableError: the map has no goal"),
     ],
 )
-def test_a_model_that_fails(start: Start, ready_file: Path, role: str, text: str) -> None:
+def test_a_model_that_fails(start: Start, role: str, text: str) -> None:
     code, out, err = start(f"--role={role}").end()
     assert (code, out) == (1, '{"dodo": "ready"}\n')
     *steps, last = err.splitlines()
@@ -213,7 +206,6 @@ def test_a_model_that_fails(start: Start, ready_file: Path, role: str, text: str
         files = {line.split(",")[0].strip() for line in steps[1::2]}
         assert files == {'File "base/tiny/__main__.py"'}
         assert steps[-1].strip() in (Path(__file__).parent / "tiny/__main__.py").read_text()
-    assert not ready_file.exists()
 
 
 def test_all_of_a_traceback_with_verbose(start: Start) -> None:
@@ -229,9 +221,8 @@ def test_all_of_a_traceback_with_verbose(start: Start) -> None:
         (["--role=echo", "--frq=1"], "tiny-service: unknown flag '--frq', did you mean '--freq'?\n"),
     ],
 )
-def test_flags_that_cannot_be_met(start: Start, ready_file: Path, flags: list[str], text: str) -> None:
+def test_flags_that_cannot_be_met(start: Start, flags: list[str], text: str) -> None:
     assert start(*flags).end() == (2, "", text)
-    assert not ready_file.exists()
 
 
 def test_memory_that_another_process_has(start: Start) -> None:
@@ -244,14 +235,14 @@ def test_memory_that_another_process_has(start: Start) -> None:
 
 
 @pytest.mark.thorough
-def test_the_example_of_the_help_runs(start: Start, ready_file: Path) -> None:
+def test_the_example_of_the_help_runs(start: Start) -> None:
     text = start("--help").end()
     assert text[0] == 0
     title, *_, example = text[1].rstrip("\n").split("\n")
     assert title == "tiny-service: Does a little of everything that services do."
     assert "  --freq  (number Hz, 1 to 1000, default 50)" in text[1]
     command = shlex.split(example.removeprefix("example: "))
-    service = Process([sys.executable, *command[1:]], {"DODO_READY_FILE": str(ready_file)})
+    service = Process([sys.executable, *command[1:]])
     assert service.line() == READY
     service.stop()
     assert service.end()[0] == 0

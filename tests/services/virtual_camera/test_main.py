@@ -36,7 +36,6 @@ def start(tmp_path):
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             cwd=FOLDER.parents[1],
-            env={**os.environ, "DODO_READY_FILE": str(tmp_path / "ready")},
             text=True,
         )
         processes.append(process)

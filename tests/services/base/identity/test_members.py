@@ -4,9 +4,12 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
+from dodo_dsl.opendlv import address_book
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
@@ -15,33 +18,30 @@ from services.base.members import VARIABLE, Members, SenderTable
 from services.base.service import Service
 
 FRAME = "opendlv.sim.Frame"
-KEY = b"a key of this test"
 Join = Callable[..., tuple[Session, Members]]
 
 
 @pytest.fixture
-def enter(cid: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Join]:
-    """Makes a service with its session, which joins the others."""
+def enter(cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Join]:
+    """Makes a service with its session, which the others know if it ``says`` where it is."""
     monkeypatch.setenv(VARIABLE, "opendlv.sim.Frame/0=pose opendlv.sim.KinematicState/0=own?")
+    monkeypatch.setenv(CHANNEL_VARIABLE, str(tmp_path))
     with ExitStack() as stack:
 
-        def one(name: str, key: bytes = KEY) -> tuple[Session, Members]:
+        def one(name: str, says: bool = True) -> tuple[Session, Members]:
             session = stack.enter_context(Session(cid))
-            members = Members(session, name, SenderTable.load(session.messages, key))
-            members.join()
-            return session, members
+            if says:
+                address_book.enter(tmp_path, name, session.address)
+            return session, Members(session, name, SenderTable.load(session.messages))
 
         yield one
 
 
 def admitted(session: Session, members: Members) -> list[bool]:
-    """For each message on the bus whether it counts, but for those in which services say their address."""
+    """For each message on the bus whether it counts."""
     found = []
-    sender = session.messages.id("dodo.Sender")
     while (envelope := session.receive(0.0)) is not None:
-        counts = members.admits(envelope)
-        if envelope.data_type != sender:
-            found.append(counts)
+        found.append(members.admits(envelope))
     return found
 
 
@@ -49,70 +49,37 @@ def send(session: Session, name: str = FRAME, stamp: int = 0) -> None:
     session.send(session.messages.type(name)(), 1, stamp)
 
 
-@pytest.mark.parametrize("key", [KEY, b""])
 @pytest.mark.parametrize("first", ["pose", "track"])
-def test_whoever_came_first(enter: Join, first: str, key: bytes, capsys: pytest.CaptureFixture[str]) -> None:
-    services = {name: enter(name, key) for name in sorted(("pose", "track"), key=lambda name: name != first)}
-    pose, track = services["pose"], services["track"]
-    admitted(*pose)
-    send(pose[0])
-    assert admitted(*track) == [True]
-    application = enter("stranger", b"")[0]
+def test_whoever_came_first(enter: Join, first: str, capsys: pytest.CaptureFixture[str]) -> None:
+    services = {name: enter(name) for name in sorted(("pose", "track"), key=lambda name: name != first)}
+    send(services["pose"][0])
+    assert admitted(*services["track"]) == [True]
+    application = enter("stranger", False)[0]
     send(application)
     send(application, FRAME, 7)
-    assert admitted(*track) == [False, True]
+    assert admitted(*services["track"]) == [False, True]
     assert capsys.readouterr().out.count("the application sent opendlv.sim.Frame/0, which only 'pose' may send") == 1
 
 
-def test_a_message_of_an_unknown_address_waits_for_who_may_send_it(
-    enter: Join, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It is nobody's fault, and does not count."""
-    track, stranger = enter("track"), enter("stranger")[0]
-    send(stranger)
-    assert admitted(*track) == [False]
-    assert capsys.readouterr().out == ""
-
-
 def test_a_service_that_does_not_say_its_address_is_believed(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
-    track, own = enter("track"), enter("stranger")[0]
+    track, own = enter("track"), enter("stranger", False)[0]
     send(own, "opendlv.sim.KinematicState")
     assert admitted(*track) == [True]
-    said = enter("own")
-    admitted(*track)
-    send(said[0], "opendlv.sim.KinematicState")
-    send(own, "opendlv.sim.KinematicState")
+    said = enter("own")[0]
+    for sender in (said, own):
+        send(sender, "opendlv.sim.KinematicState")
     assert admitted(*track) == [True, False]
 
 
-def test_nobody_takes_a_service_s_place(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
-    """Neither without the key, nor by what the service said, nor under the name of one that is known."""
-    pose, track = enter("pose"), enter("track")
-    listener = enter("stranger", b"")[0]
-    pose[1].join()
-    admitted(*track)
-    application = enter("pose", b"")[0]
-    sender = application.messages.id("dodo.Sender")
-    heard = []
-    while (envelope := listener.receive(0.0)) is not None:
-        heard += [envelope] if envelope.data_type == sender else []
-    assert len(heard) > 2
-    for envelope in heard:
-        application.send_envelope(envelope)
-    send(application)
-    assert admitted(*track) == [False]
-    second = enter("pose")
-    send(second[0])
-    assert admitted(*track) == [False]
-
-
-def test_the_address_of_a_service_that_left_is_nobody_s(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
-    pose, track = enter("pose"), enter("track")
-    admitted(*pose)
-    pose[1].leave()
-    pose[1].join()  # as if repeated by who has got its port
-    send(pose[0])
-    assert admitted(*track) == [False]
+def test_the_address_of_a_service_that_left_is_nobody_s(
+    enter: Join, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What it sent before counts, however late it is taken."""
+    (pose, _), track = enter("pose"), enter("track")
+    send(pose)
+    address_book.leave(tmp_path, "pose", pose.address)
+    send(pose)
+    assert admitted(*track) == [True, False]
 
 
 class Watching(Service):
@@ -127,9 +94,7 @@ class Watching(Service):
 
 def test_what_does_not_count_is_recorded_as_never_received(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
     pose, (session, members) = enter("pose"), enter("track")
-    admitted(*pose)
-    application = enter("stranger", b"")[0]
-    admitted(session, members)
+    application = enter("stranger", False)[0]
     service = Watching()
     loop = Loop("track", service, session, RealTimeClock(), 0, members)
     for sender, time in ((pose[0], 1), (application, 2)):
@@ -173,8 +138,7 @@ def test_a_number_that_is_not_finite_fails_the_application_that_sent_it(
     printed = f"{STEERING}/0=dodo-lines " if sender == "dodo-lines" else ""
     monkeypatch.setenv(VARIABLE, f"{printed}opendlv.sim.Frame/0=pose opendlv.sim.KinematicState/0=own?")
     session, members = enter("track")
-    source = enter(sender, b"" if sender in ("stranger", "own") else KEY)[0]
-    admitted(session, members)
+    source = enter("dodo-runner" if printed else sender, sender not in ("stranger", "own"))[0]
     loop = Loop("track", Taking(), session, RealTimeClock(), 0, members)
     for time in (1, 2):
         source.send(source.messages.type(message)(**fields), time)
@@ -189,12 +153,11 @@ def test_a_number_that_is_not_finite_fails_the_application_that_sent_it(
 def test_what_the_application_prints_comes_from_the_runner_alone(
     enter: Join, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It says its address as services do; under that it sends nothing else of theirs."""
+    """Which sends nothing else of services from there."""
     monkeypatch.setenv(VARIABLE, f"{STEERING}/0=dodo-lines opendlv.sim.Frame/0=pose")
     enter("pose")
     session, members = enter("track")
-    admitted(session, members)
-    runner, application = enter("dodo-lines")[0], enter("dodo-lines", b"")[0]
+    runner, application = enter("dodo-runner")[0], enter("dodo-runner", False)[0]
     for sender in (runner, application):
         send(sender, STEERING)
     assert admitted(session, members) == [True, False]
@@ -209,7 +172,7 @@ def test_what_the_application_prints_comes_from_the_runner_alone(
 def test_who_may_end_the_input_alone_may_say_what_was_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "dodo.EndOfInput=camera,drive")
     messages = MessageSet.standard()
-    table = SenderTable.load(messages, b"")
+    table = SenderTable.load(messages)
     told = table.by_message[messages.id("dodo.NotShown"), None]
     assert (told.services, told.reason) == (
         ("camera", "drive"), "the application sent dodo.NotShown, which only 'camera' and 'drive' may send",

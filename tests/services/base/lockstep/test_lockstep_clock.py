@@ -66,7 +66,6 @@ def test_multiples_of_a_rate_meet_for_ever(slow: float, fast: float) -> None:
 def test_a_clock_driven_by_messages(
     cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("DODO_READY_FILE", str(tmp_path / "ready"))
     (tmp_path / "service.yml").write_text(MANIFEST)
     seen: list[int] = []
     with Session(cid) as session:
