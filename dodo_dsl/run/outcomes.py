@@ -196,7 +196,7 @@ def memory_taken(event: MemoryTaken) -> Finding:
 
     No machine is so busy that a copy takes as long as a service waits for the lock.
     """
-    reason = f"the application keeps service '{event.service}' from its shared memory: {event.how}"
+    reason = f"the application keeps service '{event.service}' from its shared memory: {event.text}"
     return Finding("failed", reason, event.service)
 
 

@@ -2,11 +2,17 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Annotated, Protocol
+
+from msgspec import Meta
 
 from dodo_dsl.outcome import Check, Response, Verdict
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.machine_load.snapshot import Snapshot
+
+MOST_TEXT = 2000
+"""Characters that a report can show."""
+Sentence = Annotated[str, Meta(min_length=1, max_length=MOST_TEXT)]
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,7 @@ class Overrun:
     """A service has lost ``messages`` of the bus up to now, because its receive buffer was full."""
 
     service: str
-    messages: int
+    messages: Annotated[int, Meta(gt=0, le=(1 << 63) - 1)]
 
 
 @dataclass(frozen=True)
@@ -69,9 +75,9 @@ class Late:
     """Up to now ``late`` of the ``updates`` of a service were late, one of them by ``worst_s``."""
 
     service: str
-    updates: int
-    late: int
-    worst_s: float
+    updates: Annotated[int, Meta(le=(1 << 63) - 1)]
+    late: Annotated[int, Meta(gt=0)]
+    worst_s: Annotated[float, Meta(ge=0)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -79,7 +85,7 @@ class Paused:
     """What a service emulates has stood still for ``seconds`` so far, as the machine was too busy for it."""
 
     service: str
-    seconds: float
+    seconds: Annotated[float, Meta(gt=0)]
 
 
 @dataclass(frozen=True)
@@ -90,8 +96,8 @@ class Flooded:
     """
 
     service: str
-    what: str
-    message: str
+    what: Sentence
+    message: Sentence
     sender_stamp: int
     share: float
     too_fast: bool
@@ -102,21 +108,21 @@ class MemoryTaken:
     """A service cannot write its shared memory any more, as a reader of it keeps the lock or has broken it."""
 
     service: str
-    how: str
+    text: Sentence
 
 
 @dataclass(frozen=True)
 class Noted:
     """A note on the test besides its outcome."""
 
-    text: str
+    text: Sentence
 
 
 @dataclass(frozen=True)
 class Foreign:
     """The application sent what only others may send; one sentence."""
 
-    reason: str
+    reason: Sentence
 
 
 @dataclass(frozen=True)
@@ -144,7 +150,7 @@ class Time:
     """How far the clock of a lockstep test is: test time in seconds; ``last`` when it has stopped."""
 
     seconds: float
-    last: bool
+    last: bool = False
 
 
 @dataclass(frozen=True)
@@ -159,7 +165,7 @@ class Stopped:
     """The clock of a lockstep test gives up: ``kind`` is unanswered, stuck or timedout."""
 
     kind: str
-    reason: str
+    reason: Annotated[str, Meta(max_length=MOST_TEXT)]
 
 
 @dataclass(frozen=True)

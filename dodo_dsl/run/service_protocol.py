@@ -10,6 +10,7 @@ from msgspec import Meta, Struct
 from dodo_dsl.outcome import Evidence, Response, with_margin
 from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.run.protocol import (
+    MOST_TEXT,
     Event,
     Flooded,
     Foreign,
@@ -23,6 +24,7 @@ from dodo_dsl.run.protocol import (
     Ready,
     Recorded,
     Responded,
+    Sentence,
     Stopped,
     Time,
     VerdictEvent,
@@ -30,7 +32,6 @@ from dodo_dsl.run.protocol import (
 
 JUDGED = b'{"dodo": "judged"'
 _STOPS = ("unanswered", "stuck", "timedout")
-_MAX_TEXT = 2000
 
 
 def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
@@ -46,85 +47,44 @@ def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
         return Malformed(service, "its JSON cannot be read") if is_evaluator and b'"verdict"' in text else None
     if not isinstance(message, dict):
         return None
-    kind = message.get("dodo")
-    if kind == "ready":
-        return Ready(service)
-    if kind == "end-of-input":
-        return InputEnded(service)
-    if kind in ("note", "foreign", "taken"):
-        return _told(service, message)
-    if kind == "lost" and type(message.get("messages")) is int and 0 < message["messages"] < 1 << 63:
-        return Overrun(service, message["messages"])
-    if kind in ("late", "paused"):
-        return _late(service, message) if kind == "late" else _paused(service, message.get("s"))
-    if kind == "verdict" and is_evaluator:
-        return _verdict(service, message)
-    if kind == "flood" and service == RECORDER:
-        return _flood(service, message)
-    return _clock_event(kind, message) if service == CLOCK else None
-
-
-def _told(service: str, message: dict[str, Any]) -> Event | None:
-    """What a service says in a sentence."""
-    kind = message["dodo"]
-    text = message.get("reason" if kind == "foreign" else "text")
-    if not isinstance(text, str) or not _is_text(text):
+    kind = str(message.get("dodo"))
+    if kind == "verdict":
+        return _verdict(service, message) if is_evaluator else None
+    try:
+        json.dumps(message, ensure_ascii=False).encode()
+        return _event(service, kind, message)
+    except (UnicodeEncodeError, msgspec.ValidationError):
         return None
-    if kind == "foreign":
-        return Foreign(text)
-    return Noted(f"service '{service}': {text}") if kind == "note" else MemoryTaken(service, text)
 
 
-def _flood(service: str, message: dict[str, Any]) -> Flooded | None:
-    """The service that fills the recording, where the values can be."""
-    what, name, sender, share = (message.get(key) for key in ("what", "message", "sender", "share"))
-    if not (_is_text(what) and _is_text(name) and type(sender) is int and _is_number(share)):
-        return None
-    return Flooded(service, str(what), str(name), sender, float(share or 0.0), message.get("limit") == "rate")
-
-
-def _late(service: str, message: dict[str, Any]) -> Late | None:
-    """How late a service is, where the numbers can be."""
-    updates, late, worst = message.get("updates"), message.get("late"), message.get("worst_s", 0.0)
-    if type(updates) is not int or type(late) is not int or not 0 < late <= updates < 1 << 63:
-        return None
-    return Late(service, updates, late, float(worst)) if _is_number(worst) and worst >= 0 else None
-
-
-def _paused(service: str, seconds: Any) -> Paused | None:
-    """For how long what a service emulates stood still, where that can be."""
-    return Paused(service, float(seconds)) if _is_number(seconds) and seconds > 0 else None
-
-
-def _clock_event(kind: object, message: dict[str, Any]) -> Event | None:
-    """How far the clock is, or why it stopped."""
-    seconds, reason = message.get("s"), message.get("reason")
-    if kind == "time" and _is_number(seconds):
-        return Time(float(seconds or 0.0), message.get("last") is True)
-    if kind == "response":
-        return _response(message)
-    if kind in _STOPS and isinstance(reason, str) and _is_text(reason or "none"):
-        return Stopped(str(kind), reason)
-    return None
-
-
-_UNSEEN = dict.fromkeys(("processor_median_s", "processor_p95_s", "processor_worst_s", "over"))
+_EVENTS: dict[str, Any] = {
+    "ready": Ready, "end-of-input": InputEnded, "note": Noted, "foreign": Foreign, "taken": MemoryTaken,
+    "lost": Overrun, "late": Late, "paused": Paused,
+}  # fmt: skip
+_OF_CLOCK: dict[str, Any] = {"time": Time, "response": Response, **dict.fromkeys(_STOPS, Stopped)}
+"""What lines say, by their kind; of the clock alone the second ones."""
+_FIELDS = {"dodo": "kind", "s": "seconds", "sender": "sender_stamp"}
+"""Names of an event's fields, where a line has others."""
+_UNSEEN = {**dict.fromkeys(("processor_median_s", "processor_p95_s", "processor_worst_s", "over")), "processor": ""}
 """What the clock leaves out where it cannot see the application's processes, or the test has no limit."""
 
 
-def _response(message: dict[str, Any]) -> Responded | None:
-    """How long the application took, where all of the numbers can be."""
-    processor = message.get("processor")
-    given = {**_UNSEEN, **message, "processor": processor if _is_text(processor) else ""}
-    try:
-        found = msgspec.convert(given, Response)
-    except msgspec.ValidationError:
+def _event(service: str, kind: str, message: dict[str, Any]) -> Event | None:
+    """Raises ValidationError."""
+    known = _EVENTS | (_OF_CLOCK if service == CLOCK else {}) | ({"flood": Flooded} if service == RECORDER else {})
+    if kind not in known:
         return None
-    counts = (found.slow, found.over or 0, found.uncopied, found.worst_frame - 1)
-    return Responded(found) if max(counts) <= found.answers else None
-
-
-_Text = Annotated[str, Meta(min_length=1, max_length=_MAX_TEXT)]
+    own = {"service": service, "too_fast": message.get("limit") == "rate"}
+    given = {**_UNSEEN, **{_FIELDS.get(key, key): value for key, value in message.items()}, **own}
+    event = msgspec.convert(given, known[kind])
+    if isinstance(event, Noted):
+        return Noted(f"service '{service}': {event.text}")
+    if isinstance(event, Late):
+        return event if event.late <= event.updates else None
+    if isinstance(event, Response):
+        counts = (event.slow, event.over or 0, event.uncopied, event.worst_frame - 1)
+        return Responded(event) if max(counts) <= event.answers else None
+    return event  # type: ignore[no-any-return]
 
 
 class _Limit(Struct, forbid_unknown_fields=True):
@@ -133,16 +93,16 @@ class _Limit(Struct, forbid_unknown_fields=True):
 
 
 class _Check(Struct, forbid_unknown_fields=True):
-    name: _Text
+    name: Sentence
     value: int | float | None
     limit: _Limit
-    unit: Annotated[str, Meta(max_length=_MAX_TEXT)]
+    unit: Annotated[str, Meta(max_length=MOST_TEXT)]
     ok: bool
     exclusive: bool = False
 
 
 class _Verdict(Struct):
-    reason: _Text
+    reason: Sentence
     checks: list[_Check]
     evidence: Evidence = {}
 
@@ -169,14 +129,3 @@ def _finite(text: str) -> Any:
     """A number; what is none, or what no float holds, is a list, which may stand nowhere."""
     number = float(text)
     return [] if not math.isfinite(number) else int(text) if text.lstrip("-").isdecimal() else number
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _is_text(value: object) -> bool:
-    """Whether a value is a string that UTF-8 can encode, of a length that a report can show."""
-    if not isinstance(value, str) or not 0 < len(value) <= _MAX_TEXT:
-        return False
-    return not any("\ud800" <= character <= "\udfff" for character in value)

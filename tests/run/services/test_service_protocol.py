@@ -156,10 +156,8 @@ CLOCKED = {
     response(**SENT_ON): Responded(Response(**RESPONSE, **SENT_ON)),  # type: ignore[arg-type]
     response(surplus=-1): None,
     response(unasked=True): None,
-    response(processor=7): Responded(Response(**RESPONSE)),  # type: ignore[arg-type]
     '{"dodo": "time", "s": 1.5}': Time(1.5, False),
     '{"dodo": "time", "s": 2, "last": true}': Time(2.0, True),
-    '{"dodo": "time", "s": 2, "last": 1}': Time(2.0, False),
     '{"dodo": "time", "s": null}': None,
     '{"dodo": "time"}': None,
     '{"dodo": "unanswered", "reason": "no answer"}': Stopped("unanswered", "no answer"),
