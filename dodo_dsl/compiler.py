@@ -134,8 +134,13 @@ class Compilation:
 
     compiled: "Compiled"
     jobs: "Pipeline"
-    pipeline: "File"
     problems: tuple[Diagnostic, ...]
+
+    @property
+    def pipeline(self) -> "File":
+        from dodo_dsl.emit.render import render_pipeline
+
+        return render_pipeline(self.jobs)
 
 
 class NoApplication(Exception):
@@ -268,7 +273,6 @@ def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Co
     """
     from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_folder, pipeline_problems
     from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS
-    from dodo_dsl.emit.render import render_pipeline
     from dodo_dsl.plan.build import build
 
     if checked.application is None:
@@ -279,12 +283,11 @@ def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Co
         checked.tests, checked.manifests, deployment, application, out.resolve(), settings, options.from_repository
     )
     jobs = pipeline(compiled.suite, pipeline_folder(out), options)
-    child = render_pipeline(jobs)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    limits = pipeline_problems(compiled.suite, jobs, child.text)
+    limits = pipeline_problems(compiled.suite, jobs)
     problems = [
         replace(problem, span=replace(problem.span, file=shown.get(problem.span.file, problem.span.file)))
         for problem in [*limits, *artifact_problems(compiled, options)]
     ]
-    return Compilation(compiled, jobs, child, tuple(ordered(problems)))
+    return Compilation(compiled, jobs, tuple(ordered(problems)))
