@@ -234,10 +234,6 @@ class RunState:
         """Whether a failure may come from what a program was given, unlike a message that it must not send."""
         return finding.result == "failed" and bool(finding.is_verdict or self._ended_by or self.is_unanswered)
 
-    def ended_early(self) -> bool:
-        """Whether the end of a service was that of the test."""
-        return bool(self._ended_by)
-
     def _without_display(self, finding: Finding) -> Finding:
         """The end of a program of the application that wanted to draw, with what to do."""
         if finding.result == "passed" or not self.is_application(finding.service):
@@ -309,8 +305,8 @@ class RunState:
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
         findings = (*answers.findings, *use.findings)
-        considered = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
-        found = self._explained(self._elsewhere(self._timed(considered.finding)))
+        considered, load = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
+        found = self._explained(self._elsewhere(self._timed(considered)))
         finding = self._without_display(self._with_told(self._with_printed(found)))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
@@ -331,7 +327,7 @@ class RunState:
                 *answers.notes,
                 *use.notes,
             ),
-            machine=considered.load,
+            machine=load,
             response=None if plan.clock == VIRTUAL else self.response,
             resources=self.resources,
         )

@@ -5,6 +5,7 @@ import contextlib
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,20 +14,23 @@ from docker.errors import APIError
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
 from dodo_dsl.run.docker.backend import DockerBackend
-from dodo_dsl.run.docker.container_use import ContainerProcesses, ContainerUse
+from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.pulls import Pulls
-from dodo_dsl.run.machine_load.snapshot import Times
+from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.protocol import BackendError
 from tests.run.helpers import Bench
-from tests.run.load.test_thread_times import Proc
+from tests.run.load.test_service_use import Proc
 
 
 class Container:
     """A container as the engine's client shows it."""
 
-    def __init__(self, number: str, pid: int, problem: Exception | None = None) -> None:
-        self.id, self.problem = number, problem
-        self.attrs: dict[str, Any] = {"State": {"Pid": pid}}
+    def __init__(
+        self, number: str, pid: int, problem: Exception | None = None, stats: dict[str, Any] | None = None
+    ) -> None:
+        self.id, self.problem, self.stats = number, problem, stats or {}
+        self.attrs: dict[str, Any] = {"State": {"Pid": pid}, "HostConfig": {"Memory": 9_000_000}}
+        self.client = SimpleNamespace(api=SimpleNamespace(stats=lambda *_, **__: self.stats))
 
     def reload(self) -> None:
         if self.problem:
@@ -37,9 +41,8 @@ class Container:
 def proc(tmp_path: Path) -> Proc:
     """Process 10 belongs to container c0ffee, 11 to no container."""
     found = Proc(tmp_path)
-    (tmp_path / "stat").write_text("".join(f"cpu{core} 1 1 1 1 1 1 1 1 0 0\n" for core in range(1024)))
     for pid, group in ((10, "0::/../c0ffee"), (11, "0::/")):
-        found.put(pid, 1, {pid: (100, 10)})
+        found.put(pid, 1, megabytes=3, threads={pid: (100, 10)})
         (tmp_path / str(pid) / "cgroup").write_text(f"{group}\n")
     return found
 
@@ -48,7 +51,7 @@ def test_which_containers_listen_on_a_bus(proc: Proc, monkeypatch: pytest.Monkey
     """By their sockets; where those are hidden, by the members of their networks."""
     (proc.root / "10" / "net").mkdir()
     (proc.root / "10" / "net" / "igmp").write_text("Idx\tDevice\n2\teth0\n\t\t\t\t830000E1     1 0:00000000\t\t0\n")
-    containers = ContainerProcesses({"app": Container("c0ffee", 10), "camera": Container("beef", 12)}, proc.root)
+    containers = ContainerUse({"app": Container("c0ffee", 10), "camera": Container("beef", 12)}, proc=proc.root)
     monkeypatch.setattr(container_use, "listening", lambda services, _: set(services.values()))
     assert containers.listeners(["app"], 130) == {"app"}
     assert containers.listeners(["camera"], 130) is None
@@ -59,7 +62,7 @@ def test_which_containers_listen_on_a_bus(proc: Proc, monkeypatch: pytest.Monkey
 def test_the_first_processes_of_the_application(proc: Proc) -> None:
     """None where the engine runs one of them elsewhere, or does not tell."""
     containers = {"app": Container("c0ffee", 10), "ended": Container("beef", 0), "far": Container("beef", 11)}
-    found = ContainerProcesses({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc.root)
+    found = ContainerUse({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc=proc.root)
     assert found.first(["app", "ended"]) == {10: "app"}
     assert (found.first(["app", "far"]), found.first(["mute"])) == (None, None)
 
@@ -78,7 +81,7 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
     async def begin() -> None:
         plan = replace(Bench(tmp_path).plan(), isolation=isolation)
         backend = DockerBackend(plan, tmp_path, tmp_path, None, Pulls(None), "p", (), print, b"")
-        backend._processes = ContainerProcesses({"app": Changing("c0ffee", 0)}, proc.root)
+        backend._use = ContainerUse({"app": Changing("c0ffee", 0)}, proc=proc.root)
         await backend.require_own_host()
 
     refused = pytest.raises(BackendError, match=r"another machine.*use --isolation network")
@@ -95,7 +98,7 @@ def test_one_thread_at_a_time_measures(proc: Proc) -> None:
             with contextlib.suppress(threading.BrokenBarrierError):
                 met.append(both.wait(0.1))
 
-    use = ContainerUse({"app": Slow("c0ffee", 0)}, proc.root)
+    use = ContainerUse({"app": Slow("c0ffee", 0)}, proc=proc.root)
     threads = [threading.Thread(target=use.take) for _ in range(2)]
     for thread in threads:
         thread.start()
@@ -104,21 +107,56 @@ def test_one_thread_at_a_time_measures(proc: Proc) -> None:
     assert not met
 
 
-def services(proc: Proc, **containers: Any) -> dict[str, Times] | None:
-    found = ContainerProcesses(containers, proc.root).load()
-    return None if found is None else dict(found.services)
+OF_1 = {"rss": 5, "shmem": 6, "total_rss": 5_000_000, "total_shmem": 1_000_000}
+OF_2 = {"anon": 5_000_000, "file": 777, "shmem": 1_000_000}
 
 
-def test_what_containers_on_this_machine_used(proc: Proc) -> None:
-    used = {"app": Times(pytest.approx(0.1), pytest.approx(0.01))}
-    assert services(proc, app=Container("c0ffee", 10), **{SANDBOX: Container("c0ffee", 11)}) == used
-    assert services(proc, app=Container("c0ffee", 10), ended=Container("beef", 0)) == used
+def counted(number: str, pid: int, memory: dict[str, int] | None) -> Container:
+    """One of which the engine says what the kernel counts for its control group."""
+    cpu = {"cpu_usage": {"total_usage": 2_500_000_000}}
+    return Container(number, pid, stats={"cpu_stats": cpu, "memory_stats": {"stats": memory} if memory else {}})
 
 
-def test_containers_on_another_machine_are_not_measured(proc: Proc) -> None:
-    """A process here may have the number of one there."""
-    assert services(proc, app=Container("c0ffee", 11)) is None
-    assert services(proc, app=Container("c0ffee", 12)) is None
-    assert services(proc, app=Container("c0ffee", 10), camera=Container("beef", 12)) is None, "or counts as others"
-    assert services(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
-    assert services(proc) is None
+def used(proc: Proc, **containers: Container) -> dict[str, Used] | None:
+    taken = ContainerUse(containers, ["app"], proc.root).take()
+    return None if taken is None else dict(taken.services)
+
+
+@pytest.mark.parametrize(
+    ("pid", "memory", "expected"),
+    [
+        (10, OF_1, Used(2.5, 0.01, 6_000_000, 9_000_000)),
+        (10, OF_2, Used(2.5, 0.01, 6_000_000, 9_000_000)),
+        (10, None, Used(2.5, 0.01, 3 << 20, 9_000_000)),
+        (11, OF_2, Used(2.5, 0.0, 6_000_000, 9_000_000)),
+    ],
+    ids=["version 1", "version 2", "without the controller of memory", "elsewhere"],
+)
+def test_what_containers_used(proc: Proc, pid: int, memory: dict[str, int] | None, expected: Used) -> None:
+    """A process here may have the number of one on another machine."""
+    sandbox, ended = Container("c0ffee", 11), Container("beef", 0)
+    assert used(proc, app=counted("c0ffee", pid, memory), ended=ended, **{SANDBOX: sandbox}) == {"app": expected}
+
+
+def test_a_container_that_ended_has_used_what_it_had(proc: Proc) -> None:
+    app = counted("c0ffee", 10, OF_2)
+    use = ContainerUse({"app": app}, ["app"], proc.root)
+    use.take()
+    app.stats = {"cpu_stats": {"cpu_usage": {"total_usage": 0}}, "memory_stats": {}}
+    proc.end(10)
+    taken = use.take()
+    assert taken is not None and taken.services == {"app": Used(2.5, 0.01, 0, 9_000_000)}
+
+
+def test_the_load_is_measured_where_all_containers_run_here(proc: Proc) -> None:
+    def is_measured(**containers: Container) -> bool:
+        taken = ContainerUse(containers, ["app"], proc.root).take()
+        return taken is not None and taken.busy_s is not None
+
+    app = Container("c0ffee", 10)
+    assert is_measured(app=app) and is_measured(app=app, ended=Container("beef", 0))
+    assert not is_measured(app=app, camera=Container("beef", 12)), "or counts as others"
+    assert not is_measured(app=counted("c0ffee", 11, OF_2))
+    assert used(proc, app=Container("c0ffee", 12)) is None
+    assert used(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
+    assert used(proc) is None
