@@ -187,10 +187,10 @@ def test_between_two_times_of_a_clock_in_steps_nobody_knows(count: int, expected
     assert growth(points, [round(at_s, 6) for at_s in known]) == expected
 
 
-@pytest.mark.parametrize(("at_s", "expected"), [(9.0, 0.0), (10.0, 0.0), (10.5, 1.5), (11.5, 3.0), (20.0, 3.0)])
-def test_the_time_that_a_test_had_reached(at_s: float, expected: float) -> None:
-    assert test_time([(10.0, 0.0), (11.0, 3.0), (12.0, 3.0)], at_s) == expected
-    assert test_time([], at_s) == 0.0
+def test_the_time_that_a_test_had_reached() -> None:
+    progress = [(10.0, 0.0), (11.0, 3.0), (12.0, 3.0)]
+    assert [test_time(progress, at_s) for at_s in (9.0, 10.0, 10.5, 11.5, 20.0)] == [0.0, 0.0, 1.5, 3.0, 3.0]
+    assert test_time([], 9.0) == 0.0
 
 
 def test_figures_are_by_the_test_s_own_time() -> None:
