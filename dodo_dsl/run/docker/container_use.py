@@ -12,6 +12,7 @@ from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.run.listeners import listening, members
 from dodo_dsl.run.machine_load.processes import PROC
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used, UseReader
+from dodo_dsl.run.process import process_group
 
 ELSEWHERE = "the Docker engine runs its containers on another machine or in a virtual one"
 _OF_1, _OF_2 = ("total_rss", "total_shmem"), ("anon", "shmem")
@@ -21,8 +22,8 @@ _OF_1, _OF_2 = ("total_rss", "total_shmem"), ("anon", "shmem")
 class ContainerUse:
     """``containers`` are those of the engine's client, by service, ``application`` the application's.
 
-    The engine is asked what these use, as it counts what has ended, too. Where it counts no memory, as on a Raspberry
-    Pi by default, it is by processes.
+    What these use is by their control groups, which count what has ended, too; where these count no memory, as on a
+    Raspberry Pi by default, by processes. An engine elsewhere is asked, which takes a second.
     """
 
     def __init__(self, containers: Mapping[str, Any], application: Collection[str] = (), proc: Path = PROC) -> None:
@@ -43,29 +44,27 @@ class ContainerUse:
             taken = self._reader.take(self._pids) if self._pids else Snapshot(time.monotonic(), {})
             services = dict(taken.services)
             for name, container in self._application.items():
-                seen, last = services.get(name), self._last.get(name)
-                ran_s, size = self._asked(container)
-                if seen or last or size is not None:
+                pid = next((pid for pid, service in self._pids.items() if service == name), None)
+                here = process_group.counted(self._proc / str(pid), self._proc / "self") if pid else (0.0, {})
+                ran_s, rows = here if self._pids else self._asked(container)
+                seen, last, memory = services.get(name), self._last.get(name), _memory(rows)
+                if seen or last or memory is not None:
                     seen = seen or Used()
                     ran_s = max(ran_s, seen.processor_s, last.processor_s if last else 0.0)
                     limit = int(container.attrs.get("HostConfig", {}).get("Memory") or 0)
-                    services[name] = Used(ran_s, seen.waited_s, seen.memory if size is None else size, limit)
+                    services[name] = Used(ran_s, seen.waited_s, seen.memory if memory is None else memory, limit)
             self._last = services
             return replace(taken, services=services, changes=0) if services else None
 
     @staticmethod
-    def _asked(container: Any) -> tuple[float, int | None]:
-        """Processor time and memory by the engine (``GET /containers/ID/stats``), 0 and None if it does not know."""
+    def _asked(container: Any) -> tuple[float, Mapping[str, int]]:
+        """Processor time and rows of memory by the engine (``GET /containers/ID/stats``), if it knows."""
         from docker.errors import DockerException
 
-        ran_s = 0.0
         with contextlib.suppress(DockerException, OSError, KeyError, TypeError):
             stats = container.client.api.stats(container.id, stream=False, one_shot=True)
-            ran_s = stats["cpu_stats"]["cpu_usage"]["total_usage"] * 1e-9
-            counted = stats["memory_stats"]["stats"]
-            names = _OF_1 if _OF_1[0] in counted else _OF_2
-            return ran_s, counted[names[0]] + counted.get(names[1], 0)
-        return ran_s, None
+            return stats["cpu_stats"]["cpu_usage"]["total_usage"] * 1e-9, stats["memory_stats"]["stats"]
+        return 0.0, {}
 
     def listeners(self, names: Collection[str], cid: int) -> set[str] | None:
         """The services among ``names`` that listen on an OpenDLV bus already; None if that cannot be seen.
@@ -84,6 +83,11 @@ class ContainerUse:
         """The first processes of containers that run; None if one of them is not found here."""
         found = {name: first_process(c, self._proc) for name, c in self._containers.items() if name in names}
         return None if None in found.values() else {pid: name for name, pid in found.items() if pid}
+
+
+def _memory(rows: Mapping[str, int]) -> int | None:
+    names = _OF_1 if _OF_1[0] in rows else _OF_2
+    return rows[names[0]] + rows.get(names[1], 0) if names[0] in rows else None
 
 
 def first_process(container: Any, proc: Path = PROC) -> int | None:

@@ -37,11 +37,8 @@ class ProcessGroup:
 
     def used_s(self) -> float | None:
         """Processor time in s of all that were ever in it; None if it is not counted."""
-        with contextlib.suppress(OSError, ValueError, KeyError):
-            if self._usage is not None:
-                text = os.pread(self._usage, _MOST, 0).decode()
-                rows = dict(line.split() for line in text.splitlines()) if " " in text else {}
-                return int(rows["usage_usec"]) / 1e6 if rows else int(text) / 1e9
+        with contextlib.suppress(OSError):
+            return None if self._usage is None else _seconds(os.pread(self._usage, _MOST, 0).decode())
         return None
 
     def remove(self) -> None:
@@ -105,6 +102,35 @@ def holding(proc: Path = Path("/proc/self")) -> Iterator[Path]:
         yield from (group for group in (own, *own.parents) if group.is_relative_to(top))
 
 
+def counted(process: Path, own: Path) -> tuple[float, dict[str, int]]:
+    """Processor time in s, and the rows of memory, by the groups of a process; 0 and none if they are not counted.
+
+    ``own`` is the folder of this process, by which groups are shown.
+    """
+    times = (folder / file for folder, _, _ in _shown_groups(process, _CPUACCT, own) for file in (_USAGE, _STAT))
+    seconds = (_seconds(_text(file)) for file in times)
+    memories = (_rows(_text(folder / "memory.stat")) for folder, _, _ in _shown_groups(process, "memory", own))
+    return next(filter(None, seconds), 0.0), next(filter(None, memories), {})
+
+
+def _text(file: Path) -> str:
+    with contextlib.suppress(OSError):
+        return file.read_text()
+    return ""
+
+
+def _seconds(text: str) -> float | None:
+    """By the text of ``cpuacct.usage`` or ``cpu.stat``."""
+    if text.strip().isdecimal():
+        return int(text) / 1e9
+    ticks = _rows(text).get("usage_usec")
+    return None if ticks is None else ticks / 1e6
+
+
+def _rows(text: str) -> dict[str, int]:
+    return {name: int(number) for name, number in (line.split() for line in text.splitlines())}
+
+
 def _parents(proc: Path, counter: str = _PIDS) -> Iterator[Path]:
     """The groups in which others that count processes may be made: this process's own, or the one above it."""
     for own, top, is_first_version in _shown_groups(proc, counter):
@@ -112,11 +138,14 @@ def _parents(proc: Path, counter: str = _PIDS) -> Iterator[Path]:
         yield from [own] if is_first_version else (group for group in (own, *above) if _hands_on(group))
 
 
-def _shown_groups(proc: Path, counter: str = _PIDS) -> Iterator[tuple[Path, Path, bool]]:
-    """The group of this process, the top of the tree of which it is seen, and whether that is of version 1."""
+def _shown_groups(proc: Path, counter: str = _PIDS, own: Path | None = None) -> Iterator[tuple[Path, Path, bool]]:
+    """The group of a process, the top of the tree of which it is seen, and whether that is of version 1.
+
+    ``own`` is the folder of this process, if that is another one.
+    """
     try:
         groups = [line.split(":", 2) for line in (proc / "cgroup").read_text().splitlines()]
-        mounts = [line.split() for line in (proc / "mountinfo").read_text().splitlines()]
+        mounts = [line.split() for line in ((own or proc) / "mountinfo").read_text().splitlines()]
     except OSError:
         return
     for _, controllers, path in (group for group in groups if len(group) == 3):

@@ -107,14 +107,24 @@ def test_one_thread_at_a_time_measures(proc: Proc) -> None:
     assert not met
 
 
-OF_1 = {"rss": 5, "shmem": 6, "total_rss": 5_000_000, "total_shmem": 1_000_000}
-OF_2 = {"anon": 5_000_000, "file": 777, "shmem": 1_000_000}
+OF_1, OF_2 = "rss 5\nshmem 6\ntotal_rss 5000000\ntotal_shmem 1000000\n", "anon 5000000\nfile 777\nshmem 1000000\n"
+STATS = {
+    "cpu_stats": {"cpu_usage": {"total_usage": 2_500_000_000}},
+    "memory_stats": {"usage": 9, "stats": {"anon": 5_000_000, "shmem": 1_000_000}},
+}
 
 
-def counted(number: str, pid: int, memory: dict[str, int] | None) -> Container:
-    """One of which the engine says what the kernel counts for its control group."""
-    cpu = {"cpu_usage": {"total_usage": 2_500_000_000}}
-    return Container(number, pid, stats={"cpu_stats": cpu, "memory_stats": {"stats": memory} if memory else {}})
+def counted(proc: Proc, kind: str, options: str, files: dict[str, str], shown: str = "/") -> None:
+    """What the kernel counts for the group of process 10, of which this process sees what is below ``shown``."""
+    names = "" if kind == "cgroup2" else options
+    groups = f"{0 if kind == 'cgroup2' else 4}:{names}:/docker/c0ffee\n"
+    with (proc.root / "10" / "cgroup").open("a") as group, (proc.root / "self" / "mountinfo").open("a") as mounts:
+        group.write(groups)
+        mounts.write(f"30 25 0:26 {shown} {proc.root}/{names or 'unified'} rw shared:4 - {kind} x rw,{options}\n")
+    folder = proc.root / (names or "unified") / Path("/docker/c0ffee").relative_to(shown)
+    folder.mkdir(parents=True)
+    for name, text in files.items():
+        (folder / name).write_text(text)
 
 
 def used(proc: Proc, **containers: Container) -> dict[str, Used] | None:
@@ -122,30 +132,32 @@ def used(proc: Proc, **containers: Container) -> dict[str, Used] | None:
     return None if taken is None else dict(taken.services)
 
 
-@pytest.mark.parametrize(
-    ("pid", "memory", "expected"),
-    [
-        (10, OF_1, Used(2.5, 0.01, 6_000_000, 9_000_000)),
-        (10, OF_2, Used(2.5, 0.01, 6_000_000, 9_000_000)),
-        (10, None, Used(2.5, 0.01, 3 << 20, 9_000_000)),
-        (11, OF_2, Used(2.5, 0.0, 6_000_000, 9_000_000)),
-    ],
-    ids=["version 1", "version 2", "without the controller of memory", "elsewhere"],
-)
-def test_what_containers_used(proc: Proc, pid: int, memory: dict[str, int] | None, expected: Used) -> None:
-    """A process here may have the number of one on another machine."""
-    sandbox, ended = Container("c0ffee", 11), Container("beef", 0)
-    assert used(proc, app=counted("c0ffee", pid, memory), ended=ended, **{SANDBOX: sandbox}) == {"app": expected}
+SEEN = Used(2.5, 0.01, 6_000_000, 9_000_000)
 
 
-def test_a_container_that_ended_has_used_what_it_had(proc: Proc) -> None:
-    app = counted("c0ffee", 10, OF_2)
-    use = ContainerUse({"app": app}, ["app"], proc.root)
-    use.take()
-    app.stats = {"cpu_stats": {"cpu_usage": {"total_usage": 0}}, "memory_stats": {}}
+@pytest.mark.parametrize("shown", ["/", "/docker", "/docker/c0ffee"])
+def test_what_containers_used_by_groups_of_version_1(proc: Proc, shown: str) -> None:
+    """Also where DoDo sees only a part of the groups, as in a container. What has ended has used what it had."""
+    counted(proc, "cgroup", "cpu,cpuacct", {"cpuacct.usage": "2500000000\n"}, shown)
+    counted(proc, "cgroup", "memory", {"memory.stat": OF_1}, shown)
+    counted(proc, "cgroup2", "nsdelegate", {"cpu.stat": "usage_usec 77\n"}, shown)
+    app, sandbox, ended = Container("c0ffee", 10), Container("c0ffee", 11), Container("beef", 0)
+    use = ContainerUse({"app": app, "ended": ended, SANDBOX: sandbox}, ["app"], proc.root)
+    assert (taken := use.take()) is not None and taken.services == {"app": SEEN}
     proc.end(10)
-    taken = use.take()
-    assert taken is not None and taken.services == {"app": Used(2.5, 0.01, 0, 9_000_000)}
+    assert (taken := use.take()) is not None and taken.services == {"app": SEEN._replace(memory=0)}
+
+
+@pytest.mark.parametrize(("files", "memory"), [({"memory.stat": OF_2}, 6_000_000), ({}, 3 << 20)])
+def test_what_containers_used_by_groups_of_version_2(proc: Proc, files: dict[str, str], memory: int) -> None:
+    """Also without the controller of memory."""
+    counted(proc, "cgroup2", "nsdelegate", {"cpu.stat": "usage_usec 2500000\nuser_usec 1\n", **files})
+    assert used(proc, app=Container("c0ffee", 10)) == {"app": SEEN._replace(memory=memory)}
+
+
+def test_what_containers_used_on_another_machine(proc: Proc) -> None:
+    """A process here may have the number of one there."""
+    assert used(proc, app=Container("c0ffee", 11, stats=STATS)) == {"app": SEEN._replace(waited_s=0.0)}
 
 
 def test_the_load_is_measured_where_all_containers_run_here(proc: Proc) -> None:
@@ -156,7 +168,7 @@ def test_the_load_is_measured_where_all_containers_run_here(proc: Proc) -> None:
     app = Container("c0ffee", 10)
     assert is_measured(app=app) and is_measured(app=app, ended=Container("beef", 0))
     assert not is_measured(app=app, camera=Container("beef", 12)), "or counts as others"
-    assert not is_measured(app=counted("c0ffee", 11, OF_2))
+    assert not is_measured(app=Container("c0ffee", 11, stats=STATS))
     assert used(proc, app=Container("c0ffee", 12)) is None
     assert used(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
     assert used(proc) is None
