@@ -60,7 +60,7 @@ class Engine:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
         self._now = asyncio.get_running_loop().time
         self.state = RunState(self.plan, self._now, memory_kills=shortage.memory_kills)
-        self._meter = Meter(self.backend.use, self.state.is_application)
+        self._meter = Meter(self.backend.use, self.state.test_s, self.state.is_application)
         kept: list[str] = []
         try:
             await self._set_up()
@@ -124,11 +124,8 @@ class Engine:
         except Exception as error:  # noqa: BLE001  (whatever it is, it must not decide the test)
             why = f"{type(error).__name__}: {error}"
             self.state.notes.append(f"load and use of the machine were not measured to the end: {why}")
-        began, finished = self.state.began, self.state.finished or self._now()
-        in_steps = self.plan.lockstep is not None
-        whole = [] if began is None else [(began, 0.0), (finished, finished - began)]
         names = [service.name for service in self.plan.application.services]
-        self.state.resources = self._meter.figures(names, self.state.progress if in_steps else whole, in_steps)
+        self.state.resources = self._meter.figures(names, in_steps=self.plan.lockstep is not None)
         self.state.load = self._meter.load()
         self._is_measured = True
 

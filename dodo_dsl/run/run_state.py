@@ -98,8 +98,6 @@ class RunState:
     memory_kills: Callable[[], int] = lambda: 0
     """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
-    progress: list[tuple[float, float]] = field(default_factory=list)
-    """Times of ``clock`` in lockstep, with the test time that was reached then."""
     resources: tuple[ServiceUse, ...] = ()
     _ended_by: str = ""
     """The service whose end was that of the test."""
@@ -110,6 +108,12 @@ class RunState:
     def __post_init__(self) -> None:
         self._killed_before = self.memory_kills()
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
+
+    def test_s(self) -> float:
+        """How far the test is by its own time, as far as that is known."""
+        if self.plan.lockstep:
+            return self.time.seconds if self.time else 0.0
+        return 0.0 if self.began is None else (self.finished or self.clock()) - self.began
 
     def all_evaluators_ended(self) -> bool:
         return all(name in self.exits for name in self.facts.evaluators)
@@ -182,7 +186,6 @@ class RunState:
                 self.input_ended = True
             case Time():
                 self.time = event
-                self.progress.append((self.clock(), event.seconds))
             case Responded(answers):
                 self.response = answers
 

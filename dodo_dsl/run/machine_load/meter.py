@@ -4,7 +4,6 @@ Use is processor time, memory, and how that grows.
 """
 
 import asyncio
-import bisect
 import contextlib
 import statistics
 from collections.abc import Awaitable, Callable, Collection, Sequence
@@ -13,11 +12,11 @@ from dataclasses import dataclass, field
 from dodo_dsl.outcome import MachineLoad, ServiceUse, Wait
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 
-FIRST_PERIOD_S, MOST_PERIOD_S = 0.02, 0.25
+FIRST_PERIOD_S, MOST_PERIOD_S = 0.04, 0.25
 """A test of 30 frames in lockstep may be over in a second, and a long one needs no more than a few looks a second."""
 _PERIOD_SHARE = 0.02
 """Of the time that passed so far, until the next look."""
-_TIMES_COST, _MOST_PAUSE_S = 10, 0.4
+_TIMES_COST, _MOST_PAUSE_S = 3, 0.15
 """How many times as long as a look took until the next one, and how long at most."""
 LAST_PATIENCE_S = 1.0
 WINDOW_S = 0.4
@@ -30,13 +29,10 @@ LEAST_RISE = 1_000_000
 """Bytes by which memory has to rise for a growth: less is what programs take and give back at any time."""
 _LEAST_SHARE = 1 / 6
 """Of the rise that each half of it has to have: memory that is taken once, whenever that is, does not grow."""
-_LEAST_TIMES = 8
-"""Known times of the test within the second half: what was measured between two of them may be of either."""
+_LEAST_TIMES, _LEAST_STEPS = 3, 6
 _MOST_KEPT = 2000
 Point = tuple[float, float]
-"""Time in s and bytes of memory."""
-Progress = Sequence[tuple[float, float]]
-"""Times of the clock with those of the test, in ascending order."""
+"""Time of the test in s, and bytes of memory."""
 
 
 def period_s(passed_s: float, took_s: float = 0.0) -> float:
@@ -55,11 +51,22 @@ class _Service:
 
 
 class Meter:
-    """Looks by ``take`` from ``begin`` to ``end``; ``is_application`` says which services are the application's."""
+    """Looks by ``take`` from ``begin`` to ``end``, at times ``test_s`` of the test.
 
-    def __init__(self, take: Callable[[], Awaitable[Snapshot | None]], is_application: Callable[[str], bool]) -> None:
+    ``is_application`` says which services are the application's.
+    """
+
+    def __init__(
+        self,
+        take: Callable[[], Awaitable[Snapshot | None]],
+        test_s: Callable[[], float],
+        is_application: Callable[[str], bool],
+    ) -> None:
         self._take = take
+        self._test_s = test_s
         self._is_application = is_application
+        self._times: list[float] = []
+        """Those of the test at the first and the last look."""
         self._task: asyncio.Task[None] | None = None
         self._is_over = False
         self._services: dict[str, _Service] = {}
@@ -98,12 +105,13 @@ class Meter:
 
     def add(self, snapshot: Snapshot) -> None:
         """What services have used up to a time."""
+        self._times = [*self._times[:1], self._test_s()]
         for name, used in snapshot.services.items():
             service = self._services.setdefault(name, _Service(Used() if self._first else used, used))
             service.last = used
             service.peak = max(service.peak, used.memory)
             if used.memory:
-                service.points.append((snapshot.at_s, used.memory))
+                service.points.append((self._times[-1], used.memory))
             if len(service.points) > _MOST_KEPT:
                 del service.points[1:-1:2]
         self._first, self._last = self._first or snapshot, snapshot
@@ -157,20 +165,13 @@ class Meter:
         waited_s, displaced_s = (spent[name][1], services[name].displaced_s) if spent else (0.0, 0.0)
         return Wait(sum(ran for ran, _ in spent.values()), min(waited_s, took_s), min(displaced_s, took_s), name)
 
-    def figures(self, names: Collection[str], progress: Progress, in_steps: bool = False) -> tuple[ServiceUse, ...]:
-        """What each of some services used.
-
-        ``in_steps``: between the times of ``progress`` the test may have stood still, as in lockstep.
-        """
-        if self._first is None or self._last is None:
-            return ()
-        passed_s = test_time(progress, self._last.at_s) - test_time(progress, self._first.at_s)
-        known = {at_s for _, at_s in progress} if in_steps else None
-        found = []
+    def figures(self, names: Collection[str], in_steps: bool = False) -> tuple[ServiceUse, ...]:
+        """What each of some services used; ``in_steps`` as of ``growth``."""
+        passed_s, found = self._times[-1] - self._times[0] if self._times else 0.0, []
         for name, service in sorted((name, self._services[name]) for name in {*names} & self._services.keys()):
             ran_s, _ = _spent(service.first, service.last)
             share = ran_s / passed_s if passed_s > 0 else None
-            rate = growth([(test_time(progress, at_s), size) for at_s, size in service.points], known)
+            rate = growth(service.points, in_steps)
             found.append(ServiceUse(name, ran_s, share, service.peak, rate, service.last.limit or None))
         return tuple(found)
 
@@ -180,32 +181,21 @@ def _spent(then: Used, now: Used) -> tuple[float, float]:
     return max(now.processor_s - then.processor_s, 0.0), max(now.waited_s - then.waited_s, 0.0)
 
 
-def test_time(progress: Progress, at_s: float) -> float:
-    """The time that a test had reached, between those that are known; 0 if none is."""
-    after = bisect.bisect_right(progress, at_s, key=lambda pair: pair[0])
-    if after in (0, len(progress)):
-        return progress[after - 1 if after else 0][1] if progress else 0.0
-    (begin_s, before), (end_s, behind) = progress[after - 1 : after + 1]
-    return before + (behind - before) * (at_s - begin_s) / (end_s - begin_s)
-
-
-def growth(points: Sequence[Point], known: Collection[float] | None = None) -> float | None:
+def growth(points: Sequence[Point], in_steps: bool = False) -> float | None:
     """Bytes a second by which memory grows in the second half of the time, in which programs have warmed up.
 
     It is by the medians of its thirds, as single points may be anywhere. 0 where memory does not rise by LEAST_RISE, or
-    not from each third to the next. None if one of them has no point, or there are too few times that are ``known``:
-    without these all are.
+    not from each third to the next. None if there are too few times of the test: more are needed if it goes on
+    ``in_steps``, as what was measured between two of them may be of either.
     """
-    end_s = points[-1][0] if points else 0.0
-    middle_s = (points[0][0] + end_s) / 2 if points else 0.0
-    thirds: tuple[list[Point], ...] = ([], [], [])
-    for at_s, size in points:
-        if middle_s <= at_s and middle_s < end_s:
-            thirds[min(int(3 * (at_s - middle_s) / (end_s - middle_s)), 2)].append((at_s, size))
-    if not all(thirds) or (known is not None and sum(middle_s <= at_s <= end_s for at_s in known) < _LEAST_TIMES):
+    middle_s = (points[0][0] + points[-1][0]) / 2 if points else 0.0
+    found = [*{at_s: size for at_s, size in points if at_s >= middle_s}.items()]
+    if len(found) < (_LEAST_STEPS if in_steps else _LEAST_TIMES):
         return None
-    (begin_s, low), (last_s, high) = (map(statistics.median, zip(*third, strict=True)) for third in thirds[::2])
-    rise, central = high - low, [size for _, size in thirds[1]]
+    third = len(found) // 3
+    ends = (map(statistics.median, zip(*part, strict=True)) for part in (found[:third], found[-third:]))
+    (begin_s, low), (last_s, high) = ends
+    rise, central = high - low, [size for _, size in found[third:-third]]
     rises = statistics.median_low(central) - low, high - statistics.median_high(central)
     is_steady = rise >= LEAST_RISE and min(rises) >= _LEAST_SHARE * rise
     return rise / (last_s - begin_s) if is_steady else 0.0
