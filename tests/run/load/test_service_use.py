@@ -2,6 +2,8 @@
 
 import json
 import os
+import shutil
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 
 from dodo_dsl.run.machine_load.processes import above, memory
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used, UseReader, busy_s
+from dodo_dsl.run.process.children import Children
 
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 MB = 1 << 20
@@ -43,10 +46,7 @@ class Proc:
             (folder / "task" / str(thread) / "schedstat").write_text(f"{ran * 1_000_000} {waited * 1_000_000} 7\n")
 
     def end(self, pid: int) -> None:
-        for path in sorted((self.root / str(pid)).rglob("*"), reverse=True):
-            path.rmdir() if path.is_dir() else path.unlink()
-        if (self.root / str(pid)).is_dir():
-            (self.root / str(pid)).rmdir()
+        shutil.rmtree(self.root / str(pid), ignore_errors=True)
 
     def used(self, **services: int) -> Snapshot:
         return self.reader.take({pid: "" if name == "sandbox" else name for name, pid in services.items()})
@@ -183,3 +183,20 @@ def test_what_only_a_descriptor_holds_counts_once() -> None:
     assert 50 < (memory([os.getpid()], []) - before) / MB < 100
     os.close(file)
     os.close(copy)
+
+
+@pytest.mark.parametrize("is_counted", [True, False])
+def test_what_ended_is_the_applications(tmp_path: Path, is_counted: bool) -> None:
+    """With all that it waited for; where nobody counts the rest, what began and ended may be the application's."""
+    ended: list[str] = []
+    children = Children(lambda name, _: ended.append(name))
+    children._is_all_counted = is_counted
+    inner = "import time\nwhile time.process_time() < 0.1: pass"
+    code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {inner!r}])"
+    with (tmp_path / "log").open("w") as log:
+        children.start("app", [sys.executable, "-c", code], {}, str(tmp_path), log.fileno())
+    while not ended:
+        children.reap()
+    found = children.with_ended(Snapshot(1.0, {"app": Used(), "camera": Used(7.0)}, changes=3))
+    assert found.services["app"].processor_s > 0.1
+    assert (found.services["camera"].processor_s, found.changes) == (7.0, 0 if is_counted else 3)
