@@ -14,10 +14,8 @@ from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 
 FIRST_PERIOD_S, MOST_PERIOD_S = 0.04, 0.25
 """A test of 30 frames in lockstep may be over in a second, and a long one needs no more than a few looks a second."""
-_PERIOD_SHARE = 0.02
-"""Of the time that passed so far, until the next look."""
-_TIMES_COST, _MOST_PAUSE_S = 3, 0.15
-"""How many times as long as a look took until the next one, and how long at most."""
+_PERIOD_SHARE, _TIMES_COST = 0.02, 3
+"""Of the time that passed so far, and how many times as long as a look took, until the next one."""
 LAST_PATIENCE_S = 1.0
 WINDOW_S = 0.4
 """The least time over which it is decided whether the machine was full."""
@@ -37,8 +35,7 @@ Point = tuple[float, float]
 
 def period_s(passed_s: float, took_s: float = 0.0) -> float:
     """Seconds until the next look, by what passed so far, and what the last one took."""
-    period = min(max(FIRST_PERIOD_S, _PERIOD_SHARE * passed_s), MOST_PERIOD_S)
-    return max(period, min(_TIMES_COST * took_s, _MOST_PAUSE_S))
+    return min(max(FIRST_PERIOD_S, _PERIOD_SHARE * passed_s, _TIMES_COST * took_s), MOST_PERIOD_S)
 
 
 @dataclass
@@ -68,7 +65,6 @@ class Meter:
         self._times: list[float] = []
         """Those of the test at the first and the last look."""
         self._task: asyncio.Task[None] | None = None
-        self._is_over = False
         self._services: dict[str, _Service] = {}
         self._first: Snapshot | None = None
         self._window: Snapshot | None = None
@@ -83,7 +79,6 @@ class Meter:
         """Looks for the last time, with little patience."""
         if self._task is None:
             return
-        self._is_over = True  # also for a snapshot that came as it was cancelled
         self._task.cancel()
         await asyncio.gather(self._task, return_exceptions=True)
         self._task = None
@@ -94,7 +89,7 @@ class Meter:
     async def _run(self) -> None:
         now = asyncio.get_running_loop().time
         began = now()
-        while not self._is_over:
+        while True:
             looked = now()
             await self._look()
             await asyncio.sleep(period_s(now() - began, now() - looked))
@@ -168,7 +163,8 @@ class Meter:
     def figures(self, names: Collection[str], in_steps: bool = False) -> tuple[ServiceUse, ...]:
         """What each of some services used; ``in_steps`` as of ``growth``."""
         passed_s, found = self._times[-1] - self._times[0] if self._times else 0.0, []
-        for name, service in sorted((name, self._services[name]) for name in {*names} & self._services.keys()):
+        for name in sorted({*names} & self._services.keys()):
+            service = self._services[name]
             ran_s, _ = _spent(service.first, service.last)
             share = ran_s / passed_s if passed_s > 0 else None
             rate = growth(service.points, in_steps)

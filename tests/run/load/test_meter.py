@@ -1,7 +1,6 @@
 """What snapshots add up to: who waited and whose fault it was, and how memory grows."""
 
 import asyncio
-import contextlib
 import random
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -112,7 +111,7 @@ def test_snapshots_are_taken_from_begin_to_end() -> None:
 
 def test_a_long_test_is_looked_at_less_often() -> None:
     assert [period_s(t) for t in (0.0, 1.0, 1000.0)] == [FIRST_PERIOD_S, FIRST_PERIOD_S, MOST_PERIOD_S]
-    assert [period_s(0.0, took_s) for took_s in (0.02, 9.0)] == pytest.approx([0.06, 0.15]), "or where that takes long"
+    assert [period_s(0.0, took_s) for took_s in (0.02, 9.0)] == pytest.approx([0.06, MOST_PERIOD_S])
 
 
 def test_a_backend_that_does_not_answer_holds_up_nothing_for_long() -> None:
@@ -124,23 +123,6 @@ def test_a_backend_that_does_not_answer_holds_up_nothing_for_long() -> None:
         return asyncio.get_running_loop().time()
 
     assert run(scene()) == pytest.approx(1.0 + LAST_PATIENCE_S)
-
-
-def test_a_snapshot_that_comes_as_it_is_cancelled_ends_it_all_the_same() -> None:
-    """As with ``asyncio.wait_for`` of Python 3.11, which then gives the result and forgets the cancellation."""
-
-    async def take() -> Snapshot | None:
-        with contextlib.suppress(asyncio.CancelledError):
-            await asyncio.sleep(600)
-        return None
-
-    async def scene() -> None:
-        meter = Meter(take, float, bool)
-        meter.begin()
-        await asyncio.sleep(0)
-        await meter.end()
-
-    run(asyncio.wait_for(scene(), 100 * LAST_PATIENCE_S))
 
 
 def noise(size: float) -> float:
