@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import functools
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,7 @@ from dodo_dsl.run import application_time, service_protocol
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
-from dodo_dsl.run.machine_load.service_use import Used
-from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.outcomes import how_it_ended
 from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
@@ -34,7 +33,7 @@ from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off
 from dodo_dsl.spec.model import VIRTUAL
 
-LOAD_PATIENCE_S = 2.0
+USE_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
 _OF_SANDBOX = ("bwrap:", "setpriv:")
@@ -45,7 +44,6 @@ class ProcessBackend:
     """One test in a sandbox; ``folder`` is the compiled test's, ``report`` takes logs and recordings."""
 
     name = "process"
-    has_engine = False
 
     def __init__(
         self,
@@ -301,21 +299,15 @@ class ProcessBackend:
         to = hearers(self.plan, self.slot.cid, self._addresses)
         self._sandbox.send({"do": "send", "to": to, "data": frame.hex()})
 
-    async def load(self) -> Snapshot | None:
-        """What the sandbox sees of its processes; None when it does not answer."""
-        return msgspec.convert(await self._ask("load"), Snapshot | None)
-
     async def listeners(self) -> Collection[str] | None:
         """As the sandbox sees them; None when it does not answer."""
         found: list[str] | None = await self._ask("listeners")
         return found
 
-    async def use(self) -> Mapping[str, Used] | None:
+    async def use(self) -> Snapshot | None:
         """As the sandbox sees it; None when it does not answer."""
         names = [service.name for service in self.plan.application.services]
-        found: dict[str, tuple[float, int]] | None = await self._ask("use", names=names)
-        limit = self.plan.application.limits.memory if self._is_confined else 0
-        return {name: Used(*used, limit) for name, used in found.items()} if found else None
+        return msgspec.convert(await self._ask("use", names=names), Snapshot | None)
 
     async def _ask(self, what: str, **words: object) -> Any:
         """What the sandbox answers; None when it does not."""
@@ -323,7 +315,7 @@ class ProcessBackend:
             self._asked[what] = asyncio.get_running_loop().create_future()
             self._sandbox.send({"do": what, **words})
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
+            async with asyncio.timeout(USE_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
                 return await asyncio.shield(self._asked[what])
         return None
 

@@ -1,4 +1,4 @@
-"""A program of the application in its own sandbox, whether this machine can confine it, and how much memory it uses.
+"""A program of the application in its own sandbox, and whether this machine can confine it.
 
 The process has the interface of subprocess.Popen that ``Children`` uses. Where an application cannot be confined, the
 probe says whether the machine lacks what that takes.
@@ -12,10 +12,9 @@ import resource
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from dodo_dsl.run.machine_load import processes
 from dodo_dsl.run.process import confinement, namespaces, places, process_group, seccomp_filter
 from dodo_dsl.run.process.confinement import INTERPRETER, PROGRAM, Confinement
 from dodo_dsl.run.process.places import Places
@@ -71,7 +70,6 @@ class ConfinedProcess:
             for descriptor in (began, filter_fd, source):
                 os.close(descriptor)
         self.pid = self._process.pid
-        self.memory = confined.limits.memory
         self.failed = False
         """Whether the program never began; known after ``wait``."""
 
@@ -169,32 +167,3 @@ def missing() -> str:
 
 
 PERIOD_S = 0.25
-
-
-def above(limits: Mapping[int, int], parents: Mapping[int, int], proc: Path = processes.PROC) -> dict[int, int]:
-    """Bytes of memory that a process uses with all that descend from it, of those which use more than their limit.
-
-    ``limits`` are bytes by process id, ``parents`` those of all processes. What processes share counts once.
-    """
-    groups: dict[int, list[int]] = {root: [] for root in limits}
-    for pid in parents:
-        ancestor = pid
-        while ancestor in parents and ancestor not in groups:
-            ancestor = parents[ancestor]
-        if ancestor in groups:
-            groups[ancestor].append(pid)
-    found, memories = {}, processes.segments(proc)
-    for root, pids in groups.items():
-        attached, detached = processes.of_service(memories, pids, proc)
-        held = processes.held(pids, proc) + attached
-        if _used(processes.resident, proc, pids, held) + detached > limits[root]:
-            size = _used(processes.proportional, proc, pids, held) + detached
-            if size > limits[root]:
-                found[root] = size
-    return found
-
-
-def _used(measure: Callable[[int, Path], tuple[int, int]], proc: Path, pids: Iterable[int], held: int) -> int:
-    """Bytes of anonymous memory, and of shared memory or of what descriptors hold."""
-    anonymous, shared = map(sum, zip(*(measure(pid, proc) for pid in pids), strict=True)) if pids else (0, 0)
-    return anonymous + max(shared, held)

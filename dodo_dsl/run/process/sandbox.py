@@ -8,16 +8,15 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
-                        {"do": "close"}; {"do": "probe"}; {"do": "send", "to", "data"}; {"do": "load"};
+                        {"do": "close"}; {"do": "probe"}; {"do": "send", "to", "data"};
                         {"do": "relay", "cid"}; {"do": "line", "data"}; {"do": "listeners"};
-                        {"do": "use", "names": [service, ...]};
+                        {"do": "use", "names": services of which memory is measured, too};
                         {"do": "keep"} with the descriptors of outputs and logs
     sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
-                        {"load": snapshot or null};
                         {"relay": [host, port] of what sends lines, or null};
                         {"listeners": names of what listens on a bus, or null};
-                        {"use": {service: [seconds on processors, bytes of memory]} or null};
+                        {"use": snapshot or null};
                         {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
                         ``confined.missing`` has it}
 """
@@ -41,8 +40,6 @@ import msgspec
 
 from dodo_dsl.opendlv.relay import Relay
 from dodo_dsl.run.listeners import listening
-from dodo_dsl.run.machine_load import snapshot
-from dodo_dsl.run.machine_load.processes import ThreadTimes
 from dodo_dsl.run.machine_load.service_use import UseReader
 from dodo_dsl.run.process import confined_process, namespaces, places
 from dodo_dsl.run.process.children import Children
@@ -68,9 +65,8 @@ class Sandbox:
         self.forks = forks
         umask = UMASK if isolation == "network" else -1
         self.use = UseReader()
-        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), self.use.note_end, umask)
+        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), umask)
         self.places: Places | None = None
-        self.times = ThreadTimes()
         self.relay: Relay | None = None
         self.keep = False
         self.ended = False
@@ -180,21 +176,11 @@ class Sandbox:
             if self.relay is not None:
                 self.relay.send(bytes.fromhex(data))
 
-    def _do_load(self, _descriptors: list[int]) -> None:
-        """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
-        names, took = {**self.children.names, os.getpid(): ""}, self.children.took_s()
-        taken = snapshot.take(self.times, names) if _has_own_proc() else None
-        self.send(load=taken and asdict(snapshot.with_ended(taken, took, self.times.ended)))
-
     def _do_use(self, _descriptors: list[int], names: list[str]) -> None:
-        """Reports what some services have used so far."""
-        services = {pid: name for pid, name in self.children.names.items() if name in names}
-        took = self.children.took_s()
-        found = {
-            name: (max(used.processor_s, took.get(name) or 0.0), used.memory)
-            for name, used in (self.use.take(services).items() if _has_own_proc() else ())
-        }
-        self.send(use=found if _has_own_proc() else None)
+        """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
+        self.use.sized.update(names)
+        taken = self.use.take({**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
+        self.send(use=taken and asdict(self.children.with_ended(taken)))
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
         found = listening(self.children.names) if _has_own_proc() else None
