@@ -6,8 +6,7 @@ from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import file_rules, resolve, service_rules, spec_rules, wiring_rules
-from dodo_dsl.check.context import Rule, RuleContext
-from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.resolve import ResolvedTest, Rule, RuleContext
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
@@ -20,7 +19,7 @@ RULES: tuple[Rule, ...] = (
     spec_rules.check_pools,
     spec_rules.check_rigs,
     spec_rules.check_built_in_cid,
-    service_rules.check_camera_sources,
+    service_rules.check_cameras,
     service_rules.check_services,
     service_rules.check_layers,
     service_rules.check_parameters,

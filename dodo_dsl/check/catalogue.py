@@ -101,7 +101,9 @@ def _sections() -> Iterator[str]:
         yield f"\n## {group}"
         for page in members:
             yield f"\n### {page.name}\n\n{page.summary}\n{page.why}\n"
-            yield f"```yaml\n{page.bad}\n```" + (f"\n\nInstead:\n\n```yaml\n{page.instead}\n```" if page.instead else "")
+            yield f"```yaml\n{page.bad}\n```" + (
+                f"\n\nInstead:\n\n```yaml\n{page.instead}\n```" if page.instead else ""
+            )
     yield ""
 
 

@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.check import lockstep
-from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import IMAGE, known_ids, without_pictures
+from dodo_dsl.check import wiring
+from dodo_dsl.check.resolve import IMAGE, RuleContext, known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import formats, map_file, recording_contents
@@ -239,9 +238,9 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
     spec, services = context.spec, context.services
     unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
     player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
-    known = lockstep.rates(services)
-    has_rate = not player and known.keys() & lockstep.cameras_of(context.wiring)
-    period = 1 / lockstep.step_hz(context.wiring, known) if has_rate else 0.0
+    known = wiring.rates(services)
+    has_rate = not player and known.keys() & wiring.cameras_of(context.wiring)
+    period = 1 / wiring.step_hz(context.wiring, known) if has_rate else 0.0
     for service in services if context.test.is_complete else ():
         found: list[Unmet] = []
         for name, argument in service.arguments.items():

@@ -7,13 +7,13 @@ is judged by, is left out of what is played: it would be taken for the applicati
 
 import functools
 import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource, Declared
-from dodo_dsl.check.lockstep import driving
-from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, message, wire
+from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, driving, message, wire
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
 from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
@@ -259,3 +259,40 @@ def takes_old_frames(wiring: Wiring, own: tuple[Path, ...]) -> bool:
 def _arguments(test: ResolvedTest | None, layer: str, name: str) -> Mapping[str, Argument] | None:
     services = test.services if test else ()
     return next((s.arguments for s in services if (s.use.layer, s.use.name) == (layer, name)), None)
+
+
+@dataclass(frozen=True)
+class RuleContext:
+    """One instance with its deployment and application; ``by_name`` has one instance of each file by its name."""
+
+    test: ResolvedTest
+    manifests: Mapping[str, Manifest]
+    by_name: Mapping[str, list[Spec]]
+    deployment: Deployment
+    application: ApplicationSource | None = None
+
+    @property
+    def spec(self) -> Spec:
+        return self.test.spec
+
+    @property
+    def rig(self) -> Rig | None:
+        """The rig of a hil test, when the deployment has it."""
+        return self.test.rig
+
+    @property
+    def services(self) -> tuple[ResolvedService, ...]:
+        """Those that are known in their layers; ``unknown-service`` and ``wrong-layer`` report the others."""
+        return self.test.services
+
+    @property
+    def wiring(self) -> Wiring:
+        return self.test.wiring
+
+    @property
+    def messages(self) -> Collection[str]:
+        """The full names of all messages: OpenDLV's, DoDo's and the deployment's, as far as these can be read."""
+        return known_ids(self.deployment.messages)
+
+
+Rule = Callable[[RuleContext], Iterator[Diagnostic]]

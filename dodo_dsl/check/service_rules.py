@@ -2,19 +2,19 @@
 
 import re
 from collections.abc import Collection, Iterator
-from pathlib import Path, PurePath
+from pathlib import Path
 
 from dodo_dsl.application.model import PrintedLine
 from dodo_dsl.check import resolve
-from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.resolve import RuleContext
 from dodo_dsl.check.senders import is_shipped, told
-from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Reader, Scalar, Sequence, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
 from dodo_dsl.spec.deployment import MANIFEST
 from dodo_dsl.spec.manifest import holds
-from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
+from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, Rig
 from dodo_dsl.spec.slips import meant, unknown_key
 
 
@@ -260,38 +260,19 @@ def unknown_messages(folders: tuple[Path, ...], reader: Reader, known: Collectio
                     yield from unknown_message(name, known, scalar.span)
 
 
-_FILE = "file"
-_NAMES = (RPICAM, _FILE, EMULATED)
-_ALIGNED = 64
-"""Rows of other widths are padded in the pipe of ``rpicam-vid``."""
-
 _OPTICS = "camera.intrinsics"
 
 
-def check_camera_sources(context: RuleContext) -> Iterator[Diagnostic]:
+def check_cameras(context: RuleContext) -> Iterator[Diagnostic]:
+    rig = context.rig
     for service in context.services:
-        yield from _size(context.rig, service)
+        yield from _size(rig, service)
         for argument in service.arguments.values():
-            if argument.parameter.rig == CAMERA_SOURCE and argument.text:
-                yield from _problems(context, service, argument)
-
-
-def _problems(context: RuleContext, service: ResolvedService, argument: Argument) -> Iterator[Diagnostic]:
-    source, span = argument.text or "", _span(service, argument)
-    if source not in _NAMES and not source.startswith("/dev/") and not PurePath(source).suffix:
-        known = "write a device such as /dev/video0, rpicam or file"
-        hint = did_you_mean(source, _NAMES) if closest(source, _NAMES) else known
-        yield Diagnostic(span, "camera-source", f"'{source}' is not a source of frames", hint)
-    elif source == EMULATED and context.rig is not None and not context.rig.is_emulated:
-        message = f"rig '{context.rig.name}' is hardware, and an emulated camera sees nothing of it"
-        yield Diagnostic(span, "camera-source", message, "write a device such as /dev/video0, or rpicam")
-    elif source == _FILE and _FILE not in service.use.parameters:
-        message = f"'{service.use.name}' has the source 'file', but no 'file' to take frames from"
-        yield Diagnostic(span, "camera-source", message, "write 'file: ...' under 'with' in the test, or a device")
-    elif source == RPICAM and (width := service.texts.get("width", "")).isdigit() and int(width) % _ALIGNED:
-        message = f"rpicam-vid gives frames whose width is a multiple of {_ALIGNED}, not {width}"
-        hint = f"write a width of {max(int(width) // _ALIGNED, 1) * _ALIGNED}"
-        yield Diagnostic(span, "camera-source", message, hint)
+            is_drawn = argument.parameter.rig == CAMERA_SOURCE and argument.text == EMULATED
+            if is_drawn and rig is not None and not rig.is_emulated:
+                message = f"rig '{rig.name}' is hardware, and an emulated camera sees nothing of it"
+                span = argument.entry.value.span if argument.entry else service.use.span
+                yield Diagnostic(span, "camera-source", message, "write a device such as /dev/video0, or rpicam")
 
 
 def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
@@ -307,7 +288,3 @@ def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
         message += f"and '{service.use.name}' has them of {' x '.join(given)}"
         hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take frames of the measured size"
         yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)
-
-
-def _span(service: ResolvedService, argument: Argument) -> Span:
-    return argument.entry.value.span if argument.entry else service.use.span

@@ -13,7 +13,6 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.diagnostics import Span, did_you_mean, shown_path
-from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Argument, default_value
 from dodo_dsl.spec.model import LEVEL_WORDS, Use
 from dodo_dsl.spec.quantity import SHARE

@@ -14,8 +14,7 @@ from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.file_rules import MAP, needed
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
-from dodo_dsl.check.spec_rules import resolved_goals
-from dodo_dsl.check.suite_rules import containers
+from dodo_dsl.check.spec_rules import containers, resolved_goals
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.plan import added_services, addresses, hidden_paths
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
