@@ -8,15 +8,15 @@ from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Known
 from dataclasses import dataclass, replace
 
-from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, read
+from dodo_dsl.diagnostics import Diagnostic, has_errors
+from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, read
 from dodo_dsl.spec import extends, matrix, slips, vary
 from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
 from dodo_dsl.spec.registry import Location
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
-from dodo_dsl.spec.validation import REPORTED, schema_of_keys, valid_part, validate, without_places
 from dodo_dsl.spec.validation import Path as ValuePath
+from dodo_dsl.spec.validation import schema_of_keys, valid_part, validate, without_places
 
 Loaded = tuple[list[Spec], list[Diagnostic]]
 """The instances of a file, and its problems."""
@@ -46,14 +46,10 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
     choices, found = matrix.choices(node)
     of_matrix = list(matrix.PLACEHOLDERS.unknown(node, "matrix-unknown"))
     of_ranges = list(vary.PLACEHOLDERS.unknown(node, "vary-unknown"))
-    unknown = [*of_matrix, *of_ranges]  # which may be meant to use any name
-    found += [] if of_matrix else matrix.PLACEHOLDERS.idle(node, "matrix-unused")
-    found += [] if of_ranges else vary.PLACEHOLDERS.idle(node, "vary-unused")
-    found += unknown
+    found += of_matrix or matrix.PLACEHOLDERS.idle(node, "matrix-unused")
+    found += of_ranges or vary.PLACEHOLDERS.idle(node, "vary-unused")
     spans = {key: entry.value.span for key, entry in node.entries.items()}
     are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
-    is_broken = len(choices[0].values) < len(getattr(node.get(MATRIX), "entries", ()))
-    reported = {problem.span for problem in unknown}
     specs: list[Spec] = []
     for choice in choices:
         if wrong >= _MOST_WRONG:
@@ -61,8 +57,6 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
         template = matrix.substitute(node, choice)
         ranges, problems = vary.read(template)
         found += problems
-        if is_broken or has_errors(found):
-            template = _marked(template, reported, {each.name for each in ranges})
         if places is None or not are_alike:
             instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges))
             _, problems, places = valid_part(instance if places is None else without(instance, MATRIX), "dodo")
@@ -75,21 +69,6 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
         found += problems
         specs.append(replace(spec, corners=corners, template=template if ranges else None))
     return specs, found
-
-
-def _marked(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
-    """The test with a mark at values of which nothing more can be said: their placeholders have a problem."""
-
-    def marked(value: Node) -> Node:
-        if value.span in spans or matrix.PLACEHOLDERS.names_in(value) or vary.PLACEHOLDERS.names_in(value) - ranges:
-            return replace(value, tag=REPORTED)
-        if isinstance(value, Mapping):
-            entries = {key: Entry(entry.key, marked(entry.value)) for key, entry in value.entries.items()}
-            return replace(value, entries=entries)
-        return replace(value, items=tuple(map(marked, value.items))) if isinstance(value, Sequence) else value
-
-    entries = {k: e if k == MATRIX else Entry(e.key, marked(e.value)) for k, e in node.entries.items()}
-    return replace(node, entries=entries)
 
 
 def _hides_services(node: Mapping, places: Collection[ValuePath]) -> bool:

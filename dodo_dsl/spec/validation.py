@@ -20,12 +20,11 @@ from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, shown_path
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
+from dodo_dsl.spec.matrix import REPORTED
 from dodo_dsl.spec.registry import SUFFIX, as_file
 from dodo_dsl.spec.slips import boolean_meant, meant, repaired, schema_at, unknown_key
 
 OF_COMPOSE = "application"
-REPORTED = "\0"
-"""The tag of values with a problem that is known already, which no file can have."""
 UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
 """The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
 _WHOLE = "x-whole"
