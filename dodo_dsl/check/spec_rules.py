@@ -15,7 +15,7 @@ from dodo_dsl.spec.deployment import RESERVED_CIDS, Deployment
 from dodo_dsl.spec.load import members
 from dodo_dsl.spec.model import VIRTUAL, Goal, Use
 from dodo_dsl.spec.quantity import SHARE, QuantityError, convert
-from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, as_file, is_free, is_name
+from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, is_free, is_name
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, EMULATED_RIGS, KIND_TAGS, MEMORY, PORT, Rig, is_simulated
 
 
@@ -25,7 +25,7 @@ def check_names(context: RuleContext) -> Iterator[Diagnostic]:
         return
     if spec.name in KEYWORDS:
         message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
-        yield Diagnostic(spec.span("name"), "name-reserved", message, as_file(spec.location.stem, SUFFIX))
+        yield Diagnostic(spec.span("name"), "name-reserved", message, "choose another name, also for the file")
     elif spec.name != spec.location.stem and is_name(spec.name):  # the schema shows what is wrong with any other
         message, stem = f"the name '{spec.name}' differs from the file's name", spec.location.stem
         written = f"write 'name: {stem}', or " if is_free(stem) else ""

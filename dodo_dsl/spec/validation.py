@@ -8,10 +8,10 @@ import functools
 import itertools
 import json
 import math
+import operator
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator
-from pathlib import PurePath
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import yaml
@@ -21,7 +21,6 @@ from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, sh
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.matrix import REPORTED
-from dodo_dsl.spec.registry import SUFFIX, as_file
 from dodo_dsl.spec.slips import boolean_meant, meant, repaired, schema_at, unknown_key
 
 OF_COMPOSE = "application"
@@ -45,24 +44,22 @@ Path = tuple[str | int, ...]
 
 
 @functools.cache
-def schema_of(name: str) -> dict[str, Any]:
-    """``schemas/<name>.schema.json`` without what is for editors alone."""
-    text = (package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8")
-    schema: dict[str, Any] = json.loads(text, object_hook=None if name == OF_COMPOSE else _exact)
-    if (use := schema.get("$defs", {}).get("use")) is not None:
+def schema_of_keys(name: str) -> dict[str, Any]:
+    """``schemas/<name>.schema.json`` without references, and without what is for editors alone."""
+    file = _file(name, None if name == OF_COMPOSE else _exact)
+    if (use := file.get("$defs", {}).get("use")) is not None:
         use.pop("allOf")  # parameters are read by their manifests
         use["properties"]["with"].pop("additionalProperties")
         use["required"] = ["uses"]  # what a test extends is merged here, of which editors know nothing
-        schema["else"].pop("properties")
-    return schema
-
-
-@functools.cache
-def schema_of_keys(name: str) -> dict[str, Any]:
-    """The same without references."""
-    found: dict[str, Any] = _inlined(schema_of(name), schema_of(name))
+        file["else"].pop("properties")
+    found: dict[str, Any] = _inlined(file, file)
     del found["$defs"]
     return found
+
+
+def _file(name: str, hook: Callable[[dict[str, Any]], dict[str, Any]] | None) -> dict[str, Any]:
+    text = (package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8")
+    return json.loads(text, object_hook=hook)  # type: ignore[no-any-return]
 
 
 def _inlined(part: Any, root: dict[str, Any]) -> Any:
@@ -70,15 +67,12 @@ def _inlined(part: Any, root: dict[str, Any]) -> Any:
         return [_inlined(each, root) for each in part]
     if not isinstance(part, dict):
         return part
-    base = _inlined(*_target(part["$ref"], root)) if isinstance(part.get("$ref"), str) else {}
+    base = {}
+    if isinstance(part.get("$ref"), str):
+        file, _, pointer = part["$ref"].partition("#/")
+        there = _file(file.removesuffix(".schema.json"), _exact) if file else root
+        base = _inlined(functools.reduce(operator.getitem, pointer.split("/"), there), there)
     return {**base, **{key: _inlined(value, root) for key, value in part.items() if key != "$ref"}}
-
-
-def _target(reference: str, root: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """What a reference means, and the file in which that stands."""
-    file, _, pointer = reference.partition("#/")
-    root = _by_address(file) if file else root
-    return functools.reduce(lambda below, key: below[key], pointer.split("/"), root), root
 
 
 def values(node: Node, schema: dict[str, Any]) -> Any:
@@ -131,21 +125,12 @@ class _Whole:
 def _validator(schema: dict[str, Any]) -> Any:
     import jsonschema_rs
 
-    return jsonschema_rs.Draft202012Validator(
-        schema, keywords={UNIT: _Quantity, RANGE: _Range, _WHOLE: _Whole}, retriever=_by_address
-    )
-
-
-@functools.cache
-def _by_address(address: str) -> dict[str, Any]:
-    """The schema that a reference means: ``application.schema.json``."""
-    text = (package_data.schemas() / address.rpartition("/")[2]).read_text(encoding="utf-8")
-    return json.loads(text, object_hook=_exact)  # type: ignore[no-any-return]
+    return jsonschema_rs.Draft202012Validator(schema, keywords={UNIT: _Quantity, RANGE: _Range, _WHOLE: _Whole})
 
 
 @functools.cache
 def _validator_of(name: str) -> Any:
-    return _validator(schema_of(name))
+    return _validator(schema_of_keys(name))
 
 
 class Violation:
@@ -159,12 +144,12 @@ class Violation:
     def __init__(self, error: Any, root: Node, name: str) -> None:
         *steps, self.keyword = error.evaluation_path
         self.path: Path = tuple(error.instance_path)
-        self.schema = _part(_root_of(steps, name), steps)
+        self.schema: Any = functools.reduce(operator.getitem, steps, schema_of_keys(name))
         self.wanted = error.kind.property if self.keyword == "required" else self.schema[self.keyword]
         is_of_key = error.kind.name == "propertyNames"
         self.instance: Any = error.kind.error.instance if is_of_key else error.instance
         self.of_key: str | None = self.instance if is_of_key else None
-        around = self.schema if self.path else schema_of(name)
+        around = self.schema if self.path else schema_of_keys(name)
         self.known, self.is_closed = around.get("properties", {}), around.get("additionalProperties") is False
         self._find(root)
 
@@ -185,13 +170,6 @@ class Violation:
         self.inherited = {k: e for k, e in beside.items() if key is not None and e.key.file != key.file}
 
     @property
-    def of_file(self) -> str:
-        """A hint for the name of a test, which is that of its file."""
-        file = PurePath(self.span.file).name
-        is_name = self.path == ("name",) and file.endswith(SUFFIX)
-        return as_file(file.removesuffix(SUFFIX), SUFFIX) if is_name else ""
-
-    @property
     def places(self) -> Iterator[Path]:
         """What is not valid: without it the rest is, as far as this violation goes."""
         if self.keyword == "additionalProperties":
@@ -207,26 +185,6 @@ def _violations(document: object, root: Node, name: str) -> list[Violation]:
     found = [Violation(error, root, name) for error in errors]
     typed = {v.path: v for v in reversed(found) if v.keyword in _OF_TYPE and v.of_key is None}
     return [v for v in found if v.of_key or typed.get(v.path, v) is v]
-
-
-def _root_of(steps: list[str], name: str) -> dict[str, Any]:
-    """The schema in which a path begins: of keywords of our own it is that in the file where they stand."""
-    schema = schema_of(name)
-    if steps[:1] != ["$defs"] or steps[1] in schema["$defs"]:
-        return schema
-    roots = (_by_address(f"{other}.schema.json") for other in ("deployment", OF_COMPOSE))
-    return next(root for root in roots if steps[1] in root["$defs"])
-
-
-def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
-    """What these steps lead to; a reference to what it means and what stands beside it."""
-    root, part = schema, schema
-    for step in steps:
-        beside, part = part, part[step]  # type: ignore[index]
-        if step == "$ref":
-            part, root = _target(str(part), root)
-            part = {key: value for key, value in beside.items() if key != "$ref"} | part
-    return part
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
@@ -368,7 +326,7 @@ def _type(v: Violation) -> Iterator[Diagnostic]:
         found = _TYPE_NAMES["object" if isinstance(value, dict) else "array"]
     if schema.get(EXPECT) == _TYPE_NAMES["boolean"]:
         names = names[:1]
-    hint, fix = schema.get("x-hint") or v.of_file or _in_quotes(v), None
+    hint, fix = schema.get("x-hint") or _in_quotes(v), None
     items = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
     if hint or wanted is None:
         pass
@@ -435,7 +393,7 @@ def _pattern(v: Violation) -> Iterator[Diagnostic]:
     span = v.span if v.of_key is None else v.entries[v.of_key].key
     name = re.sub(r"[^a-z0-9]+", "-", value[:_MOST_READ].lower()).strip("-")[:40]
     is_text = name != value and resolve(name) == name != "" and _fits(v.schema, name)
-    hint = v.of_file or (f"for example '{name}'" if is_text else "")
+    hint = f"for example '{name}'" if is_text else ""
     yield Diagnostic(span, "wrong-value", f"{_shown(value)} is not allowed here, expected {expected}", hint)
 
 
