@@ -12,8 +12,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Reader, Scalar, Sequence, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
-from dodo_dsl.spec.deployment import MANIFEST
-from dodo_dsl.spec.manifest import holds
+from dodo_dsl.spec.manifest import MANIFEST, holds
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, Rig
 from dodo_dsl.spec.slips import meant, unknown_key
 

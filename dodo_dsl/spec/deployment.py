@@ -16,12 +16,12 @@ from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read
 from dodo_dsl.spec import rig
+from dodo_dsl.spec.manifest import MANIFEST
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.slips import mended
 from dodo_dsl.spec.validation import schema_of_keys, valid_part, values
 
-MANIFEST = "service.yml"
 _TAKEN = ("services", "dodo_dsl")
 _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
