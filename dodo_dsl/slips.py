@@ -12,7 +12,6 @@ import yaml
 from dodo_dsl.diagnostics import Fix
 
 _KINDS = {
-    "escape": "escape",
     "quoted scalar": "quote",
     "simple key": "key",
     "mapping values are not allowed": "colon",
@@ -273,8 +272,6 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _open_quote,
     _Pattern("mapping flow sequence other", "mark", r".*[\"']\s*(?P<at>\0)[^\s,\]}:].*",
              "text stands behind the closing quotation mark", "put the whole text in quotes of the other kind"),
-    _Pattern("escape", "mark", r".*(?P<at>\0)(?P<sign>..?).*", "'{sign}' means nothing within double quotes",
-             "write the text in single quotes, where a backslash is a backslash"),
     _Pattern(_SUSPECTS, "suspect", r" *(?P<at>-)(?P<value>[^-\s].*)",
              "a space is missing after '-'", "write '- {value}'", "- "),
     *(_Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{name}(?P<at>:)(?P<value>(?!//)[^\s:#].*)",
@@ -283,8 +280,6 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _Pattern("colon", "mark", r"\s*(?:- )?(?P<key>[^:]*): .*(?P<at>\0).*",
              "a second colon in the value of '{key}', which must be one string",
              "put the text in quotes, or write a mapping in braces or into the next lines"),
-    _Pattern(_SUSPECTS, "suspect", rf"\s*(?:- )?{_NAME}(?P<at>[;\uff1a])\s*(?P<value>\S.*)",
-             "'{at}' stands after '{key}', expected a colon", _WRITE, ": "),
     _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}[\s=]+(?P<value>\S.*)",
              "a colon is missing after '{key}'", _WRITE + ", or indent the line if it goes on with the text above"),
     _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}\s*", "a colon is missing after '{key}'",
@@ -296,8 +291,6 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
              "write the list in brackets, or each item into its own line"),
     _Pattern("mapping sequence other", "mark", r".*\0(?P<at>[]}]).*",
              "'{at}' closes nothing", "remove it: there is one bracket too many"),
-    _Pattern("mapping", "suspect", r"\s*(?P<at>\*[\w.-]+)\s*",
-             "'{at}' stands among keys, expected a key before it", "write '<<: {at}'", "<<: {at}"),
     _between_levels,
     _open_bracket,
     _Pattern("flow", "mark", r".*\0(?P<at>[]}]).*", "'{at}' closes what '{opening}' opened", "write '{closing}'"),
@@ -306,7 +299,6 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
              "'${name}' within brackets needs quotes, as braces mean something else in YAML", 'write "${name}"'),
     _Pattern("flow", "mark", r".*\0(?P<at>)\s*\S.*", "a comma is missing, or the text needs quotes", _COMMAS),
     _Pattern("character", "mark", r".*\0(?P<at>.).*", "a text cannot begin with '{at}'", "write the text in quotes"),
-    _Pattern("other", "begin", r".*\0(?P<at>[*&]).*", "a text cannot begin with '{at}'", "write the text in quotes"),
     _Pattern("other", "mark", r".*\0\s*(?P<at>\S).*", "'{at}' is not expected here",
              "remove it, or write the text in quotes"),
 )  # fmt: skip

@@ -1,15 +1,13 @@
 """``extends``: a spec built on another one. Mappings merge deeply, scalars and lists replace, null removes."""
 
-import os
 from pathlib import Path
 
-from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, shown_path
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, path_of, read
-from dodo_dsl.spec.registry import SUFFIX
+from dodo_dsl.spec.registry import near_path
 
 KEY = "extends"
 MAX_CHAIN = 8
-MAX_BESIDE = 1_000
 SHIPPED = "dodo:"
 
 _OWN = (KEY, "name")
@@ -78,21 +76,12 @@ def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -
         return Diagnostic(written.span, "extends-file", f"'{written.text}' is a folder, expected a test's file", hint)
     if not path.is_file():
         message = f"there is no file '{written.text}' to extend"
-        return Diagnostic(written.span, "extends-file", message, _near(written.text, path, chain[-1], root))
+        fits = lambda found: found.is_file() and found not in chain  # noqa: E731
+        hint, fix = near_path(written.text, chain[-1].parent, root, fits)
+        if written.text.startswith(SHIPPED):
+            hint, fix = "'dodo new NAME --extends TEST' copies a test that ships with DoDo", None
+        return Diagnostic(written.span, "extends-file", message, hint, fix=fix)
     return None
-
-
-def _near(written: str, path: Path, file: Path, root: Path) -> str:
-    """A hint for a path that does not exist: a file next to it, or the test of its name in a folder next to it."""
-    if written.startswith(SHIPPED):
-        return "'dodo new NAME --extends TEST' copies a test that ships with DoDo"
-    beside = [p.name for p in path.parent.iterdir() if p != file] if path.parent.is_dir() else []
-    folders = file.parent.parent if file.parent != root else root
-    tests = {p.name.removesuffix(SUFFIX): p for p in sorted(folders.glob(f"*/*{SUFFIX}"))[:MAX_BESIDE] if p != file}
-    near = closest(path.name.removesuffix(SUFFIX), tests)
-    if not near or closest(path.name, beside):
-        return did_you_mean(path.name, beside)
-    return f"did you mean '{Path(os.path.relpath(tests[near[0]], file.parent)).as_posix()}'?"
 
 
 def _merge(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int = 0) -> Mapping:

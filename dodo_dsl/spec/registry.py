@@ -3,12 +3,14 @@
 A test is called as its file, which is a job of a pipeline, too.
 """
 
+import glob
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dodo_dsl.diagnostics import Fix, closest, shown_path
 from dodo_dsl.source import resolve
 
 SUFFIX = ".dodo.yml"
@@ -123,3 +125,23 @@ def is_name(text: str) -> bool:
 def is_free(text: str) -> bool:
     """Whether a test may be called so, and YAML takes it for a text."""
     return is_name(text) and text not in KEYWORDS and resolve(text) == text
+
+
+def near_path(
+    text: str, folder: Path, root: Path, fits: Callable[[Path], bool] = Path.exists
+) -> tuple[str, Fix | None]:
+    """A hint about a path from a folder that leads nowhere: where DoDo looked, and a path like it that ``fits``.
+
+    That is within ``root``: of a like name beside it, the test of its name, or the same from a folder above.
+    """
+    target = (folder / text).resolve()
+    beside = [path.name for path in target.parent.iterdir()] if target.parent.is_dir() else []
+    found = [target.parent / name for name in closest(target.name, beside)]
+    for name in (target.name, f"{target.name}{SUFFIX}"):
+        found += sorted(folder.parent.glob(f"*/{glob.escape(name)}"))
+    hint = f"DoDo looked in {shown_path(str(target.parent))}"
+    for path in (each.resolve() for each in (*found, folder / ".." / text, folder / "../.." / text)):
+        if fits(path) and path.is_relative_to(root.resolve()):
+            near = Path(os.path.relpath(path, folder)).as_posix()
+            return f"{hint}; did you mean '{near}'?", Fix(text, near)
+    return hint, None

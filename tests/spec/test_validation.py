@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.source import Node, parse, plain
-from dodo_dsl.spec.slips import joined, mended
+from dodo_dsl.spec.slips import mended
 from dodo_dsl.spec.validation import schema_of_keys, valid_part, validate
 from tests.source.nodes import mapping
 
@@ -110,21 +110,6 @@ def test_what_is_not_valid_is_left_out_and_the_rest_stays() -> None:
     expected = plain(mapping(BLOCK.replace("timeout: 60 s\n", "").replace("  pose: {uses: integrator}\n", "")))
     assert node is not None
     assert plain(node) == {**expected, "record": {"limit": "2 MB"}}
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("{z: 9,5 cm}", {"z": "9,5 cm"}),
-        ("{z: -9,5, x: 1,25 m/s}", {"z": "-9,5", "x": "1,25 m/s"}),
-        ("{a: {z: 9,5 %}}", {"a": {"z": "9,5 %"}}),
-        ("{z: 9, 5 cm}", {"z": 9, "5 cm": None}),
-        ("{z: a,5 cm}", {"z": "a", "5 cm": None}),
-        ("z: 9\n5 cm:\n", {"z": 9, "5 cm": None}),
-    ],
-)
-def test_decimal_commas_in_braces(text: str, expected: object) -> None:
-    assert plain(joined(mapping(text))) == expected
 
 
 VALUES = (
