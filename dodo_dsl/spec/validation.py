@@ -265,7 +265,8 @@ def _fits(schema: dict[str, Any], value: object) -> bool:
 
 def _in_line(value: object) -> str:
     """YAML in one line."""
-    return str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf)).strip()
+    text = str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf))
+    return text.strip().removesuffix("\n...")
 
 
 def _additional(v: Violation) -> Iterator[Diagnostic]:
@@ -282,29 +283,24 @@ def _additional(v: Violation) -> Iterator[Diagnostic]:
 def _required(v: Violation) -> Iterator[Diagnostic]:
     missing, known = v.wanted, v.known
     unknown = {name: value for name, value in v.instance.items() if name not in known}
-    if missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
-        almost = next((name for name in unknown if only_fix(name, [missing])), "")
-        if not v.is_closed and almost:  # else it is reported as an unknown key
-            hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
-            yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
-        if v.is_closed or almost:
-            return
+    if v.is_closed and missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
+        return  # it is reported as an unknown key
+    if not v.is_closed and (almost := next((name for name in unknown if only_fix(name, [missing])), "")):
+        hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
+        yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
+        return
     hint = _to_write(missing, known.get(missing, {}))
     if near := closest(v.key, v.inherited):
         hint = f"did you mean '{near[0]}' of {shown_path(v.inherited[near[0]].key.file)}?"
     yield Diagnostic(v.span, "missing-key", f"{v.name} has no key '{missing}'", hint)
 
 
-def _to_write(key: str, schema: Any) -> str:
+def _to_write(key: str, schema: dict[str, Any]) -> str:
     """A hint for a key that is missing: ``write 'kind: closed-loop'``."""
-    examples = schema.get("examples", schema.get("enum", ())) if isinstance(schema, dict) else ()
-    examples = [schema["const"]] if isinstance(schema, dict) and "const" in schema else examples
-    if not examples:
-        return ""
-    others = [_in_line(other).removesuffix("\n...") for other in schema.get("enum", ()) if other != examples[0]]
-    return f"write '{key}: {_in_line(examples[0]).removesuffix(chr(10) + '...')}'" + (
-        f", or {', '.join(others)}" if others else ""
-    )
+    first = (schema.get("examples") or schema.get("enum") or [schema.get("const")])[0]
+    others = [_in_line(other) for other in schema.get("enum", ()) if other != first]
+    more = f", or {', '.join(others)}" if others else ""
+    return f"write '{key}: {_in_line(first)}'{more}" if first is not None else ""
 
 
 def _companion(v: Violation) -> Iterator[Diagnostic]:
@@ -324,23 +320,17 @@ def _type(v: Violation) -> Iterator[Diagnostic]:
     found = _shown(v.text) if v.text else "empty"
     if isinstance(value, dict | list):
         found = _TYPE_NAMES["object" if isinstance(value, dict) else "array"]
-    if schema.get(EXPECT) == _TYPE_NAMES["boolean"]:
-        names = names[:1]
-    hint, fix = schema.get("x-hint") or _in_quotes(v), None
+    span, hint, fix = v.span, schema.get("x-hint") or _in_quotes(v), None
     items = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
-    if hint or wanted is None:
-        pass
-    elif wanted == "array" and v.key and (items or "examples" in schema):
-        is_meant = items and not any(" " in item for item in items) and _fits(schema, items)
-        shown = items if is_meant else schema.get("examples", [None])[0]
-        hint = f"write {'' if is_meant else 'for example '}{v.key}: {_in_line(shown)}" if shown else ""
-    elif wanted == "boolean" and isinstance(value, str):
-        hint, fix = boolean_meant(value)
-    elif wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
-        hint = f"write {value}, without quotation marks" if _fits(schema, int(value)) else ""
-    span = v.span
     if isinstance(v.node, Sequence) and wanted == "object":
         span, hint = v.node.span, hint or "write 'key: value' in place of list items"
+    elif not hint and wanted == "array" and v.key:
+        shown = items if items and _fits(schema, items) else schema.get("examples", [None])[0]
+        hint = f"write {v.key}: {_in_line(shown)}" if shown else ""
+    elif not hint and wanted == "boolean" and isinstance(value, str):
+        hint, fix = boolean_meant(value)
+    elif not hint and wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
+        hint = f"write {value}, without quotation marks"
     yield Diagnostic(span, "wrong-type", f"{v.name} is {found}, expected {' or '.join(names)}", hint, fix=fix)
 
 
@@ -378,12 +368,9 @@ def _choices(v: Violation) -> Iterator[Diagnostic]:
 
 
 def _const(v: Violation) -> Iterator[Diagnostic]:
-    message = f"{v.name} is {_shown(v.instance)}, expected {v.wanted}"
-    hint = f"write '{v.key}: {v.wanted}'"
-    if v.key == "dodo" and type(v.instance) is int and v.instance > v.wanted:
-        message = f"the file is of language version {v.instance}, the installed DoDo {__version__} reads "
-        message += f"{v.wanted}"
-        hint = f"install a DoDo that reads version {v.instance}, or, if the number is a mistake, {hint}"
+    message, hint = f"{v.name} is {_shown(v.instance)}, expected {v.wanted}", f"write '{v.key}: {v.wanted}'"
+    if v.key == "dodo":
+        message += f", which the installed DoDo {__version__} reads"
     yield Diagnostic(v.span, "wrong-value", message, hint)
 
 
@@ -398,24 +385,20 @@ def _pattern(v: Violation) -> Iterator[Diagnostic]:
 
 
 def _bounds(v: Violation) -> Iterator[Diagnostic]:
-    schema = v.schema
-    low, high = schema.get(RANGE) or (schema.get("minimum"), schema.get("maximum"))
-    shown = v.text if len(v.text) <= 60 else f"{v.text[:57]}..."
-    yield Diagnostic(v.span, "out-of-range", f"{v.name} is {shown}, expected {low} to {high}")
+    low, high = v.schema.get(RANGE) or (v.schema.get("minimum"), v.schema.get("maximum"))
+    yield Diagnostic(v.span, "out-of-range", f"{v.name} is {_shown(v.text)}, expected {low} to {high}")
 
 
-def _too_many(v: Violation) -> Iterator[Diagnostic]:
-    if EXPECT in v.schema:
+def _count(v: Violation) -> Iterator[Diagnostic]:
+    if v.keyword.startswith("min"):
+        expected = "a string" if v.keyword == "minLength" else "at least one entry"
+        yield Diagnostic(v.span, "missing-key", f"{v.name} is empty, expected {expected}")
+    elif EXPECT in v.schema:
         yield from _pattern(v)
-        return
-    what = "characters" if v.keyword == "maxLength" else "entries"
-    message = f"{v.name} has {len(v.instance)} {what}, expected at most {v.wanted}"
-    yield Diagnostic(v.span, "too-large", message)
-
-
-def _too_few(v: Violation) -> Iterator[Diagnostic]:
-    expected = "a string" if v.keyword == "minLength" else "at least one entry"
-    yield Diagnostic(v.span, "missing-key", f"{v.name} is empty, expected {expected}")
+    else:
+        what = "characters" if v.keyword == "maxLength" else "entries"
+        message = f"{v.name} has {len(v.instance)} {what}, expected at most {v.wanted}"
+        yield Diagnostic(v.span, "too-large", message)
 
 
 def _other(v: Violation) -> Iterator[Diagnostic]:
@@ -434,12 +417,6 @@ _TRANSLATORS: dict[str, Callable[[Violation], Iterator[Diagnostic]]] = {
     "enum": _choices,
     "const": _const,
     "pattern": _pattern,
-    "maxLength": _too_many,
-    "minimum": _bounds,
-    "maximum": _bounds,
-    "maxProperties": _too_many,
-    "maxItems": _too_many,
-    "minProperties": _too_few,
-    "minItems": _too_few,
-    "minLength": _too_few,
+    **dict.fromkeys(("minimum", "maximum"), _bounds),
+    **dict.fromkeys(("maxLength", "maxProperties", "maxItems", "minProperties", "minItems", "minLength"), _count),
 }
