@@ -35,7 +35,6 @@ RULES: tuple[Rule, ...] = (
     wiring_rules.check_hidden_messages,
     wiring_rules.check_variables,
     wiring_rules.check_memories,
-    wiring_rules.check_pictures,
 )
 
 

@@ -103,24 +103,6 @@ def without_pictures(service: ResolvedService) -> Path | None:
     return None if path is None or holds(path, image, _NO_STAMP) else path
 
 
-def picture_size(service: ResolvedService) -> tuple[int, int]:
-    """Width and height of the frames that a service makes: as written, or of its recording; 0 if unknown."""
-    path = _recording(service)
-    if path is not None:
-        sender = service.texts.get("video-sender", "")
-        return _recorded_size(path, int(sender)) if sender.isdecimal() else (0, 0)
-    width, height = (service.texts.get(key, "") for key in ("width", "height"))
-    return (int(width), int(height)) if width.isdecimal() and height.isdecimal() else (0, 0)
-
-
-@functools.lru_cache(maxsize=256)
-def _recorded_size(path: Path, sender: int) -> tuple[int, int]:
-    try:
-        return recording_contents.picture_size(path, known_ids(())[IMAGE], sender)
-    except OSError:
-        return 0, 0  # reported with the file
-
-
 def _recording(service: ResolvedService) -> Path | None:
     found = [a.value.path for a in service.arguments.values() if a.parameter.format == FORMAT and a.value]
     return found[0] if len(found) == 1 else None

@@ -1,21 +1,18 @@
 """Rules on what services and application give one another: messages, shared memories, and the test's variables."""
 
-from collections.abc import Collection, Iterator, Mapping
-from pathlib import Path
+from collections.abc import Collection, Iterator
 
 from dodo_dsl.application import opendlv_flags, secret_problems
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
-from dodo_dsl.application.pictures import FORMATS, AskedPictures, pictures_of
 from dodo_dsl.application.variables import owner, split_by, with_variables
-from dodo_dsl.check.resolve import IMAGE, RuleContext, picture_size, without_pictures
+from dodo_dsl.check.resolve import IMAGE, RuleContext, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
 
 SENSORS = "opendlv.proxy."
@@ -138,61 +135,25 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
     asked = {service.name: _asked(service) for service in services}
     players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
     shown = {end.port.name for end in ends if end.service not in players}
-    yield from _blank(asked, {end.port.name: players[end.service] for end in ends if end.port.name not in shown})
+    blank = {end.port.name: players[end.service] for end in ends if end.port.name not in shown}
     for asking, names in asked.items():
         others = {name for other, own in asked.items() if other != asking for name in own}
-        if made.isdisjoint(names) and others.isdisjoint(names):
-            for name, span in names.items():
-                yield _missing(asking, name, span, made)
-
-
-def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
-    """Memories in which no frame will ever be: their services play recordings without."""
-    for service, names in asked.items():
-        for name in sorted(names.keys() & recordings.keys()):
-            file = recordings[name].name
-            message = f"the application's '{service}' reads frames from '{name}', and '{file}' has none"
-            hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
-            yield Diagnostic(names[name], "application-memory", message, hint, "warning")
-
-
-def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
-    """Frames of another size than the application's commands ask for."""
-    if context.application is None or not context.test.is_complete:
-        return
-    for asked in pictures_of(with_variables(context.application, context.test.variables)):
-        for service in context.services:
-            names = {service.texts.get(f"name.{format_}", "").removeprefix("/") for format_ in FORMATS} - {""}
-            if not names.isdisjoint(asked.formats):
-                yield from _sizes(service, asked)
-
-
-def _sizes(service: ResolvedService, asked: AskedPictures) -> Iterator[Diagnostic]:
-    made, use = picture_size(service), service.use
-    wanted = asked.width or made[0], asked.height or made[1]
-    if not all(made) or wanted == made:
-        return
-    size, other = (f"{width} x {height}" for width, height in (wanted, made))
-    written = [use.parameters[key].value.span for key in ("width", "height", "rec") if key in use.parameters]
-    who = f"the application's '{asked.service}'"
-    message = f"{who} asks for frames of {size} pixels, and '{use.name}' makes them of {other}"
-    hint = f"write --width={made[0]} --height={made[1]} in the command of '{asked.service}'"
-    if "width" in service.arguments:
-        hint += f", or 'width: {wanted[0]}' and 'height: {wanted[1]}' under 'with' of '{use.name}'"
-    yield Diagnostic(written[0] if written else use.span, "application-pictures", message, hint, "warning")
+        is_strange = made.isdisjoint(names) and others.isdisjoint(names)
+        for name, span in names.items():
+            near = closest(name, made)
+            message = f"the application's '{asking}' asks for the memory '{name}', which no service of the test makes"
+            hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
+            if name in blank:
+                message = f"the application's '{asking}' reads frames from '{name}', and '{blank[name].name}' has none"
+                hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
+            if is_strange or name in blank:
+                yield Diagnostic(span, "application-memory", message, hint, "warning")
 
 
 def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:
     """The services of an application that ask for one of these memories."""
     services = application.services.values()
     return [each.name for each in services if not set(names).isdisjoint(_asked(each))]
-
-
-def _missing(service: str, name: str, span: Span, made: set[str]) -> Diagnostic:
-    message = f"the application's '{service}' asks for the memory '{name}', which no service of the test makes"
-    near = closest(name, made)
-    hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
-    return Diagnostic(span, "application-memory", message, hint, "warning")
 
 
 def _asked(service: ComposeService) -> Asked:

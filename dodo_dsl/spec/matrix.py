@@ -24,18 +24,14 @@ def without(node: Mapping, key: str) -> Mapping:
 
 @dataclass(frozen=True)
 class Placeholders:
-    """Those of one ``key`` of specs.
+    """Those of one ``key`` of specs; ``advice`` is the hint if it has no names at all.
 
-    ``lacks`` is the message about a name that the key does not have, with ``{}`` for the name, and ``advice`` the hint
-    if it has no names at all; ``why_idle`` is what a name is for that nothing uses.
-    With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so
-    that problems are shown there and not at the placeholder.
+    With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so that problems are shown
+    there and not at the placeholder.
     """
 
     key: str
-    lacks: str
     advice: str
-    why_idle: str
     points_at_value: bool = False
 
     @functools.cached_property
@@ -70,7 +66,7 @@ class Placeholders:
         used = self.used(node)
         for name, entry in self._known(node).items():
             if name not in used and (self.key == MATRIX or entry.key.file == node.span.file):
-                message = f"nothing uses ${{{self.key}.{name}}}, {self.why_idle}"
+                message = f"nothing uses ${{{self.key}.{name}}}, so that its values change nothing"
                 yield Diagnostic(entry.key, rule, message, severity="warning")
 
     def unknown(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
@@ -86,7 +82,7 @@ class Placeholders:
                     yield Diagnostic(scalar.span, rule, message, f'write "{right}"' if name in known else "")
                 elif name not in known:
                     hint = did_you_mean(name, known) if known else self.advice
-                    yield Diagnostic(scalar.span, rule, self.lacks.format(name), hint)
+                    yield Diagnostic(scalar.span, rule, f"'{self.key}' has no '{name}'", hint)
 
     def filled(self, node: Mapping, values: Values[str, Scalar]) -> Mapping:
         """The node with values for the placeholders; nodes without placeholders stay the same objects.
@@ -129,12 +125,7 @@ KEY = MATRIX
 MAX_INSTANCES = 2_000
 MAX_SLUG = 180
 
-PLACEHOLDERS = Placeholders(
-    KEY,
-    "the matrix has no dimension '{}'",
-    "add it with its values under 'matrix'",
-    "so its instances are all the same",
-)
+PLACEHOLDERS = Placeholders(KEY, "add it with its values under 'matrix'")
 _NOT_SLUG = re.compile(r"[^a-z0-9]+")
 SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 """The slug of any test or instance."""
@@ -206,18 +197,9 @@ def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
             yield Diagnostic(value.span, "matrix-value", message)
         elif slug in seen:
             message = f"'{value.text}' and '{seen[slug].text}' of '{name}' would both be called '{slug}'"
-            yield Diagnostic(value.span, "matrix-value", message, _otherwise(value.text))
+            hint = "names have letters and digits only: write one of them otherwise"
+            yield Diagnostic(value.span, "matrix-value", message, hint)
         seen.setdefault(slug, value)
-
-
-def _otherwise(text: str) -> str:
-    """A hint how to write a value so that its name is another one: signs are not part of names, digits are."""
-    whole = re.match(r"[+-]?\d+(?![\d.])", text)
-    if not whole:
-        return "names have letters and digits only: write one of them otherwise"
-    return (
-        f"names have letters and digits only: write one of them otherwise, such as '{whole[0]}.0{text[whole.end() :]}'"
-    )
 
 
 def substitute(node: Mapping, choice: Choice) -> Mapping:

@@ -136,15 +136,6 @@ CHANGES = [
     (cmd("--name.in=video0.argb --name.out=seen"), ""),
     (cmd("--name=${MEMORY}"), ""),
     (cmd("--name=seen", "--name=seen"), ""),
-    (
-        cam("width: 1280, height: 720") + cmd("--name=video0.argb --width=1280 --height=720"),
-        "base.dodo.yml:9:3 application-pictures",
-    ),
-    (
-        cam("width: 1280, height: 720") + cmd("--name video0.argb --width 640 --height 480"),
-        "12:85 application-pictures",
-    ),
-    (cam("width: 1280, height: 720") + cmd("--name=/video0.argb --width=${W:-640}"), "12:85 application-pictures"),
 ]
 
 
