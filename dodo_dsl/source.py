@@ -30,7 +30,6 @@ _DASHES = re.compile(r"-[^-\s]\S*(\s+- ?[^-\s]\S*)+")
 _NAME = re.compile(r"(matrix|vary)\.[a-z][a-z0-9-]*")
 """What a placeholder names."""
 _SECOND = "remove the line, or write what stands below into its own file"
-_CONTROL = {0: "NUL", 8: "backspace", 0xB: "vertical tab", 0xC: "form feed", 0x1B: "escape", 0x7F: "delete"}
 _SPECIAL: dict[str, Plain] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -289,8 +288,7 @@ def _unreadable(file: str, text: str, error: Exception, problem: str) -> Diagnos
     span = Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
     if not isinstance(error, yaml.reader.ReaderError):
         return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}")
-    message = f"a control character is not allowed here: {_CONTROL.get(code, 'unnamed')} (U+{code:04X})"
-    return Diagnostic(span, "yaml-syntax", message, "remove it")
+    return Diagnostic(span, "yaml-syntax", f"the control character U+{code:04X} is not allowed here", "remove it")
 
 
 def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
@@ -302,11 +300,9 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
         return _unreadable(file, text, error, problem)
     begin, context = getattr(error, "context_mark", None), getattr(error, "context", None) or ""
     began = (begin.line, begin.column) if begin else None
-    failure = Failure(text, problem, (mark.line, mark.column), context, began, _LOADER)
+    failure = Failure(file, text, problem, (mark.line, mark.column), context, began, _LOADER)
     if found := slip(failure):
-        rule = "yaml-tab" if found.is_tab else "yaml-syntax"
-        place = Span(file, found.line + 1, found.column + 1, found.length)
-        return Diagnostic(place, rule, found.message, found.hint, fix=found.fix)
+        return found
     if begin and mark.line >= len(failure.lines):  # what is never closed is shown where it is opened
         mark = begin
     if "simple key" in context and begin:

@@ -72,14 +72,6 @@ def check(
 
 def forget_files() -> None:
     """What is kept of the files that tests name, which may have changed."""
-    read = (
-        file_rules.entries,
-        file_rules.problems,
-        file_rules.course_of,
-        file_rules.fault_of_start,
-        file_rules.files,
-        file_rules.table_span,
-        file_rules.pictures,
-    )
-    for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
-        cache.cache_clear()
+    for kept in (*vars(file_rules).values(), *vars(resolve).values()):
+        if hasattr(kept, "cache_clear"):
+            kept.cache_clear()

@@ -35,19 +35,16 @@ _REQUEST = "Request"
 """How messages are called that ask an actuator for something, as applications do."""
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """The wiring with what recordings can send alone, and the messages that each service leaves out for that."""
+def replayed(
+    wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]
+) -> tuple[Wiring, Mapping[str, tuple[str, ...]]]:
+    """The wiring with what recordings can send alone, and the messages that each service leaves out for that.
 
-    wiring: Wiring
-    left_out: Mapping[str, tuple[str, ...]]
-
-
-def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]) -> Replayed:
-    """What services of one test that play recordings send; ``own`` are the files with the deployment's messages."""
+    ``own`` are the files with the deployment's messages.
+    """
     players = [each for each in services if ANYTHING in each.messages.outputs and _recording(each)]
     if not players:
-        return Replayed(wiring, {})
+        return wiring, {}
     ids = frozenset(known_ids(own).items())
     applications = {str(port): port for port in _of_application(wiring)}
     unsent, left_out = set(), {}
@@ -58,7 +55,7 @@ def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Pat
         if WITHOUT in player.arguments:
             held = (name for name, port in applications.items() if may_send(player, port, ids))
             left_out[player.use.name] = tuple(sorted(held))
-    return Replayed(replace(wiring, unsent=frozenset(unsent)), left_out)
+    return replace(wiring, unsent=frozenset(unsent)), left_out
 
 
 def _of_application(wiring: Wiring) -> Iterator[Port]:
@@ -199,8 +196,7 @@ def resolve(
         if spec.timeout_s and any(service.ends_input for service in services):
             ending = operator.attrgetter("parameter.within_timeout")
             services = tuple(_with_default(each, f"{spec.timeout_s:g}", ending) for each in services)
-        played = replayed(wiring, services, deployment.messages)
-        found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
+        found.append(ResolvedTest(spec, rig, services, *replayed(wiring, services, deployment.messages)))
     return found
 
 

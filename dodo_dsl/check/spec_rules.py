@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from dodo_dsl.application.model import ApplicationSource
@@ -66,11 +65,10 @@ def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
         message = "with clock virtual computing takes no test time, so that no answer is slow"
         hint = "limit answers with clock lockstep, or processor time with 'resources'"
         yield Diagnostic(spec.span("response"), "clock-virtual", message, hint)
-    for printed in context.wiring.printed:
-        message = f"'{printed.service}' prints its messages, and lines have no time of the test"
+    if printed := context.wiring.printed:
+        message = f"'{printed[0].service}' prints its messages, and lines have no time of the test"
         hint = "send them on the bus, or use clock lockstep"
         yield Diagnostic(spec.span("clock"), "clock-virtual", message, hint)
-        return
 
 
 def _rates(context: RuleContext) -> Iterator[Diagnostic]:
@@ -190,7 +188,7 @@ def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[D
 
 
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
-    yield from resolved_goals(context.test).problems
+    yield from resolved_goals(context.test)[1]
 
 
 _OF_THE_TEST = {
@@ -204,19 +202,11 @@ _OF_THE_TEST = {
 """Checks of no evaluator."""
 
 
-@dataclass(frozen=True)
-class ResolvedGoals:
-    """The goals that can be understood, and the problems of the others."""
-
-    goals: tuple[Goal, ...]
-    problems: tuple[Diagnostic, ...]
-
-
-def resolved_goals(test: ResolvedTest) -> ResolvedGoals:
-    """The goals of a test, in the order in which they are written."""
+def resolved_goals(test: ResolvedTest) -> tuple[tuple[Goal, ...], tuple[Diagnostic, ...]]:
+    """The goals of a test that can be understood, as they are ordered there, and what is wrong with the others."""
     found = [_goal(test, name, entry) for name, entry in test.spec.goals.items()]
     goals = tuple(goal for goal in found if isinstance(goal, Goal))
-    return ResolvedGoals(goals, tuple(problem for problem in found if isinstance(problem, Diagnostic)))
+    return goals, tuple(problem for problem in found if isinstance(problem, Diagnostic))
 
 
 def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | None:

@@ -212,7 +212,7 @@ class _Builder:
             truth=truth(self.test),
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
-            goals=resolved_goals(self.test).goals,
+            goals=resolved_goals(self.test)[0],
             import_paths=self.shared.imports,
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),

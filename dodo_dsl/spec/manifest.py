@@ -26,13 +26,7 @@ FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames")
 """A placeholder for the frames at which a map has models, as in ``{map-path.frames}``."""
 _OF_TYPES = {
     "of": ("list",),
-    "per": ("list",),
-    "driving": ("list",),
     "choices": ("string", "list"),
-    "or-share": ("amount",),
-    "multiple-of": ("integer",),
-    "not-empty": ("path",),
-    "format": ("path",),
     "unit": ("number",),
     **dict.fromkeys(("minimum", "maximum"), ("number", "integer", "amount")),
 }

@@ -107,11 +107,7 @@ class _Range:
     def validate(self, instance: object) -> None:
         with contextlib.suppress(quantity.QuantityError):  # of which the unit is wrong
             if not self._low <= quantity.convert(instance, self._unit) <= self._high:
-                raise _OutOfRange
-
-
-class _OutOfRange(Exception):
-    """A quantity is beyond its bounds."""
+                raise ValueError(instance)
 
 
 class _Whole:
