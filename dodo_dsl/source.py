@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
@@ -201,10 +201,7 @@ class _Builder:
         span = self.span(event)
         if event.anchor not in self.anchors:
             message = f"alias '*{event.anchor}' refers to an anchor that is missing or incomplete"
-            near = [f"*{name}" for name in closest(event.anchor, self.anchors)]
-            hint = f"did you mean '{near[0]}'?" if near else "a text that begins with '*' needs quotes"
-            fix = Fix(f"*{event.anchor}", near[0]) if len(near) == 1 else None
-            raise _Stop(span, "yaml-syntax", message, hint, fix)
+            raise _Stop(span, "yaml-syntax", message, "a text that begins with '*' needs quotes")
         node, weight, depth = self.anchors[event.anchor]
         self._check_depth(span, len(self.stack) + depth)
         self._add(node, weight, None, span, depth)

@@ -4,6 +4,7 @@ docs/reference/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are g
 """
 
 import functools
+import itertools
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -64,10 +65,16 @@ def pages() -> dict[str, Page]:
     if node is None or problems:
         raise ValueError(f"{FILE.name}: {problems}")
     return {
-        name: Page(name, group, **{key: text.strip("\n") for key, text in page.items()})
+        name: _page(name, group, **{key: text.strip("\n") for key, text in page.items()})
         for group, members in plain(node).items()
         for name, page in members.items()
     }
+
+
+def _page(name: str, group: str, summary: str, why: str, bad: str = "", driver: str = "", **more: str) -> Page:
+    """``driver`` are keys of the application's service."""
+    compose = f"# docker-compose.yml\nservices:\n  driver: {{image: driver, {driver}}}" if driver else ""
+    return Page(name, group, summary, why, "\n".join(filter(None, (bad, compose))), **more)
 
 
 def text(page: Page) -> str:
@@ -80,30 +87,17 @@ def text(page: Page) -> str:
 
 def markdown() -> str:
     """The text of docs/reference/rules.md."""
-    return "\n".join((_INTRODUCTION, *_contents(), *_sections()))
-
-
-def _groups() -> dict[str, list[Page]]:
-    groups: dict[str, list[Page]] = {}
-    for page in pages().values():
-        groups.setdefault(page.group, []).append(page)
-    return groups
-
-
-def _contents() -> Iterator[str]:
-    yield "| | rules |\n|---|---|"
-    for group, members in _groups().items():
-        yield f"| {group} | {', '.join(f'[{page.name}](#{page.name})' for page in members)} |"
+    return "\n".join((_INTRODUCTION, *_sections()))
 
 
 def _sections() -> Iterator[str]:
-    for group, members in _groups().items():
+    for group, members in itertools.groupby(pages().values(), lambda page: page.group):
         yield f"\n## {group}"
         for page in members:
             yield f"\n### {page.name}\n\n{page.summary}\n{page.why}\n"
-            yield f"```yaml\n{page.bad}\n```" + (
-                f"\n\nInstead:\n\n```yaml\n{page.instead}\n```" if page.instead else ""
-            )
+            yield f"```yaml\n{page.bad}\n```"
+            if page.instead:
+                yield f"\nInstead:\n\n```yaml\n{page.instead}\n```"
     yield ""
 
 

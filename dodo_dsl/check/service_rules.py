@@ -56,7 +56,9 @@ def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         yield from _written(service)
-        yield from _from_elsewhere(service)
+        for name, argument in service.arguments.items():
+            if argument.problem and name not in service.use.parameters:  # of the rig or of another service
+                yield argument.problem
         yield from _missing(context, service)
         yield from _counts(service)
 
@@ -110,19 +112,13 @@ def _misspelt(service: ResolvedService) -> set[str]:
     return {meant(name, known, is_empty=_is_empty(entry)) for name, entry in unknown}
 
 
-def _from_elsewhere(service: ResolvedService) -> Iterator[Diagnostic]:
-    """Values of the rig or of another service that do not fit here."""
-    for name, argument in service.arguments.items():
-        if argument.problem and name not in service.use.parameters:
-            yield argument.problem
-
-
 def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnostic]:
     use, manifest, misspelt = service.use, service.manifest, _misspelt(service)
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters or parameter.name in misspelt:
             continue
-        if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else _wants_rig(context)):
+        is_on_rig = bool(context.spec.rig) or context.spec.level == "hil"
+        if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else is_on_rig):
             continue  # a rig that is unknown or missing may give it, too
         if parameter.shared and not context.spec.is_whole:
             continue  # a service that could not be read may give it
@@ -153,10 +149,6 @@ def _lacks_first(context: RuleContext, service: ResolvedService, name: str) -> b
     return next(needing, service) is not service
 
 
-def _wants_rig(context: RuleContext) -> bool:
-    return bool(context.spec.rig) or context.spec.level == "hil"
-
-
 def _givers(context: RuleContext, name: str) -> dict[str, str]:
     """The values that services of the test give to a parameter, each with the first service's name."""
     givers: dict[str, str] = {}
@@ -171,15 +163,15 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
         for name, entry in service.use.parameters.items():
             argument = service.arguments.get(name)
             if argument and argument.parameter.type == "message" and argument.value:
-                yield from _known(context, argument.value.text, entry.value.span)
+                yield from unknown_message(argument.value.text, context.messages, entry.value.span)
             if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.messages.inputs):
                 for item in entry.value.items[:MAX_PROBLEMS]:
                     if isinstance(item, Scalar):
-                        yield from _known(context, item.text.partition("/")[0], item.span)
+                        yield from unknown_message(item.text.partition("/")[0], context.messages, item.span)
     declared = context.application.declared.values() if context.application else ()
     for own in declared:
         for name, span in (*own.inputs, *own.outputs, *own.answers) if own else ():
-            yield from _known(context, name.partition("/")[0], span)
+            yield from unknown_message(name.partition("/")[0], context.messages, span)
         yield from _lines(context, own.lines if own else ())
 
 
@@ -226,10 +218,6 @@ def _lines(context: RuleContext, lines: Collection[PrintedLine]) -> Iterator[Dia
 
         for line in lines:
             yield from line_problems(line, resolve.known_messages(context.deployment.messages))
-
-
-def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:
-    yield from unknown_message(name, context.messages, span)
 
 
 def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[Diagnostic]:

@@ -81,12 +81,8 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
 def _hides_services(node: Mapping, places: Collection[ValuePath]) -> bool:
     """Whether services may be in what is not valid: in a layer, or in an unknown key, most likely a misspelt layer."""
     known = schema_of_keys("dodo")["properties"]
-    for first, *rest in places:
-        if first in LAYERS and (len(rest) < 2 or rest[1] in ("uses", "with")) and len(rest) <= 2:
-            return True
-        if first not in known and not rest and isinstance(node.get(str(first)), Mapping):
-            return True
-    return False
+    of_layers = any(place[0] in LAYERS and place[2:] in ((), ("uses",), ("with",)) for place in places)
+    return of_layers or any(p[0] not in known and isinstance(node.get(str(p[0])), Mapping) for p in places)
 
 
 def _by_name(location: Location, node: Node) -> Spec:

@@ -5,6 +5,7 @@ Placeholders of ``vary`` are of the same form.
 
 import functools
 import itertools
+import math
 import re
 from collections.abc import Iterator
 from collections.abc import Mapping as Values
@@ -54,8 +55,7 @@ class Placeholders:
 
     def used(self, node: Mapping) -> set[str]:
         """The names that a spec uses outside the key itself."""
-        others = (entry.value for key, entry in node.entries.items() if key != self.key)
-        return {name for value in others for name in self.names(value)}
+        return set[str]().union(*(self.names(entry.value) for key, entry in node.entries.items() if key != self.key))
 
     def _known(self, node: Mapping) -> dict[str, Entry]:
         written = node.get(self.key)
@@ -171,9 +171,7 @@ def choices(node: Node) -> tuple[list[Choice], list[Diagnostic]]:
         if isinstance(dimension.value, Sequence)
     }
     found = [problem for name, values in dimensions.items() for problem in _alike(name, values)]
-    number = 1
-    for values in dimensions.values():
-        number *= len(values)
+    number = math.prod(map(len, dimensions.values()))
     if number > MAX_INSTANCES:
         message = f"the matrix has {number} instances, expected at most {MAX_INSTANCES}"
         hint = "choose fewer values, or write several tests that extend this one"

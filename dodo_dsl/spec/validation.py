@@ -194,7 +194,7 @@ def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], 
     Values with the tag REPORTED are not judged. A service's parameters stay, as they are read by its manifest.
     """
     found, places, tagged = list[Diagnostic](), set[Path](), list[tuple[Path, Node]]()
-    document = _document(node, schema, (), tagged)
+    document = _document(node, (), tagged, schema == OF_COMPOSE)
     for path, one in tagged:
         if "with" not in path:
             places.add(path)
@@ -212,7 +212,7 @@ def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], 
     return _without(node, (), places), found, places
 
 
-def _document(node: Node, schema: str, path: Path, tagged: list[tuple[Path, Node]]) -> Any:
+def _document(node: Node, path: Path, tagged: list[tuple[Path, Node]], is_compose: bool) -> Any:
     """As ``plain``, but for numbers that JSON does not have: their texts, or for compose the largest one.
 
     What is ``tagged`` is added to the list.
@@ -220,11 +220,11 @@ def _document(node: Node, schema: str, path: Path, tagged: list[tuple[Path, Node
     if node.tag:
         tagged.append((path, node))
     if isinstance(node, Mapping):
-        return {key: _document(entry.value, schema, (*path, key), tagged) for key, entry in node.entries.items()}
+        return {key: _document(entry.value, (*path, key), tagged, is_compose) for key, entry in node.entries.items()}
     if isinstance(node, Sequence):
-        return [_document(item, schema, (*path, number), tagged) for number, item in enumerate(node.items)]
+        return [_document(item, (*path, number), tagged, is_compose) for number, item in enumerate(node.items)]
     if isinstance(node.value, float) and not math.isfinite(node.value):
-        return sys.float_info.max if schema == OF_COMPOSE else node.text
+        return sys.float_info.max if is_compose else node.text
     return node.value
 
 
