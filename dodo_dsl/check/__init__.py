@@ -21,7 +21,6 @@ RULES: tuple[Rule, ...] = (
     spec_rules.check_built_in_cid,
     service_rules.check_cameras,
     service_rules.check_services,
-    service_rules.check_layers,
     service_rules.check_parameters,
     service_rules.check_messages,
     service_rules.check_own_messages,

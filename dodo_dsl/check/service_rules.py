@@ -20,7 +20,11 @@ from dodo_dsl.spec.slips import meant, unknown_key
 def check_services(context: RuleContext) -> Iterator[Diagnostic]:
     first_layer: dict[str, str] = {}
     for use in context.spec.uses:
-        if use.uses.text not in context.manifests and not _is_broken(context, use.uses.text):
+        if manifest := context.manifests.get(use.uses.text):
+            if use.layer not in manifest.layers:
+                message = f"service '{manifest.name}' does not fit layer {use.layer}"
+                yield Diagnostic(use.uses.span, "wrong-layer", message, f"move it to {' or '.join(manifest.layers)}")
+        elif not _is_broken(context, use.uses.text):
             hint = did_you_mean(use.uses.text, context.manifests) or "'dodo list --services' shows those that there are"
             message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
             yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
@@ -42,15 +46,6 @@ def _is_broken(context: RuleContext, name: str) -> bool:
     files = (f"{name.replace('-', '_')}/{MANIFEST}", f"{name}/{MANIFEST}")
     folders = (each for above in context.deployment.services for each in (above, above.parent))
     return any((folder / file).is_file() for folder in folders for file in files)
-
-
-def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
-    for use in context.spec.uses:
-        manifest = context.manifests.get(use.uses.text)
-        if manifest and use.layer not in manifest.layers:
-            message = f"service '{manifest.name}' does not fit layer {use.layer}"
-            hint = f"move it to {' or '.join(manifest.layers)}"
-            yield Diagnostic(use.uses.span, "wrong-layer", message, hint)
 
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:

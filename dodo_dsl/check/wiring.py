@@ -237,7 +237,9 @@ def driving(wiring: Wiring) -> list[str]:
 
 
 def _expected(wiring: Wiring) -> list[End]:
-    return [end for end in _from_application(wiring) if _is_expected(end, wiring)]
+    """What the application has to produce: an optional message only when it declares that it does."""
+    sent = [other.port for other in wiring.application_produces]
+    return [e for e in _from_application(wiring) if not e.port.optional or any(map(e.port.consumes, sent))]
 
 
 def other_inputs(wiring: Wiring) -> list[str]:
@@ -262,11 +264,6 @@ def _from_application(wiring: Wiring) -> list[End]:
         and not wiring.is_truth(end.port)
         and not any(end.port.consumes(other.port) for other in wiring.produced if other.port.name != ANYTHING)
     ]
-
-
-def _is_expected(end: End, wiring: Wiring) -> bool:
-    """Whether the application has to produce it: an optional message only when it declares that it does."""
-    return not end.port.optional or any(end.port.consumes(other.port) for other in wiring.application_produces)
 
 
 def _names(ends: Iterable[End]) -> list[str]:

@@ -61,7 +61,7 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
     for choice in choices:
         if wrong >= _MOST_WRONG:
             break
-        template = matrix.substitute(node, choice)
+        template = matrix.PLACEHOLDERS.filled(node, dict(choice.values))
         ranges, problems = vary.read(template)
         found += problems
         if places is None or not are_alike:
@@ -183,13 +183,9 @@ def _merge(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int
 def _merged(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int) -> Mapping:
     """A service with another ``uses`` replaces the base's: the base's parameters do not apply to it."""
     before, after = base.get(_USES), child.get(_USES)
-    if depth == 1 and after is not None and _text(before) != _text(after):
+    if depth == 1 and after is not None and getattr(before, "text", None) != getattr(after, "text", None):
         return child
     return _merge(base, child, problems, depth + 1)
-
-
-def _text(node: Node | None) -> str | None:
-    return node.text if isinstance(node, Scalar) else None
 
 
 def _nothing(key: str, span: Span, base: Mapping) -> Diagnostic:

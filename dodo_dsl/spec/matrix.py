@@ -198,8 +198,3 @@ def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
             hint = "names have letters and digits only: write one of them otherwise"
             yield Diagnostic(value.span, "matrix-value", message, hint)
         seen.setdefault(slug, value)
-
-
-def substitute(node: Mapping, choice: Choice) -> Mapping:
-    """The node with the choice's values for the placeholders; nodes without placeholders stay the same objects."""
-    return PLACEHOLDERS.filled(node, dict(choice.values))

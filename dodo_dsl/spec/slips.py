@@ -1,8 +1,11 @@
 """What keys and values mean that are almost right: units, minus signs, decimal commas, missing spaces, indentation."""
 
+import math
 import re
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
+
+import yaml
 
 from dodo_dsl.diagnostics import Diagnostic, Fix, closest, did_you_mean, only_fix
 from dodo_dsl.source import Entry, Mapping, Node, Scalar
@@ -87,6 +90,20 @@ def _write(key: str, value: str) -> str:
     if closing not in value:  # the key ends at the first colon within the brackets
         value = f"{value[0]}...{closing}"
     return f"write '{key}: {value if len(value) <= 60 else f'{value[:57]}...'}'"
+
+
+def in_line(value: object) -> str:
+    """YAML in one line."""
+    text = str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf))
+    return text.strip().removesuffix("\n...")
+
+
+def to_write(key: str, schema: dict[str, Any]) -> str:
+    """A hint for a key that is missing: ``write 'kind: closed-loop'``."""
+    first = (schema.get("examples") or schema.get("enum") or [schema.get("const")])[0]
+    others = [in_line(other) for other in schema.get("enum", ()) if other != first]
+    more = f", or {', '.join(others)}" if others else ""
+    return f"write '{key}: {in_line(first)}'{more}" if first is not None else ""
 
 
 def mended(node: Node, schema: dict[str, Any]) -> tuple[Node, list[Diagnostic]]:

@@ -14,14 +14,12 @@ import sys
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
-import yaml
-
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, shown_path
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.matrix import REPORTED
-from dodo_dsl.spec.slips import boolean_meant, meant, repaired, schema_at, unknown_key
+from dodo_dsl.spec.slips import boolean_meant, in_line, meant, repaired, schema_at, to_write, unknown_key
 
 OF_COMPOSE = "application"
 UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
@@ -38,7 +36,6 @@ _TYPE_NAMES = {
     "boolean": "true or false",
     "null": "no value",
 }
-_MOST_READ = 200
 
 Path = tuple[str | int, ...]
 
@@ -259,12 +256,6 @@ def _fits(schema: dict[str, Any], value: object) -> bool:
     return bool(_validator(schema).is_valid(value))
 
 
-def _in_line(value: object) -> str:
-    """YAML in one line."""
-    text = str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf))
-    return text.strip().removesuffix("\n...")
-
-
 def _additional(v: Violation) -> Iterator[Diagnostic]:
     known = v.schema.get("properties", {})
     for *_, name in itertools.islice(v.places, MAX_PROBLEMS):
@@ -285,18 +276,10 @@ def _required(v: Violation) -> Iterator[Diagnostic]:
         hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
         yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
         return
-    hint = _to_write(missing, known.get(missing, {}))
+    hint = to_write(missing, known.get(missing, {}))
     if near := closest(v.key, v.inherited):
         hint = f"did you mean '{near[0]}' of {shown_path(v.inherited[near[0]].key.file)}?"
     yield Diagnostic(v.span, "missing-key", f"{v.name} has no key '{missing}'", hint)
-
-
-def _to_write(key: str, schema: dict[str, Any]) -> str:
-    """A hint for a key that is missing: ``write 'kind: closed-loop'``."""
-    first = (schema.get("examples") or schema.get("enum") or [schema.get("const")])[0]
-    others = [_in_line(other) for other in schema.get("enum", ()) if other != first]
-    more = f", or {', '.join(others)}" if others else ""
-    return f"write '{key}: {_in_line(first)}'{more}" if first is not None else ""
 
 
 def _companion(v: Violation) -> Iterator[Diagnostic]:
@@ -322,7 +305,7 @@ def _type(v: Violation) -> Iterator[Diagnostic]:
         span, hint = v.node.span, hint or "write 'key: value' in place of list items"
     elif not hint and wanted == "array" and v.key:
         shown = items if items and _fits(schema, items) else schema.get("examples", [None])[0]
-        hint = f"write {v.key}: {_in_line(shown)}" if shown else ""
+        hint = f"write {v.key}: {in_line(shown)}" if shown else ""
     elif not hint and wanted == "boolean" and isinstance(value, str):
         hint, fix = boolean_meant(value)
     elif not hint and wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
@@ -374,7 +357,7 @@ def _pattern(v: Violation) -> Iterator[Diagnostic]:
     value = str(v.instance)
     expected = v.schema.get(EXPECT, f"a string that matches {v.schema.get('pattern')}")
     span = v.span if v.of_key is None else v.entries[v.of_key].key
-    name = re.sub(r"[^a-z0-9]+", "-", value[:_MOST_READ].lower()).strip("-")[:40]
+    name = re.sub(r"[^a-z0-9]+", "-", value[:100].lower()).strip("-")[:40]
     is_text = name != value and resolve(name) == name != "" and _fits(v.schema, name)
     hint = f"for example '{name}'" if is_text else ""
     yield Diagnostic(span, "wrong-value", f"{_shown(value)} is not allowed here, expected {expected}", hint)
