@@ -43,9 +43,10 @@ def check_services(context: RuleContext) -> Iterator[Diagnostic]:
 
 def _is_broken(context: RuleContext, name: str) -> bool:
     """Whether there is the user's own service in a folder of this name, whose manifest is reported itself."""
-    files = (f"{name.replace('-', '_')}/{MANIFEST}", f"{name}/{MANIFEST}")
-    folders = (each for above in context.deployment.services for each in (above, above.parent))
-    return any((folder / file).is_file() for folder in folders for file in files)
+    read = {manifest.folder for manifest in context.manifests.values()}
+    patterns = (MANIFEST, f"*/{MANIFEST}")
+    found = (file.parent for above in context.deployment.services for each in patterns for file in above.glob(each))
+    return name.replace("_", "-") in {folder.name.replace("_", "-") for folder in found if folder not in read}
 
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
