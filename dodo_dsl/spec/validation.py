@@ -26,7 +26,6 @@ UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
 """The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
 _WHOLE = "x-whole"
 """Beside ``type: integer``, for JSON Schema takes 1.0 for a whole number."""
-_OF_TYPE = ("type", UNIT, _WHOLE)
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
     "array": "a list",
@@ -176,7 +175,7 @@ def _violations(document: object, root: Node, name: str) -> list[Violation]:
     """At most MAX_PROBLEMS; of several about one value the first about its type alone."""
     errors = itertools.islice(_validator_of(name).iter_errors(document), MAX_PROBLEMS)
     found = [Violation(error, root, name) for error in errors]
-    typed = {v.path: v for v in reversed(found) if v.keyword in _OF_TYPE and v.of_key is None}
+    typed = {v.path: v for v in reversed(found) if v.keyword in ("type", UNIT, _WHOLE) and v.of_key is None}
     return [v for v in found if v.of_key or typed.get(v.path, v) is v]
 
 
