@@ -14,7 +14,7 @@ from dodo_dsl.application.unseen import unseen_problems
 from dodo_dsl.check import check, file_rules
 from dodo_dsl.check.resolve import ResolvedTest, known_ids, resolve
 from dodo_dsl.check.service_rules import unknown_messages
-from dodo_dsl.check.suite_rules import check_suite
+from dodo_dsl.check.spec_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment

@@ -14,8 +14,7 @@ from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.file_rules import MAP, needed
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
-from dodo_dsl.check.spec_rules import resolved_goals
-from dodo_dsl.check.suite_rules import containers
+from dodo_dsl.check.spec_rules import containers, resolved_goals
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.plan import added_services, addresses, hidden_paths
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
@@ -213,7 +212,7 @@ class _Builder:
             truth=truth(self.test),
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
-            goals=resolved_goals(self.test).goals,
+            goals=resolved_goals(self.test)[0],
             import_paths=self.shared.imports,
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),

@@ -3,12 +3,14 @@
 A test is called as its file, which is a job of a pipeline, too.
 """
 
+import glob
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dodo_dsl.diagnostics import Fix, closest, shown_path
 from dodo_dsl.source import resolve
 
 SUFFIX = ".dodo.yml"
@@ -125,14 +127,21 @@ def is_free(text: str) -> bool:
     return is_name(text) and text not in KEYWORDS and resolve(text) == text
 
 
-def near(text: str) -> str:
-    """A name like a text."""
-    slug = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
-    return next(filter(is_free, (slug[:_LONGEST].strip("-"), f"sil-{slug}"[:_LONGEST].strip("-"))), "sil-test")
+def near_path(
+    text: str, folder: Path, root: Path, fits: Callable[[Path], bool] = Path.exists
+) -> tuple[str, Fix | None]:
+    """A hint about a path from a folder that leads nowhere: where DoDo looked, and a path like it that ``fits``.
 
-
-def as_file(stem: str, ending: str) -> str:
-    """A hint for a test in a file of this name: the name, where it may have it, or another for both."""
-    if is_free(stem):
-        return f"write 'name: {stem}', as the file is called"
-    return f"rename the file to {near(stem)}{ending}, and write 'name: {near(stem)}'"
+    That is within ``root``: of a like name beside it, the test of its name, or the same from a folder above.
+    """
+    target = (folder / text).resolve()
+    beside = [path.name for path in target.parent.iterdir()] if target.parent.is_dir() else []
+    found = [target.parent / name for name in closest(target.name, beside)]
+    for name in (target.name, f"{target.name}{SUFFIX}"):
+        found += sorted(folder.parent.glob(f"*/{glob.escape(name)}"))
+    hint = f"DoDo looked in {shown_path(str(target.parent))}"
+    for path in (each.resolve() for each in (*found, folder / ".." / text, folder / "../.." / text)):
+        if fits(path) and path.is_relative_to(root.resolve()):
+            near = Path(os.path.relpath(path, folder)).as_posix()
+            return f"{hint}; did you mean '{near}'?", Fix(text, near)
+    return hint, None

@@ -1,16 +1,13 @@
 """``dodo explain``: rules, and the wiring of tests as people and programs read it."""
 
-import json
 from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.check import catalogue
-from dodo_dsl.check.explanation import explain
 from dodo_dsl.cli.main import main
 from tests.check import examples
-from tests.check.contexts import resolved
 
 GOLDEN = Path(__file__).parent / "explained"
 HIL = """\
@@ -59,7 +56,6 @@ vary:
 environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, exposure: "${vary.exposure}"}}}
 action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {yaw: "${vary.yaw}"}}}
 """
-PLACE = "tests/example/example.dodo.yml:{}"
 CASES = {
     "plain": "",
     "hil": HIL,
@@ -99,33 +95,10 @@ def test_a_test(case: str, folder: Path, update_goldens: bool) -> None:
     assert text == expected.read_text()
 
 
-def test_json_has_the_same(folder: Path) -> None:
-    examples.write(MATRIX, folder)
-    code, out, _ = explained("example", "--json")
-    assert code == 2
-    rows = json.loads(out)
-    assert [row["slug"] for row in rows][:2] == ["example--yaw-80-deg--frame-id-0", "example--yaw-80-deg--frame-id-3"]
-    pose = rows[3]["services"][2]
-    (yaw,) = [argument for argument in pose["arguments"] if argument["name"] == "yaw"]
-    assert yaw == {"name": "yaw", "value": "100", "unit": "deg", "origin": "tests/example/example.dodo.yml:14"}
-    assert rows[0]["asked"][0]["port"] == "opendlv.proxy.GroundSteeringRequest"
-
-
-def test_json_has_the_ranges(folder: Path) -> None:
-    examples.write(VARY, folder)
-    (row,) = json.loads(explained("example", "--json")[1])
-    assert row["slug"] == "example"
-    assert row["vary"] == [
-        {"name": "yaw", "nominal": "90 deg", "values": "80 deg to 100 deg", "origin": PLACE.format(10)},
-        {"name": "exposure", "nominal": "1", "values": "0.5, 1", "origin": PLACE.format(11)},
-    ]
-
-
 def test_a_rule() -> None:
     code, out, err = explained("wrong-unit")
     assert (code, err) == (0, "")
     assert out == catalogue.text(catalogue.pages()["wrong-unit"])
-    assert json.loads(explained("wrong-unit", "--json")[1])["good"] == "timeout: 60 s"
 
 
 def test_all_rules_have_a_line() -> None:
@@ -141,20 +114,3 @@ def test_neither(folder: Path) -> None:
         "dodo explain: unknown test or rule 'wrong-units'; known: base, example; or the rule: did you"
     )
     assert "'wrong-unit'" in err
-
-
-def origins(example: str, folder: Path) -> dict[tuple[str, str], str]:
-    return {(s.name, a.name): a.origin for s in explain(resolved(example, folder)).services for a in s.arguments}
-
-
-def test_origins_of_values(folder: Path) -> None:
-    found = origins("", folder)
-    assert found["camera", "map-path"] == "tests/example/example.dodo.yml:8"
-    assert found["track", "map-path"] == "as camera, tests/example/example.dodo.yml:8"
-    assert found["camera", "freq"] == "default"
-
-
-def test_origins_of_values_on_a_rig(folder: Path) -> None:
-    found = origins(HIL.removeprefix("extends: ../base/base.dodo.yml\n"), folder)
-    assert found["camera", "source"] == "the emulated rig"
-    assert found["pose", "max-speed"] == "tests/example/example.dodo.yml:9"
