@@ -2,8 +2,10 @@
 
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
 from itertools import groupby
-from typing import TextIO
+from operator import itemgetter
+from typing import Any, TextIO
 
 from dodo_dsl.check import catalogue
 from dodo_dsl.check.resolve import ResolvedTest
@@ -17,29 +19,36 @@ from dodo_dsl.spec.arguments import Argument, default_value
 from dodo_dsl.spec.model import LEVEL_WORDS, Use
 from dodo_dsl.spec.quantity import SHARE
 from dodo_dsl.spec.rig import EMULATED_FILE
-from dodo_dsl.terminal import printable
+from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
   dodo explain                       all rules, one line each
   dodo explain wrong-unit            a rule: its reason, what breaks it and what complies
   dodo explain sil-closed-straight   a test: services, origins of values, producers and consumers
+  dodo explain 'sil-*' --json        several tests, as JSON
 """
 
 _MOST_ROWS = 100
 
+Explanation = dict[str, Any]
+"""What ``dodo explain --json`` has of a test, with its keys; ``told`` is what it gets of what only a simulation has."""
+
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("word", nargs="?", metavar="TEST|RULE", help="a rule, or the name or path of a test")
+    parser.add_argument("--json", action="store_true", help="output as JSON")
     selection.add_application(parser)
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     rules = catalogue.pages()
     if options.word is None:
-        stdout.write(_table([[page.name, page.summary] for page in rules.values()], ""))
+        table = _table([[page.name, page.summary] for page in rules.values()], "")
+        stdout.write(json_text(list(map(_page, rules.values()))) if options.json else table)
         return Exit.OK
     if options.word in rules:
-        stdout.write(catalogue.text(rules[options.word]))
+        page = rules[options.word]
+        stdout.write(json_text(_page(page)) if options.json else catalogue.text(page))
         return Exit.OK
     try:
         checked = selection.select([options.word], (), options.application)
@@ -47,59 +56,63 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         near = did_you_mean(options.word, rules) if "-" in options.word else ""
         said = str(error).replace("unknown test", "unknown test or rule", 1)
         raise UsageError(f"{said}; " + (f"or the rule: {near}" if near else "'dodo explain' lists the rules")) from None
-    files = groupby(checked.tests, lambda test: test.spec.path)
-    stdout.write("\n".join(_file(list(instances)) for _, instances in files))
+    found = [explain(test) for test in checked.tests]
+    files = groupby(found, itemgetter("file"))
+    stdout.write(json_text(found) if options.json else "\n".join(_file(list(instances)) for _, instances in files))
     stderr.write(selection.left_out(checked))
     write_diagnostics(stderr, checked.diagnostics)
     return Exit.OK if checked.ok else Exit.USAGE
 
 
-def _file(instances: Sequence[ResolvedTest]) -> str:
-    """The instances of a file together: the first one whole, and what differs in the others."""
-    first, wired = instances[0], dict[str, ResolvedTest]()
-    for test in instances:
-        wired.setdefault(_wiring(test.wiring), test)
-    own, *others = wired
-    parts = [_head(first), _services(first), own, _differences(instances)]
-    parts += [f"{printable(wired[other].spec.title)}\n\n{other}" for other in others]
-    return "\n".join(part for part in parts if part)
+def _page(page: catalogue.Page) -> dict[str, str]:
+    return {**asdict(page), "good": page.good}
 
 
-def _head(test: ResolvedTest) -> str:
-    spec = test.spec
-    rig = (f", rig {spec.rig}" if spec.rig else "") + (f" of any {spec.pool}" if spec.pool else "")
-    level = f"{LEVEL_WORDS[spec.level]}\n" if spec.level in LEVEL_WORDS else ""
-    title = f"{spec.title} ({spec.level or '?'}, {spec.kind or '?'}{rig})"
-    return f"{printable(title)}\n{printable(shown_path(str(spec.path)))}\n{level}"
+def explain(test: ResolvedTest) -> Explanation:
+    """One instance, as far as it can be read."""
+    spec, wiring = test.spec, test.wiring
+    services = [
+        {"layer": use.layer, "name": use.name, "uses": use.uses.text, "arguments": list(_arguments(test, use))}
+        for use in spec.uses
+    ]
+    variables = [
+        {"name": name, "value": test.variables.get(name, "?"), "unit": "", "origin": _place(entry.key)}
+        for name, entry in spec.variables.items()
+    ]
+    vary = [
+        {"name": one.name, "nominal": one.nominal.text, "values": one.text, "origin": _place(one.nominal.span)}
+        for one in spec.ranges
+    ]
+    return {
+        "name": spec.title,
+        "slug": spec.slug,
+        "file": shown_path(str(spec.path)),
+        "level": spec.level or "?",
+        "kind": spec.kind or "?",
+        "rig": spec.rig or "",
+        "pool": spec.pool,
+        "services": services,
+        "variables": variables,
+        "vary": vary,
+        "wiring": list(_lines(wiring)),
+        "asked": list(_asked(wiring)),
+        "told": list(dict.fromkeys(str(end.port) for end in told(wiring))),
+        "has_application": wiring.has_application,
+        "undeclared": list(wiring.undeclared),
+    }
 
 
-def _services(test: ResolvedTest) -> str:
-    lines = []
-    for use in test.spec.uses:
-        lines.append(printable(f"{use.layer}: {use.name} ({use.uses.text})") + "\n")
-        rows = [[a.parameter.name, _value(a), _origin(test, use, a)] for a in _arguments(test, use)]
-        lines.append(_table(rows, "  "))
-    if given := test.spec.variables:
-        rows = [[name, test.variables.get(name, "?"), _place(test, entry.key)] for name, entry in given.items()]
-        lines += ["application: its variables\n", _table(rows, "  ")]
-    if ranges := test.spec.ranges:
-        rows = [[r.name, r.nominal.text, r.text, _place(test, r.nominal.span)] for r in ranges]
-        lines += ["ranges: their nominal values, and what dodo search tries\n", _table(rows, "  ")]
-    return "".join(lines)
+def _arguments(test: ResolvedTest, use: Use) -> Iterator[dict[str, str]]:
+    for argument in next((s.arguments.values() for s in test.services if s.use is use), ()):
+        unit = "" if argument.parameter.unit == SHARE or argument.value is None else argument.parameter.unit
+        if argument.value or argument.problem:
+            value = argument.value.text if argument.value else "?"
+            origin = _origin(test, use, argument)
+            yield {"name": argument.parameter.name, "value": value, "unit": unit, "origin": origin}
 
 
-def _arguments(test: ResolvedTest, use: Use) -> list[Argument]:
-    given = (each.arguments.values() for each in test.services if each.use is use)
-    return [argument for arguments in given for argument in arguments if argument.value or argument.problem]
-
-
-def _value(argument: Argument) -> str:
-    unit = "" if argument.parameter.unit == SHARE else argument.parameter.unit
-    return f"{argument.value.text} {unit}".strip() if argument.value else "?"
-
-
-def _place(test: ResolvedTest, span: Span) -> str:
-    return f"line {span.line}" if span.file == str(test.spec.path) else f"{shown_path(span.file)}:{span.line}"
+def _place(span: Span) -> str:
+    return f"{shown_path(span.file)}:{span.line}"
 
 
 def _origin(test: ResolvedTest, use: Use, argument: Argument) -> str:
@@ -110,47 +123,31 @@ def _origin(test: ResolvedTest, use: Use, argument: Argument) -> str:
     if entry is None:
         is_default = argument.value == default_value(argument.parameter)
         return "default" if is_default else "what vehicle or application take"
-    if name not in use.parameters and entry.key.file == EMULATED_FILE:
+    if name in use.parameters:
+        return _place(entry.key)
+    if entry.key.file == EMULATED_FILE:
         return EMULATED_FILE
-    place = _place(test, entry.key)
-    givers = (u.name for u in test.spec.uses if argument.parameter.shared and name in u.parameters)
-    return place if name in use.parameters else f"as {next(givers, f'rig {test.spec.rig}')}, {place}"
+    giver = next((u.name for u in test.spec.uses if argument.parameter.shared and name in u.parameters), "")
+    return f"as {giver}, {_place(entry.key)}" if giver else f"rig {test.spec.rig}, {_place(entry.key)}"
 
 
-def _wiring(wiring: Wiring) -> str:
-    asked: dict[str, list[End]] = {}
-    for end in wiring.required():
-        if end.port.can_be_required:
-            asked.setdefault(_named(end.port), []).append(end)
-    parts = ["producers and consumers\n" + _table(list(_lines(wiring, asked)), "  ")]
-    for title, required in (("the application must provide", True), ("the application may provide", False)):
-        wanted = [(name, ends) for name, ends in asked.items() if required is any(not e.port.optional for e in ends)]
-        rows = [[n, f"to {', '.join(e.service for e in ends)}", _declared(ends[0].port, wiring)] for n, ends in wanted]
-        parts += [f"{title}\n" + _table(rows, "  ")] if rows else []
-    words = told_in_words(tuple(dict.fromkeys(str(end.port) for end in told(wiring))))
-    return "\n".join([*parts, f"{words}\n"] if words else parts)
-
-
-def _named(port: Port) -> str:
-    return f"memory {port}" if port.kind == "memory" else "any message of it" if port.name == ANYTHING else str(port)
-
-
-def _lines(wiring: Wiring, asked: Iterable[str]) -> Iterator[list[str]]:
-    """A row for each message and memory: its name, its producers and its consumers."""
+def _lines(wiring: Wiring) -> Iterator[dict[str, Any]]:
+    """Each message and memory with its producers and its consumers."""
     consumers = (*wiring.consumed, *wiring.application_consumes)
     produced: dict[Port, list[End]] = {}
     for end in (*wiring.produced, *wiring.application_produces):
         produced.setdefault(end.port, []).append(end)
     for port, ends in produced.items():
-        by = [c for c in consumers if c.port.consumes(port) and (port.name != ANYTHING or _is_alone(wiring, c.port))]
-        none = "any reader" if port.kind == "memory" else "no consumer"
-        yield [_named(port), ", ".join(_sender(end, wiring) for end in ends), "->", _shown(by) or none]
-    unsatisfied: dict[str, list[End]] = {}
+        anything = port.name == ANYTHING
+        by = [c for c in consumers if c.port.consumes(port) and (not anything or _is_alone(wiring, c.port))]
+        name = "any message of it" if anything else str(port)
+        yield {"kind": port.kind, "port": name, "says": [_sender(e, wiring) for e in ends], "hears": _shown(by)}
+    unsatisfied: dict[tuple[str, str], list[End]] = {}
     for end in consumers:
         if not any(end.port.consumes(port) for port in produced):
-            unsatisfied.setdefault(_named(end.port), []).append(end)
-    for name, ends in unsatisfied.items():
-        yield [name, "the application" if name in asked else "no producer", "->", _shown(ends)]
+            unsatisfied.setdefault((end.port.kind, str(end.port)), []).append(end)
+    for (kind, name), ends in unsatisfied.items():
+        yield {"kind": kind, "port": name, "says": [], "hears": _shown(ends)}
 
 
 def _is_alone(wiring: Wiring, port: Port) -> bool:
@@ -159,40 +156,119 @@ def _is_alone(wiring: Wiring, port: Port) -> bool:
 
 
 def _sender(end: End, wiring: Wiring) -> str:
+    """A producer, and whether it only prints the message."""
     is_printed = any((each.service, each.port) == (end.service, end.port) for each in wiring.printed)
-    return f"{end.service} (application, prints it)" if is_printed else _shown([end])
+    return f"{end.service} (application, prints it)" if is_printed else _shown([end])[0]
 
 
-def _shown(ends: Iterable[End]) -> str:
+def _shown(ends: Iterable[End]) -> list[str]:
     names = (f"{end.service} (application)" if end.layer == "application" else end.service for end in ends)
-    return ", ".join(dict.fromkeys(names))
+    return list(dict.fromkeys(names))
 
 
-def _declared(port: Port, wiring: Wiring) -> str:
-    if not wiring.has_application:
+def _asked(wiring: Wiring) -> Iterator[dict[str, Any]]:
+    """What the application must produce, or may produce if it is not required."""
+    by_port: dict[tuple[str, str], list[End]] = {}
+    for end in wiring.required():
+        if end.port.can_be_required:
+            by_port.setdefault((end.port.kind, str(end.port)), []).append(end)
+    for (kind, name), ends in by_port.items():
+        declared = (end.service for end in wiring.application_produces if ends[0].port.consumes(end.port))
+        required = any(not end.port.optional for end in ends)
+        yield {
+            "kind": kind,
+            "port": name,
+            "needed_by": [end.service for end in ends],
+            "required": required,
+            "declared_by": list(dict.fromkeys(declared)),
+        }
+
+
+def _file(instances: Sequence[Explanation]) -> str:
+    """The instances of a file together: the first one whole, and what differs in the others."""
+    wired: dict[str, str] = {}
+    for one in instances:
+        wired.setdefault(_wiring(one), one["name"])
+    first, (own, *others) = instances[0], wired
+    parts = [_head(first), _services(first), own, _differences(instances)]
+    return "\n".join(part for part in [*parts, *(f"{printable(wired[other])}\n\n{other}" for other in others)] if part)
+
+
+def _head(one: Explanation) -> str:
+    rig = (f", rig {one['rig']}" if one["rig"] else "") + (f" of any {one['pool']}" if one["pool"] else "")
+    level = f"{LEVEL_WORDS[one['level']]}\n" if one["level"] in LEVEL_WORDS else ""
+    title = f"{one['name']} ({one['level']}, {one['kind']}{rig})"
+    return f"{printable(title)}\n{printable(one['file'])}\n{level}"
+
+
+def _services(one: Explanation) -> str:
+    lines = []
+    for service in one["services"]:
+        lines += [f"{printable('{layer}: {name} ({uses})'.format(**service))}\n", _values(one, service["arguments"])]
+    if one["variables"]:
+        lines += ["application: its variables\n", _values(one, one["variables"])]
+    if one["vary"]:
+        rows = [[r["name"], r["nominal"], r["values"], _short(one, r["origin"])] for r in one["vary"]]
+        lines += ["ranges: their nominal values, and what dodo search tries\n", _table(rows, "  ")]
+    return "".join(lines)
+
+
+def _values(one: Explanation, arguments: Sequence[dict[str, str]]) -> str:
+    return _table([[a["name"], _value(a), _short(one, a["origin"])] for a in arguments], "  ")
+
+
+def _value(argument: dict[str, str]) -> str:
+    return f"{argument['value']} {argument['unit']}".strip()
+
+
+def _short(one: Explanation, origin: str) -> str:
+    return origin.replace(f"{one['file']}:", "line ")
+
+
+def _wiring(one: Explanation) -> str:
+    asked = {each["port"] for each in one["asked"]}
+    rows = []
+    for line in one["wiring"]:
+        nobody = "the application" if line["port"] in asked else "no producer"
+        unheard = "any reader" if line["kind"] == "memory" else "no consumer"
+        rows.append([_port(line), ", ".join(line["says"]) or nobody, "->", ", ".join(line["hears"]) or unheard])
+    parts = ["producers and consumers\n" + _table(rows, "  ")]
+    for title, required in (("the application must provide", True), ("the application may provide", False)):
+        wanted = [each for each in one["asked"] if each["required"] is required]
+        rows = [[_port(each), f"to {', '.join(each['needed_by'])}", _declared(each, one)] for each in wanted]
+        parts += [f"{title}\n" + _table(rows, "  ")] if rows else []
+    words = told_in_words(one["told"])
+    return "\n".join([*parts, f"{words}\n"] if words else parts)
+
+
+def _port(line: dict[str, Any]) -> str:
+    return f"memory {line['port']}" if line["kind"] == "memory" else str(line["port"])
+
+
+def _declared(asked: dict[str, Any], one: Explanation) -> str:
+    if not one["has_application"]:
         return ""
-    declared = dict.fromkeys(end.service for end in wiring.application_produces if port.consumes(end.port))
-    if declared:
-        return f"declared by {', '.join(declared)}"
-    undeclared = ", ".join(wiring.undeclared)
+    if asked["declared_by"]:
+        return f"declared by {', '.join(asked['declared_by'])}"
+    undeclared = ", ".join(one["undeclared"])
     return f"not declared; {undeclared} has no x-dodo and may provide it" if undeclared else "not declared"
 
 
-def _differences(instances: Sequence[ResolvedTest]) -> str:
+def _differences(instances: Sequence[Explanation]) -> str:
     """The values that differ between the instances, one row per instance."""
     if len(instances) == 1:
         return ""
-    values = [_values(test) for test in instances]
+    values = [_flat(one) for one in instances]
     keys = [key for key in values[0] if len({v.get(key, "") for v in values}) > 1]
-    rows = [[t.spec.title, *(f"{k}: {v.get(k, '')}" for k in keys)] for t, v in zip(instances, values, strict=True)]
+    rows = [[one["name"], *(f"{k}: {v.get(k, '')}" for k in keys)] for one, v in zip(instances, values, strict=True)]
     rest = f"  ... {len(rows) - _MOST_ROWS} more\n" if len(rows) > _MOST_ROWS else ""
     return f"the {len(rows)} instances and their differences\n" + _table(rows[:_MOST_ROWS], "  ") + rest
 
 
-def _values(test: ResolvedTest) -> dict[str, str]:
-    spec = test.spec
-    services = {f"{u.name}.{a.parameter.name}": _value(a) for u in spec.uses for a in _arguments(test, u)}
-    return {"level": spec.level or "", "kind": spec.kind or "", "rig": spec.rig or "", **services, **test.variables}
+def _flat(one: Explanation) -> dict[str, str]:
+    services = {f"{s['name']}.{a['name']}": _value(a) for s in one["services"] for a in s["arguments"]}
+    variables = {v["name"]: v["value"] for v in one["variables"]}
+    return {key: one[key] for key in ("level", "kind", "rig")} | services | variables
 
 
 def _table(rows: Sequence[Sequence[str]], indent: str) -> str:

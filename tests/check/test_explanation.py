@@ -1,5 +1,6 @@
 """``dodo explain``: rules, and the wiring of tests as people and programs read it."""
 
+import json
 from io import StringIO
 from pathlib import Path
 
@@ -95,10 +96,31 @@ def test_a_test(case: str, folder: Path, update_goldens: bool) -> None:
     assert text == expected.read_text()
 
 
+def test_json_has_the_same(folder: Path) -> None:
+    examples.write(MATRIX, folder)
+    code, out, _ = explained("example", "--json")
+    assert code == 2
+    rows = json.loads(out)
+    assert [row["slug"] for row in rows][:2] == ["example--yaw-80-deg--frame-id-0", "example--yaw-80-deg--frame-id-3"]
+    (yaw,) = [argument for argument in rows[3]["services"][2]["arguments"] if argument["name"] == "yaw"]
+    assert yaw == {"name": "yaw", "value": "100", "unit": "deg", "origin": "tests/example/example.dodo.yml:14"}
+    assert rows[0]["asked"][0]["port"] == "opendlv.proxy.GroundSteeringRequest"
+
+
+def test_json_has_the_ranges(folder: Path) -> None:
+    examples.write(VARY, folder)
+    (row,) = json.loads(explained("example", "--json")[1])
+    assert [(one["name"], one["values"]) for one in row["vary"]] == [
+        ("yaw", "80 deg to 100 deg"),
+        ("exposure", "0.5, 1"),
+    ]
+
+
 def test_a_rule() -> None:
     code, out, err = explained("wrong-unit")
     assert (code, err) == (0, "")
     assert out == catalogue.text(catalogue.pages()["wrong-unit"])
+    assert json.loads(explained("wrong-unit", "--json")[1])["good"] == "timeout: 60 s"
 
 
 def test_all_rules_have_a_line() -> None:
