@@ -170,7 +170,7 @@ def _of_users(table: _Processes) -> Iterator[Shortage]:
     for name, count in (("instances", _instances), ("watches", _watches)):
         most = _number(table.proc / f"sys/fs/inotify/max_user_{name}")
         for user, used in table.by_user(count).most_common(1):
-            if user not in range(places.FIRST, places.LAST + 1):
+            if not places.is_own(user):
                 by, others = partial(table.most, count), partial(table.of_others, count, user)
                 yield _full(f"inotify {name} of user {user}", used, most, by, others)
     user, (_, hard) = os.getuid(), resource.getrlimit(resource.RLIMIT_NPROC)

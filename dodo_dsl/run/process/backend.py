@@ -37,8 +37,8 @@ from dodo_dsl.spec.model import VIRTUAL
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
-_OF_SANDBOX = ("bwrap:", "setpriv:")
-"""How lines of the programs begin that confine an application's."""
+_NO_PROGRAM = "bwrap: execvp "
+"""How bubblewrap says that it cannot start the application's program."""
 
 
 class ProcessBackend:
@@ -140,9 +140,10 @@ class ProcessBackend:
             if self.is_on_host and MOUNT_GONE.match(said) and len(starts) < MOST_TRIES:
                 self._start(starts[-1])
                 return
-            is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
-            what = "its sandbox cannot be set up: " if is_of_sandbox else ""
-            self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
+            why = f"its sandbox cannot be set up: {said or f'exit code {code}'}"
+            if said.startswith(_NO_PROGRAM):
+                why = said.removeprefix(_NO_PROGRAM)
+            self._events.put_nowait(Unstartable(exited, why))
             self._conditions.failed(exited)
             return
         if used:
@@ -276,7 +277,7 @@ class ProcessBackend:
         limits = application.limits
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
-        confined = confinement(command.folder, self.isolation, self.cid, limits, hidden)
+        confined = confinement(command.folder, self.isolation, limits, hidden)
         if self._has_time:
             confined = replace(confined, time=self._commands.time_folder)
         return asdict(replace(confined, masked=command.masked))

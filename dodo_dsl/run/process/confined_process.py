@@ -12,7 +12,7 @@ import resource
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl.run.machine_load import processes
@@ -25,6 +25,8 @@ from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _SIGNALLED = range(129, 129 + 64)
 """Exit codes by which bubblewrap reports the signal that ended the program."""
+_BEGAN = b'"exit-code"'
+"""What bubblewrap reports only of a program that it could start (``--json-status-fd``)."""
 
 
 class ConfinedProcess:
@@ -42,34 +44,38 @@ class ConfinedProcess:
         """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
         program = _found(words[0], environment, confined.folder)
         user = places.user if places else None
-        mounts = _mounts(places, confined) if places else None
-        given = {**environment, "PWD": confined.folder, **({"HOME": confinement.HOME} if mounts else {})}
+        mounts = _mounts(places, confined, program) if places else None
+        given = {**environment, **({"HOME": confinement.HOME} if mounts else {})}
         others = 0 if user is not None else _threads_of_this_user()
+        sandbox = confinement.sandbox_words(confined, mounts, program, given)
+        filtered = {"--seccomp": seccomp_filter.program()} if places else {}
         self._group = process_group.make(confined.limits.processes)
-        self._began, began = os.pipe()
-        filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)
-        source = confinement.launcher_variables(given)
-        sandbox = confinement.sandbox_words(confined, mounts, program, user, filter_fd)
-        limit = functools.partial(_limit, confined.limits, os.getpid(), self._group, others)
+        self._status, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            self._process = subprocess.Popen(
-                [*sandbox, *confinement.launcher_words(source, began, program), *words],
-                env={"PATH": os.environ.get("PATH", os.defpath)},
-                cwd=confined.folder,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                start_new_session=True,
-                umask=umask,
-                pass_fds=(filter_fd, began, source),
-                preexec_fn=limit,  # noqa: PLW1509  (it has one thread)
-            )
+            with _in_files(filtered) as passed, os.fdopen(status, "wb"):
+                passed["--json-status-fd"] = status
+                if places and places.namespace is not None:  # which bubblewrap closes as it closes what it waited for
+                    passed |= {"--userns": places.namespace, "--block-fd": places.namespace}
+                sandbox += [word for name, descriptor in passed.items() for word in (name, str(descriptor))]
+                with _in_files({"--args": confinement.as_data(sandbox)}) as files:
+                    self._process = subprocess.Popen(
+                        [PROGRAM, "--args", str(files["--args"]), "--", program, *words[1:]],
+                        env={"PATH": os.environ.get("PATH", os.defpath)},
+                        cwd="/",
+                        stdin=subprocess.DEVNULL,
+                        stdout=output,
+                        stderr=output,
+                        start_new_session=True,
+                        umask=umask,
+                        user=user,
+                        group=user,
+                        extra_groups=None if user is None else [],
+                        pass_fds=(*passed.values(), *files.values()),
+                        preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), self._group, others),  # noqa: PLW1509
+                    )
         except BaseException:
             self._close()
             raise
-        finally:
-            for descriptor in (began, filter_fd, source):
-                os.close(descriptor)
         self.pid = self._process.pid
         self.memory = confined.limits.memory
         self.failed = False
@@ -82,18 +88,34 @@ class ConfinedProcess:
     def wait(self) -> int:
         """The program's exit code, below 0 for the signal that ended it."""
         code = self._process.wait()
-        self.failed = os.read(self._began, 16) != confinement.BEGAN
+        try:
+            said = os.read(self._status, 4096)
+        except BlockingIOError:  # what it was to start has not ended yet
+            said = b""
+        self.failed = code > 0 and _BEGAN not in said
         self._close()
         return 128 - code if code in _SIGNALLED else code
 
     def _close(self) -> None:
-        os.close(self._began)
+        os.close(self._status)
         if self._group is not None:
             self._group.remove()
 
 
-def _mounts(places: Places, confined: Confinement) -> confinement.Mounts:
-    reads = {path: places.read(path) for path in confined.reads}
+@contextlib.contextmanager
+def _in_files(data: Mapping[str, bytes]) -> Iterator[dict[str, int]]:
+    """Descriptors of files with data, which have no names and are there to be read from their beginning."""
+    with contextlib.ExitStack() as stack:
+        files = {name: stack.enter_context(os.fdopen(os.memfd_create(name), "w+b")) for name in data}
+        for name, file in files.items():
+            file.write(data[name])
+            file.seek(0)
+        yield {name: file.fileno() for name, file in files.items()}
+
+
+def _mounts(places: Places, confined: Confinement, program: str) -> confinement.Mounts:
+    paths = (*confined.reads, *confinement.shown(confined, program))
+    reads = {path: places.read(path) for path in paths}
     return confinement.Mounts(*places.folder(confined.folder), places.home, places.shared, places.mounted, reads)
 
 
@@ -149,10 +171,8 @@ def confinement_problem() -> str:
     """
     with tempfile.TemporaryFile() as output:
         try:
-            confined = Confinement(_FOLDER, "network", 0, INTERPRETER)
-            true = ConfinedProcess(
-                ["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(places.own_user(0))
-            )
+            confined = Confinement(_FOLDER, "network", INTERPRETER)
+            true = ConfinedProcess(["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(places.own_user()))
             code = true.wait()
         except (OSError, subprocess.SubprocessError, NoSeccomp) as error:
             return str(error)

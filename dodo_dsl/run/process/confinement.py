@@ -1,8 +1,8 @@
 """What a service of the application sees and may use, and the words by which bubblewrap (bwrap(1)) confines it.
 
-A program gets its environment only when it is confined and has given up root: variables such as LD_PRELOAD and PATH
-would otherwise act on the programs that confine it. They come by a file without a name, as everybody on the machine can
-read words of a command line.
+Bubblewrap reads them from a file without a name: everybody on the machine can read words of a command line, and the
+application's variables are among them. Of these, LD_PRELOAD and such act on the application's program alone, as it is
+what bubblewrap executes next.
 """
 
 import os
@@ -26,12 +26,10 @@ class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
     With ``isolation`` ``host`` it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
-    ``cid`` decides which user id is tried first, where DoDo runs as root.
     """
 
     folder: str
     isolation: str
-    cid: int
     reads: tuple[str, ...] = ()
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
@@ -40,12 +38,12 @@ class Confinement:
     """The folder by which it gets the test's time, where it may write into the page and wake its threads."""
 
 
-def confinement(folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
+def confinement(folder: Path, isolation: str, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
     """The confinement of an application; of the ``hidden`` paths, those matter that it would see."""
     reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
     every = tuple(dict.fromkeys([*INTERPRETER, str(_PACKAGE), *reads]))
     inside = _inside(hidden, (*SYSTEM, *every, str(folder)))
-    return Confinement(str(folder), isolation, cid, every, tuple(dict.fromkeys(inside)), limits)
+    return Confinement(str(folder), isolation, every, tuple(dict.fromkeys(inside)), limits)
 
 
 def _inside(hidden: Iterable[Path], shown: Iterable[str]) -> Iterator[str]:
@@ -67,9 +65,6 @@ _MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 """On Debian since 12 these are links into /usr."""
 _EMPTY = ("/run", "/var/tmp")
 """Folders that programs may look into, and that nobody may write to."""
-_KEPT = ("CAP_SETUID", "CAP_SETGID", "CAP_SETPCAP")
-"""What ``setpriv`` needs to give up root and then itself gives up."""
-
 _TO_UNMASK = ("CAP_SYS_ADMIN", "CAP_MKNOD", "CAP_DAC_READ_SEARCH", "CAP_SYS_MODULE", "CAP_SYS_RAWIO")
 
 
@@ -89,34 +84,33 @@ class Mounts:
 
 
 def sandbox_words(
-    confined: Confinement, mounts: Mounts | None, program: str, user: int | None, filter_fd: int
+    confined: Confinement, mounts: Mounts | None, program: str, environment: Mapping[str, str]
 ) -> list[str]:
-    """The words before the application's own; ``mounts`` is None on the host, ``user`` None without root.
+    """What bubblewrap is to do, but for descriptors; ``mounts`` is None on the host.
 
     ``program`` is the path of the application's program, which is shown where nothing else would.
     """
-    always = [PROGRAM, "--unshare-pid", "--die-with-parent"]
-    chdir = ["--chdir", confined.folder]
+    words = ["--unshare-pid", "--die-with-parent", "--clearenv"]
+    words += [word for name, value in environment.items() for word in ("--setenv", name, value)]
     if mounts is None:
-        return [*always, "--dev-bind", "/", "/", *_masked(confined.masked), "--proc", "/proc", *chdir, "--"]
-    seen = _seen(confined, mounts, program)
-    filtered = ["--seccomp", str(filter_fd)]
-    unshared = ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try"]
-    if user is None:
-        return [*always, *unshared, *seen, *chdir, "--cap-drop", "ALL", *filtered, "--"]
-    kept = [word for name in _KEPT for word in ("--cap-add", name)]
-    return [*always, *unshared, *seen, *chdir, "--cap-drop", "ALL", *kept, *filtered, "--", *_as_user(user)]
+        words += ["--dev-bind", "/", "/", *_masked(confined.masked), "--proc", "/proc"]
+    else:
+        words += ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try", "--cap-drop", "ALL"]
+        words += _seen(confined, mounts, program)
+    return [*words, "--chdir", confined.folder]
+
+
+def as_data(words: Sequence[str]) -> bytes:
+    """Words as bubblewrap reads them from a file; raises ValueError."""
+    if any("\0" in word for word in words):
+        raise ValueError("a word or a variable holds a NUL character")
+    return b"".join(os.fsencode(f"{word}\0") for word in words)
 
 
 def _masked(devices: Iterable[str]) -> list[str]:
     """Nothing in the place of devices; root then has no capability to look behind, or to make the device again."""
     binds = [word for path in devices for word in ("--dev-bind", "/dev/null", path)]
     return [*binds, *(word for name in _TO_UNMASK for word in ("--cap-drop", name))] if binds else []
-
-
-def _as_user(user: int) -> list[str]:
-    ids = [f"--reuid={user}", f"--regid={user}", "--clear-groups"]
-    return ["setpriv", *ids, "--inh-caps=-all", "--ambient-caps=-all", "--bounding-set=-all", "--"]
 
 
 def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
@@ -131,7 +125,7 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
     seen += [word for path, source in mounts.shared.items() for word in ("--bind", str(source), path)]
     seen += _time(confined.time)
     seen += [word for path in _EMPTY for word in ("--perms", "0755", "--dir", path)]
-    read = (*_shown(confined, program), *confined.reads)
+    read = (*shown(confined, program), *confined.reads)
     hidden = _outermost(filter(os.path.exists, confined.hidden), (*read, confined.folder))
     around = [path for path in hidden if Path(confined.folder).is_relative_to(path)]
     covered = [path for path in mounts.mounted if path not in (confined.folder, *read)]
@@ -189,52 +183,8 @@ def _parents(paths: Iterable[str]) -> list[str]:
     return sorted({str(parent) for path in paths for parent in Path(path).parents if parent != parent.parent})
 
 
-def _shown(confined: Confinement, program: str) -> Sequence[str]:
+def shown(confined: Confinement, program: str) -> Sequence[str]:
     """The program's own file, where it lies in nothing that is shown."""
     shown = [Path(path) for path in (*SYSTEM, *_MERGED, *confined.reads, confined.folder)]
     paths = dict.fromkeys((program, os.path.realpath(program)))
     return [path for path in paths if not any(Path(path).is_relative_to(folder) for folder in shown)]
-
-
-LAUNCHER = """
-import errno, os, sys
-source, began, program, *words = sys.argv[1:]
-began = int(began)
-os.set_inheritable(began, False)
-with open(int(source), "rb") as file:
-    environment = dict(item.split(b"=", 1) for item in file.read().split(b"\\0") if item)
-os.write(began, b"+")
-try:
-    try:
-        os.execve(program, words, environment)
-    except OSError as error:
-        if error.errno != errno.ENOEXEC:
-            raise
-        os.execve("/bin/sh", ["sh", program, *words[1:]], environment)
-except OSError as error:
-    os.write(began, b"-")
-    sys.exit(f"{program}: {error.strerror}")
-"""
-
-BEGAN = b"+"
-
-
-def launcher_words(source: int, began: int, program: str) -> list[str]:
-    """The words before the application's own, the name of its program among them; ``source`` is of ``variables``.
-
-    ``began`` is a descriptor that gets ``BEGAN`` when all is prepared, and more when the program cannot be started.
-    """
-    return [sys.executable, "-I", "-S", "-c", LAUNCHER, str(source), str(began), program]
-
-
-def launcher_variables(environment: Mapping[str, str]) -> int:
-    """The descriptor of a file with an environment, which the caller closes."""
-    descriptor = os.memfd_create("environment", os.MFD_CLOEXEC)
-    try:
-        with os.fdopen(os.dup(descriptor), "wb") as file:
-            file.writelines(os.fsencode(f"{name}={value}\0") for name, value in environment.items())
-        os.lseek(descriptor, 0, os.SEEK_SET)
-    except BaseException:
-        os.close(descriptor)
-        raise
-    return descriptor

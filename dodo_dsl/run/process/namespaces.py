@@ -18,7 +18,7 @@ from pathlib import Path
 _CLONE_NEWNS, _CLONE_NEWIPC, _CLONE_NEWUSER = 0x00020000, 0x08000000, 0x10000000
 _CLONE_NEWPID, _CLONE_NEWNET = 0x20000000, 0x40000000
 _MS_BIND, _MS_REC, _MS_PRIVATE, _MS_SLAVE, _MS_NOSUID, _MS_NODEV = 4096, 16384, 1 << 18, 1 << 19, 2, 4
-_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER, _PR_SET_SECUREBITS, _NO_SETUID_FIXUP = 1, 36, 28, 4
 _SIOCSIFFLAGS, _IFF_UP, _IFF_RUNNING = 0x8914, 1, 64
 _RTM_NEWROUTE, _NLM_F_REQUEST, _NLM_F_ACK, _NLM_F_CREATE = 24, 1, 4, 0x400
 _RTA_DST, _RTA_OIF, _RTA_PREFSRC = 1, 4, 7
@@ -190,7 +190,7 @@ def bind_as(source: Path, target: Path, owner: int, user: int) -> None:
 
     By an ID-mapped mount (mount_setattr(2)); raises OSError if the kernel or the file system has none.
     """
-    users = _user_namespace(_swapped(owner, user))
+    users = user_namespace(_swapped(owner, user))
     try:
         tree = _syscall(_OPEN_TREE, _AT_FDCWD, bytes(source), _OPEN_TREE_CLONE | _AT_RECURSIVE | os.O_CLOEXEC)
         attributes = struct.pack("QQQQ", _MOUNT_ATTR_IDMAP, 0, 0, users)
@@ -208,26 +208,32 @@ def _swapped(one: int, other: int) -> str:
     return "".join(f"{inside} {outside} {count}\n" for inside, outside, count in between if count)
 
 
-def _user_namespace(mapping: str) -> int:
-    """A descriptor of a user namespace with a mapping of users and groups; raises OSError."""
-    reader, writer = os.pipe()
+def user_namespace(mapping: str, owner: int = 0) -> int:
+    """A descriptor of a user namespace with a mapping of users and groups, which its owner may enter; raises OSError.
+
+    Root makes it in the owner's place, who may be allowed none.
+    """
+    ours, theirs = socket.socketpair()
     child = os.fork()
     if child == 0:
+        ours.close()
         with contextlib.suppress(OSError):
+            _call("prctl", _PR_SET_SECUREBITS, _NO_SETUID_FIXUP, 0, 0, 0)  # it keeps its capabilities
+            os.setresuid(owner, owner, owner)
             _call("unshare", _CLONE_NEWUSER)
-            os.write(writer, b"x")
-            signal.pause()
+            socket.send_fds(theirs, [b"x"], [os.open("/proc/self/ns/user", os.O_RDONLY)])
+            theirs.recv(1)
         os._exit(1)
-    os.close(writer)
+    theirs.close()
     try:
-        if not os.read(reader, 1):
+        _, descriptors, _, _ = socket.recv_fds(ours, 1, 1)
+        if not descriptors:
             raise OSError(errno.EPERM, "the kernel refuses user namespaces")
         for kind in ("uid_map", "gid_map"):
             Path(f"/proc/{child}/{kind}").write_text(mapping)
-        return os.open(f"/proc/{child}/ns/user", os.O_RDONLY | os.O_CLOEXEC)
+        return descriptors[0]
     finally:
-        os.close(reader)
-        os.kill(child, signal.SIGKILL)
+        ours.close()
         os.waitpid(child, 0)
 
 

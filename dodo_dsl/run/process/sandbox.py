@@ -157,7 +157,7 @@ class Sandbox:
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
         if confined.isolation == "network" and self.places is None:
-            self.places = Places(places.own_user(confined.cid))
+            self.places = Places(places.own_user())
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_probe(self, _descriptors: list[int]) -> None:

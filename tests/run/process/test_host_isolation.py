@@ -7,6 +7,7 @@ import re
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -172,17 +173,17 @@ BLAMES = re.compile("install bubblewrap|allow user namespaces|make namespaces")
         pytest.param("exit 7", "ended with: exit code 7", "", marks=pytest.mark.proof),
     ],
 )
-def test_only_what_is_missing_is_blamed(
-    bwrap: str, told: str, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if bwrap:
-        (tmp_path / "bwrap").write_text(f"#!/bin/sh\n{bwrap}\n")
-        (tmp_path / "bwrap").chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    refusal = isolation_refusal()
+def test_only_what_is_missing_is_blamed(bwrap: str, told: str, remedy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
+        Path(folder).chmod(0o755)  # as the application's user starts it
+        if bwrap:
+            Path(folder, "bwrap").write_text(f"#!/bin/sh\n{bwrap}\n")
+            Path(folder, "bwrap").chmod(0o755)
+        monkeypatch.setenv("PATH", folder)
+        refusal = isolation_refusal()
+        (finding,) = capabilities.namespaces()
     assert refusal is not None
     assert (str(refusal)[-len(told) :], refusal.remedy) == (told, remedy)
-    (finding,) = capabilities.namespaces()
     assert bool(BLAMES.search(finding.advice)) == bool(remedy)
 
 
