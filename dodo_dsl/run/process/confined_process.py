@@ -114,7 +114,7 @@ def _in_files(data: Mapping[str, bytes]) -> Iterator[dict[str, int]]:
 
 
 def _mounts(places: Places, confined: Confinement, program: str) -> confinement.Mounts:
-    paths = (*confined.reads, *confinement.shown(confined, program))
+    paths = (*confined.reads, *confinement.programs(confined, program))
     reads = {path: places.read(path) for path in paths}
     return confinement.Mounts(*places.folder(confined.folder), places.home, places.shared, places.mounted, reads)
 

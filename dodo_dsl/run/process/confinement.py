@@ -114,31 +114,35 @@ def _masked(devices: Iterable[str]) -> list[str]:
 
 
 def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
-    """The file system: the system's programs, what may be read, and the application's folder; all else is absent."""
-    seen = [word for path in SYSTEM for word in ("--ro-bind-try", path, path)]
+    """The file system: the system's programs, what may be read, and the application's folder; all else is absent.
+
+    Within them lies what is hidden, and in that again what may be read: outer paths come first.
+    """
+    shown = {path: ["--ro-bind-try", path, path] for path in SYSTEM}
     for path in _MERGED:
-        if Path(path).is_symlink():
-            seen += ["--symlink", str(Path(path).readlink()), path]
-        else:
-            seen += ["--ro-bind-try", path, path]
-    seen += ["--proc", "/proc", "--dev", "/dev"]
-    seen += [word for path, source in mounts.shared.items() for word in ("--bind", str(source), path)]
-    seen += _time(confined.time)
-    seen += [word for path in _EMPTY for word in ("--perms", "0755", "--dir", path)]
-    read = (*shown(confined, program), *confined.reads)
-    hidden = _outermost(filter(os.path.exists, confined.hidden), (*read, confined.folder))
-    around = [path for path in hidden if Path(confined.folder).is_relative_to(path)]
-    covered = [path for path in mounts.mounted if path not in (confined.folder, *read)]
-    covered += [path for path in around if not any(Path(path).is_relative_to(one) for one in read)]
-    covered = list(dict.fromkeys(covered))
-    seen += [word for path in covered for word in ("--perms", "0755", "--tmpfs", path)]
-    seen += [*_folders(_parents((HOME, confined.folder, *read))), *_read_only(read, mounts)]
-    seen += ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
-    seen += ["--bind", str(mounts.home), HOME]
-    for path in hidden:
-        if path not in around:
-            seen += _mask(path, read, mounts)
-    return [*seen, *(word for path in (*covered, "/dev", "/") for word in ("--remount-ro", path))]
+        is_link = Path(path).is_symlink()
+        shown[path] = ["--symlink", str(Path(path).readlink()), path] if is_link else ["--ro-bind-try", path, path]
+    reads = (*programs(confined, program), *confined.reads)
+    shown |= {path: ["--ro-bind-try", str(mounts.reads.get(path, path)), path] for path in reads}
+    own = {path: ["--bind", str(source), path] for path, source in {**mounts.shared, HOME: mounts.home}.items()}
+    own[confined.folder] = ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
+    hidden = {*filter(os.path.exists, confined.hidden), *mounts.mounted} - {*reads, *own}
+    words = ["--proc", "/proc", "--dev", "/dev", *(word for path in _EMPTY for word in ("--dir", path))]
+    shows: dict[str, bool | None] = {"/": False}
+    """Whether what is mounted at a path shows what lies there; None where that is another folder."""
+    for path in sorted({*shown, *own, *hidden}, key=lambda path: Path(path).parts):
+        outer = next(shows[outer] for outer in map(str, Path(path).parents) if outer in shows)
+        if path in own:
+            words += own[path]
+            shows[path] = None if path in mounts.shared else True
+        elif path in hidden and outer is not False:
+            words += ["--tmpfs", path] if Path(path).is_dir() else ["--ro-bind", os.devnull, path]
+            shows[path] = False
+        elif path in shown and path not in hidden and outer is not True:
+            words += shown[path]
+            shows[path] = True
+    empty = [path for path, is_shown in shows.items() if is_shown is False and Path(path).is_dir()]
+    return [*words, *_time(confined.time), *(word for path in ("/dev", *empty) for word in ("--remount-ro", path))]
 
 
 def _time(folder: str) -> list[str]:
@@ -150,40 +154,7 @@ def _time(folder: str) -> list[str]:
     return ["--ro-bind", folder, folder, "--bind", page, page, *channels]
 
 
-def _mask(path: str, read: Sequence[str], mounts: Mounts) -> list[str]:
-    """Nothing in the place of a file or folder, but what may be read in it, or is that itself."""
-    if not Path(path).is_dir():
-        return [] if path in read else ["--ro-bind", os.devnull, path]
-    inside = [one for one in read if Path(one).is_relative_to(path)]
-    parents = [one for one in _parents(inside) if Path(one).is_relative_to(path) and one != path]
-    return ["--tmpfs", path, *_folders(parents), *_read_only(inside, mounts), "--remount-ro", path]
-
-
-def _folders(paths: Iterable[str]) -> list[str]:
-    return [word for path in paths for word in ("--perms", "0755", "--dir", path)]
-
-
-def _read_only(paths: Iterable[str], mounts: Mounts) -> list[str]:
-    return [word for path in paths for word in ("--ro-bind-try", str(mounts.reads.get(path, path)), path)]
-
-
-def _outermost(paths: Iterable[str], shown: Iterable[str]) -> list[str]:
-    """Paths without those that lie in another one and in nothing ``shown`` there: they are hidden already."""
-    found: dict[str, None] = {}
-    for path in sorted(set(paths), key=lambda one: Path(one).parts):  # what holds others comes before them
-        outer = [other for other in map(str, Path(path).parents) if other in found]
-        holds = [one for one in shown if outer and one != path and Path(path).is_relative_to(one)]
-        if all(any(Path(one).is_relative_to(other) for one in holds) for other in outer):
-            found[path] = None
-    return list(found)
-
-
-def _parents(paths: Iterable[str]) -> list[str]:
-    """The folders that hold paths, outer ones first: everybody may pass through, as bubblewrap would not allow."""
-    return sorted({str(parent) for path in paths for parent in Path(path).parents if parent != parent.parent})
-
-
-def shown(confined: Confinement, program: str) -> Sequence[str]:
+def programs(confined: Confinement, program: str) -> Sequence[str]:
     """The program's own file, where it lies in nothing that is shown."""
     shown = [Path(path) for path in (*SYSTEM, *_MERGED, *confined.reads, confined.folder)]
     paths = dict.fromkeys((program, os.path.realpath(program)))

@@ -3,7 +3,7 @@
 import itertools
 import json
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import msgspec
@@ -49,7 +49,7 @@ def test_a_repository_where_every_application_sees_the_machine_is_hidden_around_
     )
     order = [argv.index(word) for word in ("/usr/share", python, folder, inner, tests)]
     assert argv[order[0] - 1] == "--tmpfs"
-    assert max(order[1:3]) < argv.index(inner)
+    assert order[0] < min(order[1:3]) and order[1] < order[3] and order[2] < order[4]
     assert "/usr/share/perl5" not in argv
 
 
@@ -99,9 +99,20 @@ def test_nothing_is_mounted_in_what_is_hidden_but_what_may_be_read(tmp_path: Pat
     hidden = (str(report), str(tests), str(tests))
     argv = sandbox_words(Confinement(str(tmp_path), "network", (str(python),), hidden), MOUNTS, "/usr/bin/x", {})
     assert [path for word, path in itertools.pairwise(argv) if word == "--tmpfs"] == [str(tests)]
-    inside = argv[argv.index("--bind", argv.index(str(MOUNTS.folder))) :]
-    inside = inside[inside.index(str(tests)) + 1 :]
-    assert inside[: inside.index("--remount-ro")] == [
-        *("--perms", "0755", "--dir", str(python.parent)),
-        *("--ro-bind-try", str(python), str(python)),
-    ]
+    inside = argv[argv.index(str(tests)) + 1 :]
+    assert inside[:3] == ["--ro-bind-try", str(python), str(python)]
+    assert str(tests) in argv[len(argv) - argv[::-1].index("--remount-ro") - 6 :]
+
+
+def test_what_may_be_read_in_the_folder_of_others_is_shown_and_nothing_else_there(tmp_path: Path) -> None:
+    """Of ``/tmp`` the application has another one, where its own and other folders are mounted."""
+    repository, venv, other = (tmp_path / name for name in ("repository", "venv", "other"))
+    for folder in (repository / "app", venv, other):
+        folder.mkdir(parents=True)
+    mounts = replace(MOUNTS, shared={str(tmp_path): Path("/x")}, mounted=tuple(map(str, (repository, venv, other))))
+    words = sandbox_words(Confinement(f"{repository}/app", "network", (str(venv),)), mounts, "/bin/x", {})
+    places = [tmp_path, other, repository, repository / "app", venv]
+    before = [words[words.index(str(path)) - (1 if path in (other, repository) else 2)] for path in places[:3]]
+    assert before == ["--bind", "--tmpfs", "--tmpfs"]
+    assert [words.index(str(path)) for path in places] == sorted(words.index(str(path)) for path in places)
+    assert words[words.index(str(venv)) - 1] == "--ro-bind-try"
