@@ -3,6 +3,7 @@
 Programs are those that some tests need: a Docker engine, Compose, and the emulator of the rig's firmware.
 """
 
+import asyncio
 import contextlib
 import errno
 import os
@@ -54,10 +55,10 @@ _SEGMENT_BYTES = 64 << 20
 
 def namespaces() -> Iterator[Capability]:
     """Whether tests can have their own namespaces."""
-    if refusal := host_isolation.isolation_refusal():
+    if refusal := asyncio.run(host_isolation.isolation_refusal()):
         remedy = f"{refusal.remedy}; " if refusal.remedy else ""
         way = f"{remedy}for applications you trust, --isolation host"
-        yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal}", way)
+        yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal.why}", way)
     else:
         yield Capability("namespaces", "ok", "each test gets its own network, IPC and /tmp, its application a sandbox")
 

@@ -1,7 +1,6 @@
-"""A program of the application in its own sandbox, whether this machine can confine it, and how much memory it uses.
+"""A program of the application in its own sandbox, and how much memory it uses.
 
-The process has the interface of subprocess.Popen that ``Children`` uses. Where an application cannot be confined, the
-probe says whether the machine lacks what that takes.
+The process has the interface of subprocess.Popen that ``Children`` uses.
 """
 
 import contextlib
@@ -11,16 +10,14 @@ import os
 import resource
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl.run.machine_load import processes
-from dodo_dsl.run.process import confinement, namespaces, places, process_group, seccomp_filter
-from dodo_dsl.run.process.confinement import INTERPRETER, PROGRAM, Confinement
+from dodo_dsl.run.process import confinement, namespaces, process_group, seccomp_filter
+from dodo_dsl.run.process.confinement import PROGRAM, Confinement
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.process_group import ProcessGroup
-from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _SIGNALLED = range(129, 129 + 64)
@@ -158,34 +155,6 @@ def _threads_of_this_user(proc: Path = Path("/proc")) -> int:
                 if entry.stat().st_uid == os.getuid():
                     threads += sum(1 for _ in (entry / "task").iterdir())
     return threads
-
-
-BUBBLEWRAP, NAMESPACES = "bubblewrap", "namespaces"
-_FOLDER = "/usr"
-
-
-def confinement_problem() -> str:
-    """What goes wrong when a program that does nothing is confined as an application is; empty when nothing does.
-
-    To be called by a sandbox with own mounts.
-    """
-    with tempfile.TemporaryFile() as output:
-        try:
-            confined = Confinement(_FOLDER, "network", INTERPRETER)
-            true = ConfinedProcess(["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(places.own_user()))
-            code = true.wait()
-        except (OSError, subprocess.SubprocessError, NoSeccomp) as error:
-            return str(error)
-        output.seek(0)
-        told = output.read(1000).decode(errors="replace").strip()
-    return "" if code == 0 else told or f"exit code {code}"
-
-
-def missing() -> str:
-    """What confining takes and this machine lacks, each tried by itself: BUBBLEWRAP, NAMESPACES, or empty."""
-    if shutil.which(PROGRAM) is None:
-        return BUBBLEWRAP
-    return NAMESPACES if namespaces.refusal() else ""
 
 
 PERIOD_S = 0.25

@@ -79,28 +79,6 @@ def unshare() -> None:
     _unshare(_CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID)
 
 
-def refusal() -> str:
-    """Why the kernel refuses this process further namespaces with their own mounts; empty when it allows them.
-
-    A child tries it as bubblewrap would: without root within a user namespace.
-    """
-    reader, writer = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            _unshare(_CLONE_NEWNS | _CLONE_NEWPID)
-            _keep_mounts_private()
-        except OSError as error:
-            os.write(writer, str(error.strerror).encode())
-        finally:
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as answer:
-        why = answer.read().decode(errors="replace")
-    os.waitpid(child, 0)
-    return why
-
-
 def _keep_mounts_private() -> None:
     _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
 

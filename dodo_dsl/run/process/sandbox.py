@@ -8,18 +8,16 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
-                        {"do": "close"}; {"do": "probe"}; {"do": "send", "to", "data"}; {"do": "load"};
+                        {"do": "close"}; {"do": "send", "to", "data"}; {"do": "load"};
                         {"do": "relay", "cid"}; {"do": "line", "data"}; {"do": "listeners"};
                         {"do": "use", "names": [service, ...]};
                         {"do": "keep"} with the descriptors of outputs and logs
-    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
+    sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
                         {"load": snapshot or null};
                         {"relay": [host, port] of what sends lines, or null};
                         {"listeners": names of what listens on a bus, or null};
                         {"use": {service: [seconds on processors, bytes of memory]} or null};
-                        {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
-                        ``confined.missing`` has it}
 """
 
 import contextlib
@@ -44,7 +42,7 @@ from dodo_dsl.run.listeners import listening
 from dodo_dsl.run.machine_load import snapshot
 from dodo_dsl.run.machine_load.processes import ThreadTimes
 from dodo_dsl.run.machine_load.service_use import UseReader
-from dodo_dsl.run.process import confined_process, namespaces, places
+from dodo_dsl.run.process import namespaces, places
 from dodo_dsl.run.process.children import Children
 from dodo_dsl.run.process.confined_process import PERIOD_S
 from dodo_dsl.run.process.confinement import Confinement
@@ -160,10 +158,6 @@ class Sandbox:
             self.places = Places(places.own_user())
         return self.children.confine(name, words, environment, output, confined, self.places)
 
-    def _do_probe(self, _descriptors: list[int]) -> None:
-        why = confined_process.confinement_problem()
-        self.send(probe=why, missing=confined_process.missing() if why else "")
-
     def _do_send(self, _descriptors: list[int], to: list[tuple[str, int]], data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for host, port in to:
@@ -260,8 +254,7 @@ def main(argv: list[str]) -> int:
         else:
             namespaces.adopt_orphans()
     except OSError as error:
-        missing = confined_process.NAMESPACES if namespaces.refusal() else ""
-        channel.send(json.dumps({"down": str(error.strerror or error), "missing": missing}).encode())
+        channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
         return 1
     sandbox = Sandbox(channel, isolation, forks)
     sandbox.send(up=outside)

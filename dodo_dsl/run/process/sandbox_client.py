@@ -65,7 +65,7 @@ class SandboxClient:
             self._close_socket()
             answer = await self._start(slot, folder / LOG)
         if "down" in answer:
-            raise BackendError(f"no sandbox of isolation {self._isolation}: {answer['down']}")
+            raise BackendError(f"the test's sandbox does not start: {answer['down']}")
         if self._process is None:
             self._process = ForkedSandbox(answer["up"])
 
