@@ -49,8 +49,6 @@ _BUSES = "225.0.0.0/24"
 _NO_ROUTE = (errno.ENETUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL)
 _SYS = Path("/proc/sys")
 _FREE_BYTES = 2 << 30
-_SEGMENTS = 64
-_SEGMENT_BYTES = 64 << 20
 
 
 def namespaces() -> Iterator[Capability]:
@@ -101,30 +99,11 @@ def receive_buffer() -> Iterator[Capability]:
         yield Capability("receive buffer", "ok", f"sockets may hold {limit:,} bytes")
 
 
-def shared_memory() -> Iterator[Capability]:
-    """Whether the limits of System V shared memory suffice."""
-    segments, size = _number("/proc/sys/kernel/shmmni"), _number("/proc/sys/kernel/shmmax")
-    if segments < _SEGMENTS or size < _SEGMENT_BYTES:
-        way = _sysctl(f"kernel.shmmni={max(segments, 4096)}", f"kernel.shmmax={max(size, _SEGMENT_BYTES * 16)}")
-        yield Capability("shared memory", "problem", f"only {segments} segments of {size:,} bytes are allowed", way)
-    else:
-        yield Capability("shared memory", "ok", f"{segments:,} segments are allowed")
-
-
-def _sysctl(*settings: str) -> str:
-    """Sets limits of the kernel; in a container, whose /proc/sys is read-only, they are its host's."""
-    path = _SYS / settings[0].partition("=")[0].replace(".", "/")
+def _sysctl(setting: str) -> str:
+    """Sets a limit of the kernel; in a container, whose /proc/sys is read-only, it is its host's."""
+    path = _SYS / setting.partition("=")[0].replace(".", "/")
     is_host = path.exists() and (os.geteuid() != 0 or os.access(path, os.W_OK))
-    return (
-        advice.as_root(f"sysctl -w {' '.join(settings)}") if is_host else f"on the host: sysctl -w {' '.join(settings)}"
-    )
-
-
-def _number(path: str) -> int:
-    try:
-        return int(Path(path).read_text().split()[0])
-    except (OSError, ValueError, IndexError):
-        return 0
+    return advice.as_root(f"sysctl -w {setting}") if is_host else f"on the host: sysctl -w {setting}"
 
 
 def disk() -> Iterator[Capability]:
@@ -267,7 +246,6 @@ CHECKS: tuple[Callable[[], Iterator[Capability]], ...] = (
     namespaces,
     multicast,
     receive_buffer,
-    shared_memory,
     disk,
     docker_engine,
     compose_plugin,

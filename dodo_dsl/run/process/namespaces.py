@@ -97,60 +97,42 @@ def _unshare(flags: int) -> None:
 def enter(process: int) -> dict[Path, int]:
     """Joins the network and IPC namespaces of another process, and leaves the host's mounts and process numbers.
 
-    The next fork is process 1. Gives descriptors of the other process's ``SHARED`` folders, for ``furnish_entered``.
+    The next fork is process 1. Gives descriptors of the other process's ``SHARED`` folders, for ``furnish``.
     Raises OSError: only root may do so.
     """
-    _join(process, "net", _CLONE_NEWNET)
-    _join(process, "ipc", _CLONE_NEWIPC)
-    own = os.open("/proc/self/ns/mnt", os.O_RDONLY | os.O_CLOEXEC)
-    _join(process, "mnt", _CLONE_NEWNS)
+    other, own = os.pidfd_open(process), os.open("/proc/self/ns/mnt", os.O_RDONLY | os.O_CLOEXEC)
+    _call("setns", other, _CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS)
     try:
         flags = _OPEN_TREE_CLONE | os.O_CLOEXEC
         trees = {path: _syscall(_OPEN_TREE, _AT_FDCWD, bytes(path), flags) for path in SHARED}
     finally:
         _call("setns", own, _CLONE_NEWNS)
         os.close(own)
+        os.close(other)
     _call("unshare", _CLONE_NEWNS | _CLONE_NEWPID)
     return trees
 
 
-def _join(process: int, kind: str, flag: int) -> None:
-    descriptor = os.open(f"/proc/{process}/ns/{kind}", os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        _call("setns", descriptor, flag)
-    finally:
-        os.close(descriptor)
+def furnish(shown: Collection[Path], trees: Mapping[Path, int]) -> None:
+    """Mounts, and the network of new namespaces; to be called by their process 1.
 
-
-def furnish_entered(trees: Mapping[Path, int], shown: Collection[Path]) -> None:
-    """Mounts the folders of ``enter``; to be called by the new process 1.
-
-    Of the host's ``SHARED`` only the folders ``shown`` stay, which are empty to the other process.
-    """
-    _keep_mounts_private()
-    _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
-    for folder, tree in trees.items():
-        old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
-        _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(folder), _MOVE_MOUNT_F_EMPTY_PATH)
-        os.close(tree)
-        _bind_old(old, folder, shown)
-
-
-def furnish(shown: Collection[Path]) -> None:
-    """Mounts and network of the new namespaces; to be called by their process 1.
-
-    Of the folders in ``SHARED`` those stay that are ``shown``, but no files: they may be another test's tokens.
+    With the ``trees`` of ``enter``, mounts are all. Of the folders in ``SHARED`` those stay that are ``shown``, which
+    are empty to the other process, but no files: they may be another test's tokens.
     """
     _keep_mounts_private()
     with contextlib.suppress(OSError):  # containers may mask /proc; only tools like ps would miss it
         _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
-    for folder in SHARED:
-        if folder.is_dir():
-            old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+    for folder in filter(Path.is_dir, SHARED):
+        old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+        if trees:
+            _syscall(_MOVE_MOUNT, trees[folder], b"", _AT_FDCWD, bytes(folder), _MOVE_MOUNT_F_EMPTY_PATH)
+            os.close(trees[folder])
+        else:
             mount_tmpfs(folder, _SHARED_SIZE)
-            _bind_old(old, folder, shown)
-    _loopback_up()
-    _multicast_route()
+        _bind_old(old, folder, shown)
+    if not trees:
+        _loopback_up()
+        _multicast_route()
 
 
 def mount_tmpfs(folder: Path, options: str) -> None:

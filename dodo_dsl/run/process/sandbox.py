@@ -229,10 +229,7 @@ def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
     child = os.fork()
     if child == 0:
         namespaces.die_with_parent(signal.SIGKILL)
-        if entered.process:
-            namespaces.furnish_entered(trees, entered.shown)
-        else:
-            namespaces.furnish(entered.shown)
+        namespaces.furnish(entered.shown, trees)
         return
     channel.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)

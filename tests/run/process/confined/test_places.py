@@ -31,7 +31,7 @@ def within(scene: Callable[[], object], *needed: Path) -> object:
             if (first := os.fork()) != 0:  # without a process 1, which lives, there are no others
                 os.waitpid(first, 0)
                 os._exit(0)
-            namespaces.furnish(Entered.with_own(0, *needed).shown)
+            namespaces.furnish(Entered.with_own(0, *needed).shown, {})
             told = scene()
         except OSError as error:
             told = [str(error.filename), error.strerror]
