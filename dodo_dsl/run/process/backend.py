@@ -88,9 +88,7 @@ class ProcessBackend:
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
-        self._sandbox = SandboxClient(
-            isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
-        )
+        self._sandbox = SandboxClient(self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server)
 
     @property
     def is_on_host(self) -> bool:

@@ -41,10 +41,9 @@ class ConfinedProcess:
         """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
         program = _found(words[0], environment, confined.folder)
         user = places.user if places else None
-        mounts = _mounts(places, confined, program) if places else None
-        given = {**environment, **({"HOME": confinement.HOME} if mounts else {})}
+        given = {**environment, **({"HOME": confinement.HOME} if places else {})}
         others = 0 if user is not None else _threads_of_this_user()
-        sandbox = confinement.sandbox_words(confined, mounts, program, given)
+        sandbox = confinement.sandbox_words(confined, places, program, given)
         filtered = {"--seccomp": seccomp_filter.program()} if places else {}
         self._group = process_group.make(confined.limits.processes)
         self._status, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
@@ -108,12 +107,6 @@ def _in_files(data: Mapping[str, bytes]) -> Iterator[dict[str, int]]:
             file.write(data[name])
             file.seek(0)
         yield {name: file.fileno() for name, file in files.items()}
-
-
-def _mounts(places: Places, confined: Confinement, program: str) -> confinement.Mounts:
-    paths = (*confined.reads, *confinement.programs(confined, program))
-    reads = {path: places.read(path) for path in paths}
-    return confinement.Mounts(*places.folder(confined.folder), places.home, places.shared, places.mounted, reads)
 
 
 def _found(name: str, environment: Mapping[str, str], folder: str) -> str:

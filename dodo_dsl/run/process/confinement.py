@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dodo_dsl.run.process.places import Places
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _PACKAGE = Path(__file__).resolve().parents[2]
@@ -68,35 +69,20 @@ _EMPTY = ("/run", "/var/tmp")
 _TO_UNMASK = ("CAP_SYS_ADMIN", "CAP_MKNOD", "CAP_DAC_READ_SEARCH", "CAP_SYS_MODULE", "CAP_SYS_RAWIO")
 
 
-@dataclass(frozen=True)
-class Mounts:
-    """Where the sandbox prepared the application's folder and home, ``/tmp`` and ``/dev/shm``, and what it may read."""
-
-    folder: Path
-    writable: bool
-    """The folder; what is written there goes with the test."""
-    home: Path
-    shared: Mapping[str, Path]
-    mounted: Sequence[str] = ()
-    """What is mounted there for DoDo's services, which the application must neither see nor remove."""
-    reads: Mapping[str, Path] = field(default_factory=dict)
-    """By their paths; what is not there is shown as it is."""
-
-
 def sandbox_words(
-    confined: Confinement, mounts: Mounts | None, program: str, environment: Mapping[str, str]
+    confined: Confinement, places: Places | None, program: str, environment: Mapping[str, str]
 ) -> list[str]:
-    """What bubblewrap is to do, but for descriptors; ``mounts`` is None on the host.
+    """What bubblewrap is to do, but for descriptors; ``places`` is None on the host.
 
     ``program`` is the path of the application's program, which is shown where nothing else would.
     """
     words = ["--unshare-pid", "--die-with-parent", "--clearenv"]
     words += [word for name, value in environment.items() for word in ("--setenv", name, value)]
-    if mounts is None:
+    if places is None:
         words += ["--dev-bind", "/", "/", *_masked(confined.masked), "--proc", "/proc"]
     else:
         words += ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try", "--cap-drop", "ALL"]
-        words += _seen(confined, mounts, program)
+        words += _seen(confined, places, program)
     return [*words, "--chdir", confined.folder]
 
 
@@ -113,7 +99,7 @@ def _masked(devices: Iterable[str]) -> list[str]:
     return [*binds, *(word for name in _TO_UNMASK for word in ("--cap-drop", name))] if binds else []
 
 
-def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
+def _seen(confined: Confinement, places: Places, program: str) -> list[str]:
     """The file system: the system's programs, what may be read, and the application's folder; all else is absent.
 
     Within them lies what is hidden, and in that again what may be read: outer paths come first.
@@ -122,11 +108,11 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
     for path in _MERGED:
         is_link = Path(path).is_symlink()
         shown[path] = ["--symlink", str(Path(path).readlink()), path] if is_link else ["--ro-bind-try", path, path]
-    reads = (*programs(confined, program), *confined.reads)
-    shown |= {path: ["--ro-bind-try", str(mounts.reads.get(path, path)), path] for path in reads}
-    own = {path: ["--bind", str(source), path] for path, source in {**mounts.shared, HOME: mounts.home}.items()}
-    own[confined.folder] = ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
-    hidden = {*filter(os.path.exists, confined.hidden), *mounts.mounted} - {*reads, *own}
+    reads = (*_programs(confined, program), *confined.reads)
+    shown |= {path: ["--ro-bind-try", str(places.read(path)), path] for path in reads}
+    own = {path: ["--bind", str(source), path] for path, source in {**places.shared, HOME: places.home}.items()}
+    own[confined.folder] = ["--bind" if places.writable else "--ro-bind", str(places.folder), confined.folder]
+    hidden = {*filter(os.path.exists, confined.hidden), *places.mounted} - {*reads, *own}
     words = ["--proc", "/proc", "--dev", "/dev", *(word for path in _EMPTY for word in ("--dir", path))]
     shows: dict[str, bool | None] = {"/": False}
     """Whether what is mounted at a path shows what lies there; None where that is another folder."""
@@ -134,7 +120,7 @@ def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
         outer = next(shows[outer] for outer in map(str, Path(path).parents) if outer in shows)
         if path in own:
             words += own[path]
-            shows[path] = None if path in mounts.shared else True
+            shows[path] = None if path in places.shared else True
         elif path in hidden and outer is not False:
             words += ["--tmpfs", path] if Path(path).is_dir() else ["--ro-bind", os.devnull, path]
             shows[path] = False
@@ -154,7 +140,7 @@ def _time(folder: str) -> list[str]:
     return ["--ro-bind", folder, folder, "--bind", page, page, *channels]
 
 
-def programs(confined: Confinement, program: str) -> Sequence[str]:
+def _programs(confined: Confinement, program: str) -> Sequence[str]:
     """The program's own file, where it lies in nothing that is shown."""
     shown = [Path(path) for path in (*SYSTEM, *_MERGED, *confined.reads, confined.folder)]
     paths = dict.fromkeys((program, os.path.realpath(program)))

@@ -5,7 +5,7 @@ import json
 import socket
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.slot import package_path
@@ -44,12 +44,14 @@ class ForkServer:
         with contextlib.suppress(OSError):  # it has ended, which the next sandbox finds
             self._socket.send(json.dumps({"load": sorted(modules)}).encode())
 
-    def fork(self, channel: socket.socket, log: int, slot: str, words: Sequence[str] = ()) -> None:
-        """Starts a sandbox at the other end of ``channel``, with more ``words``.
+    def fork(self, channel: socket.socket, log: int, slot: str, entered: str) -> None:
+        """Starts a sandbox at the other end of ``channel``, in its namespaces.
 
         Raises OSError when the fork server has ended.
         """
-        socket.send_fds(self._socket, [json.dumps({"slot": slot, "words": words}).encode()], [channel.fileno(), log])
+        socket.send_fds(
+            self._socket, [json.dumps({"slot": slot, "entered": entered}).encode()], [channel.fileno(), log]
+        )
 
     @property
     def is_alive(self) -> bool:

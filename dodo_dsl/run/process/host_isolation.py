@@ -67,7 +67,7 @@ async def _trial(fork_server: ForkServer | None) -> str:
         if "started" not in message and not ended.done():
             ended.set_result(message)
 
-    client = SandboxClient("network", take, lambda why: take({"why": why}), fork_server)
+    client = SandboxClient(take, lambda why: take({"why": why}), fork_server)
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as output:
         try:
             await client.open(Slot(0), Path(folder), Entered.with_own(0))

@@ -26,58 +26,48 @@ _READABLE = stat.S_IROTH | stat.S_IXOTH
 class Places:
     """Folders that belong to ``user``, None for that of this process. To be made by a sandbox with own mounts."""
 
-    def __init__(self, user: int | None) -> None:
+    def __init__(self, folder: str, user: int | None) -> None:
+        """``folder`` is the application's; raises OSError, also where its user may not read that."""
         self.user = user
         """The user that the application runs as; None for the user of this process."""
         self._root = Path(tempfile.mkdtemp(prefix="dodo-application-", dir=namespaces.SHARED[0]))  # the sandbox's own
         namespaces.mount_tmpfs(self._root, _SIZE)
-        self.home = self._own("home")
+        self.home = self._made("home", is_own=True)
         self.shared = {str(place): self._shallow(place) for place in namespaces.SHARED if place.is_dir()}
         """``/tmp`` and ``/dev/shm`` by their names, without the host's folders that are mounted there."""
         self.namespace = None if user is None else namespaces.user_namespace(f"{user} {user} 1\n", user)
         """The descriptor of that user's own namespace, which bubblewrap enters where it is not to make one."""
         self.mounted = tuple(str(path) for place in self.shared for path in Path(place).iterdir() if path.is_mount())
         """What is mounted there, and must be a mount to the application as well: no other folder can be removed."""
-        self._shown: dict[str, tuple[Path, bool]] = {}
         self._read: dict[str, Path] = {}
+        self.folder, self.writable = self._overlaid(Path(folder))
+        """Where its folder is shown, the same for all services; what is written there goes nowhere else."""
 
     def _shallow(self, place: Path) -> Path:
-        target = self._folder(place.name)
+        target = self._made(place.name)
         namespaces.bind(place, target, deep=False)
         return target
 
-    def _folder(self, name: str) -> Path:
+    def _made(self, name: str, is_own: bool = False) -> Path:
         path = self._root / name
         path.mkdir()
         path.chmod(_MODE)
-        return path
-
-    def _own(self, name: str) -> Path:
-        path = self._folder(name)
-        if self.user is not None:
+        if is_own and self.user is not None:
             os.chown(path, self.user, self.user)
         return path
 
-    def folder(self, folder: str) -> tuple[Path, bool]:
-        """Where an application's folder is shown, the same for all services, and whether it can be written there.
-
-        What is written goes nowhere else. Raises OSError, also where its user may not read the folder.
-        """
-        if folder not in self._shown:
-            place = self._folder(f"folder-{len(self._shown)}")
-            lower, merged = self._folder(f"{place.name}/lower"), self._folder(f"{place.name}/merged")
-            upper, work = self._own(f"{place.name}/upper"), self._own(f"{place.name}/work")
-            status = Path(folder).stat()
-            if not self._show(Path(folder), lower) and self.user and status.st_mode & _READABLE != _READABLE:
-                why = "readable for its owner alone, and this kernel cannot show it to the application's user"
-                raise PermissionError(errno.EACCES, why, folder)
-            try:
-                namespaces.overlay(lower, upper, work, merged)
-            except OSError:  # as some file systems refuse: then it can only be read
-                self._shown[folder] = lower, False
-            else:
-                self._shown[folder] = merged, True
-        return self._shown[folder]
+    def _overlaid(self, folder: Path) -> tuple[Path, bool]:
+        lower, merged = self._made("lower"), self._made("merged")
+        upper, work = self._made("upper", is_own=True), self._made("work", is_own=True)
+        mode = folder.stat().st_mode
+        if not self._show(folder, lower) and self.user is not None and mode & _READABLE != _READABLE:
+            why = "readable for its owner alone, and this kernel cannot show it to the application's user"
+            raise PermissionError(errno.EACCES, why, str(folder))
+        try:
+            namespaces.overlay(lower, upper, work, merged)
+        except OSError:  # as some file systems refuse: then it can only be read
+            return lower, False
+        return merged, True
 
     def read(self, path: str) -> Path:
         """Where a path is shown that it may read, as its own where the kernel can do that; or the path itself."""

@@ -50,6 +50,7 @@ from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.slot import Entered
 
+HOST = "host"
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
 UMASK = 0o022
@@ -59,12 +60,12 @@ UMASK = 0o022
 class Sandbox:
     """The main loop of the sandbox's process."""
 
-    def __init__(self, channel: socket.socket, isolation: str, forks: bool = False) -> None:
+    def __init__(self, channel: socket.socket, is_on_host: bool, forks: bool) -> None:
         """``forks`` means that this process has loaded what services need."""
         self.channel = channel
-        self.isolation = isolation
+        self.is_on_host = is_on_host
         self.forks = forks
-        umask = UMASK if isolation == "network" else -1
+        umask = -1 if is_on_host else UMASK
         self.use = UseReader()
         self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), self.use.note_end, umask)
         self.places: Places | None = None
@@ -109,7 +110,7 @@ class Sandbox:
                 if not self.keep:
                     break
                 sources.remove(self.channel)
-        self.children.end_all(self.isolation == "network" and os.getpid() == 1, self._wait)
+        self.children.end_all(not self.is_on_host, self._wait)
 
     def _drain_wakeup(self) -> None:
         with contextlib.suppress(BlockingIOError):
@@ -155,7 +156,7 @@ class Sandbox:
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
         if confined.isolation == "network" and self.places is None:
-            self.places = Places(places.own_user())
+            self.places = Places(confined.folder, places.own_user())
         return self.children.confine(name, words, environment, output, confined, self.places)
 
     def _do_send(self, _descriptors: list[int], to: list[tuple[str, int]], data: str) -> None:
@@ -239,21 +240,18 @@ def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
 
 
 def main(argv: list[str]) -> int:
-    """``sandbox DESCRIPTOR network|host [--forks] [--enter=JSON]``: serves the runner at the other end.
-
-    ``--enter`` is an ``Entered``.
-    """
+    """``sandbox DESCRIPTOR host|ENTERED [--forks]``: serves the runner at the other end."""
     channel = socket.socket(fileno=int(argv[0]))
-    isolation, outside, forks = argv[1], os.getpid(), "--forks" in argv
+    is_on_host, outside = argv[1] == HOST, os.getpid()
     try:
-        if isolation == "network":
-            _in_namespaces(channel, Entered.among(argv) or Entered.with_own(0))
+        if not is_on_host:
+            _in_namespaces(channel, Entered.of(argv[1]))
         else:
             namespaces.adopt_orphans()
     except OSError as error:
         channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
         return 1
-    sandbox = Sandbox(channel, isolation, forks)
+    sandbox = Sandbox(channel, is_on_host, "--forks" in argv)
     sandbox.send(up=outside)
     sandbox.run()
     return 0

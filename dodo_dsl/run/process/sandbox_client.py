@@ -11,14 +11,14 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import END_S, ForkServer
-from dodo_dsl.run.process.sandbox import MAX_MESSAGE
+from dodo_dsl.run.process.sandbox import HOST, MAX_MESSAGE
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
 from dodo_dsl.run.protocol import BackendError
 
@@ -34,13 +34,11 @@ class SandboxClient:
 
     def __init__(
         self,
-        isolation: str,
         on_message: Callable[[dict[str, Any]], None],
         on_lost: Callable[[str], None],
         fork_server: ForkServer | None = None,
     ) -> None:
-        self._isolation = isolation
-        self._fork_server = fork_server if isolation == "network" else None
+        self._fork_server = fork_server
         self._on_message = on_message
         self._on_lost = on_lost
         self.pid: int | None = None
@@ -56,11 +54,11 @@ class SandboxClient:
 
         ``entered`` are its namespaces; None on the host.
         """
-        words = [entered.word()] if entered else []
         folder.mkdir(parents=True, exist_ok=True)
         answer: dict[str, Any] = {}
-        for server in (self._fork_server, None) if self._fork_server else (None,):  # it may have ended
-            answer = await self._start(slot, folder / LOG, words, server)
+        server = self._fork_server if entered else None
+        for each in (server, None) if server else (None,):  # it may have ended
+            answer = await self._start(slot, folder / LOG, entered.word() if entered else HOST, each)
             if "up" in answer:
                 break
             self._close_socket()
@@ -70,7 +68,7 @@ class SandboxClient:
         with contextlib.suppress(ProcessLookupError):
             self._end = os.pidfd_open(answer["up"])
 
-    async def _start(self, slot: Slot, log: Path, words: Sequence[str], server: ForkServer | None) -> dict[str, Any]:
+    async def _start(self, slot: Slot, log: Path, entered: str, server: ForkServer | None) -> dict[str, Any]:
         """The first message of a new sandbox, which a fork server forks, where there is one."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
@@ -79,11 +77,11 @@ class SandboxClient:
         with theirs, atomic.appended(log) as stderr:
             if server is not None:
                 with contextlib.suppress(OSError):
-                    server.fork(theirs, stderr.fileno(), slot.name, words)
+                    server.fork(theirs, stderr.fileno(), slot.name, entered)
             else:
                 module = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox"]
                 self._child = subprocess.Popen(
-                    [*module, str(theirs.fileno()), self._isolation, *words],
+                    [*module, str(theirs.fileno()), entered],
                     pass_fds=(theirs.fileno(), *slot.descriptors),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,

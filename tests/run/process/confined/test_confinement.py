@@ -3,17 +3,27 @@
 import itertools
 import json
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import msgspec
 import pytest
 
 from dodo_dsl.run.process import confinement as module
-from dodo_dsl.run.process.confinement import Confinement, Mounts, as_data, confinement, sandbox_words
+from dodo_dsl.run.process.confinement import Confinement, as_data, confinement, sandbox_words
+from dodo_dsl.run.process.places import Places
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
-MOUNTS = Mounts(Path("/tmp/x/folder"), True, Path("/tmp/x/home"), {"/tmp": Path("/tmp/x/tmp")})
+
+class Made(Places):
+    """Places that nobody has made."""
+
+    def __init__(self, place: str = "/tmp", mounted: tuple[str, ...] = ()) -> None:
+        self.folder, self.writable, self.home = Path("/tmp/x/folder"), True, Path("/tmp/x/home")
+        self.shared, self.mounted, self.user = {place: Path("/tmp/x/tmp")}, mounted, None
+
+
+MOUNTS = Made()
 
 
 def test_paths_are_relative_to_its_folder_and_the_interpreter_is_there(tmp_path: Path) -> None:
@@ -109,7 +119,7 @@ def test_what_may_be_read_in_the_folder_of_others_is_shown_and_nothing_else_ther
     repository, venv, other = (tmp_path / name for name in ("repository", "venv", "other"))
     for folder in (repository / "app", venv, other):
         folder.mkdir(parents=True)
-    mounts = replace(MOUNTS, shared={str(tmp_path): Path("/x")}, mounted=tuple(map(str, (repository, venv, other))))
+    mounts = Made(str(tmp_path), tuple(map(str, (repository, venv, other))))
     words = sandbox_words(Confinement(f"{repository}/app", "network", (str(venv),)), mounts, "/bin/x", {})
     places = [tmp_path, other, repository, repository / "app", venv]
     before = [words[words.index(str(path)) - (1 if path in (other, repository) else 2)] for path in places[:3]]
