@@ -275,7 +275,7 @@ class ProcessBackend:
         limits = application.limits
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
-        confined = confinement(command.folder, self.isolation, limits, hidden)
+        confined = confinement(command.folder, limits, hidden)
         if self._has_time:
             confined = replace(confined, time=self._commands.time_folder)
         return asdict(replace(confined, masked=command.masked))

@@ -26,11 +26,10 @@ SYSTEM = ("/usr", "/etc", "/opt", "/sys/devices/system")
 class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
-    With ``isolation`` ``host`` it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
+    On the host it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
     """
 
     folder: str
-    isolation: str
     reads: tuple[str, ...] = ()
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
@@ -39,12 +38,12 @@ class Confinement:
     """The folder by which it gets the test's time, where it may write into the page and wake its threads."""
 
 
-def confinement(folder: Path, isolation: str, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
+def confinement(folder: Path, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
     """The confinement of an application; of the ``hidden`` paths, those matter that it would see."""
     reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
     every = tuple(dict.fromkeys([*INTERPRETER, str(_PACKAGE), *reads]))
     inside = _inside(hidden, (*SYSTEM, *every, str(folder)))
-    return Confinement(str(folder), isolation, every, tuple(dict.fromkeys(inside)), limits)
+    return Confinement(str(folder), every, tuple(dict.fromkeys(inside)), limits)
 
 
 def _inside(hidden: Iterable[Path], shown: Iterable[str]) -> Iterator[str]:

@@ -82,7 +82,7 @@ async def _trial(fork_server: ForkServer | None) -> str:
             "fork": False,
             "masked": (),
         }
-        client.send({**start, "confined": asdict(Confinement("/usr", "network", INTERPRETER))}, (output.fileno(),))
+        client.send({**start, "confined": asdict(Confinement("/usr", INTERPRETER))}, (output.fileno(),))
         answer = await ended
         await client.close()
         output.seek(0)

@@ -7,6 +7,7 @@ in them those stay visible that the test needs, so that programs and specs kept 
 import contextlib
 import ctypes
 import errno
+import functools
 import os
 import signal
 import socket
@@ -151,14 +152,13 @@ def bind_as(source: Path, target: Path, owner: int, user: int) -> None:
     By an ID-mapped mount (mount_setattr(2)); raises OSError if the kernel or the file system has none.
     """
     users = user_namespace(_swapped(owner, user))
+    tree = _syscall(_OPEN_TREE, _AT_FDCWD, bytes(source), _OPEN_TREE_CLONE | _AT_RECURSIVE | os.O_CLOEXEC)
+    attributes = struct.pack("QQQQ", _MOUNT_ATTR_IDMAP, 0, 0, users)
     try:
-        tree = _syscall(_OPEN_TREE, _AT_FDCWD, bytes(source), _OPEN_TREE_CLONE | _AT_RECURSIVE | os.O_CLOEXEC)
-        attributes = struct.pack("QQQQ", _MOUNT_ATTR_IDMAP, 0, 0, users)
         _syscall(_MOUNT_SETATTR, tree, b"", _AT_EMPTY_PATH, attributes, len(attributes))
         _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(target), _MOVE_MOUNT_F_EMPTY_PATH)
-        os.close(tree)
     finally:
-        os.close(users)
+        os.close(tree)
 
 
 def _swapped(one: int, other: int) -> str:
@@ -168,10 +168,11 @@ def _swapped(one: int, other: int) -> str:
     return "".join(f"{inside} {outside} {count}\n" for inside, outside, count in between if count)
 
 
+@functools.cache
 def user_namespace(mapping: str, owner: int = 0) -> int:
     """A descriptor of a user namespace with a mapping of users and groups, which its owner may enter; raises OSError.
 
-    Root makes it in the owner's place, who may be allowed none.
+    Root makes it in the owner's place, who may be allowed none. It stays open.
     """
     ours, theirs = socket.socketpair()
     child = os.fork()

@@ -155,7 +155,7 @@ class Sandbox:
     def _confine(
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
-        if confined.isolation == "network" and self.places is None:
+        if self.places is None and not self.is_on_host:
             self.places = Places(confined.folder, places.own_user())
         return self.children.confine(name, words, environment, output, confined, self.places)
 
