@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from dodo_dsl import atomic
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.plan.added_services import TIME
@@ -27,13 +28,14 @@ from dodo_dsl.run.process.commands import Command, Commands, changes, needed_pat
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
+from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off
 from dodo_dsl.spec.model import VIRTUAL
 
+LOG = "sandbox.log"
 LOAD_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
@@ -102,7 +104,8 @@ class ProcessBackend:
             self._commands = replace(self._commands, time=time)
             needed += [time.library.parent, time.agent.parent]
         entered = None if self.is_on_host else Entered.with_own(container, *needed)
-        await self._sandbox.open(self.slot, self.report, entered)
+        with atomic.appended(self.report / LOG) as log:
+            await self._sandbox.open(self.slot, log.fileno(), entered)
 
     def _take(self, message: dict[str, Any]) -> None:
         if "started" in message:

@@ -12,10 +12,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from dodo_dsl import atomic
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import END_S, ForkServer
 from dodo_dsl.run.process.sandbox import HOST, MAX_MESSAGE
@@ -23,7 +21,6 @@ from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
 from dodo_dsl.run.protocol import BackendError
 
 CLOSE_S = 10.0
-LOG = "sandbox.log"
 
 
 class SandboxClient:
@@ -49,16 +46,15 @@ class SandboxClient:
         self._up: asyncio.Future[dict[str, Any]] | None = None
         self._closing = False
 
-    async def open(self, slot: Slot, folder: Path, entered: Entered | None = None) -> None:
-        """Starts the sandbox, which logs into ``folder`` and holds the slot's leases; raises BackendError.
+    async def open(self, slot: Slot, log: int, entered: Entered | None = None) -> None:
+        """Starts the sandbox, which logs to a descriptor and holds the slot's leases; raises BackendError.
 
         ``entered`` are its namespaces; None on the host.
         """
-        folder.mkdir(parents=True, exist_ok=True)
         answer: dict[str, Any] = {}
         server = self._fork_server if entered else None
         for each in (server, None) if server else (None,):  # it may have ended
-            answer = await self._start(slot, folder / LOG, entered.word() if entered else HOST, each)
+            answer = await self._start(slot, log, entered.word() if entered else HOST, each)
             if "up" in answer:
                 break
             self._close_socket()
@@ -68,16 +64,16 @@ class SandboxClient:
         with contextlib.suppress(ProcessLookupError):
             self._end = os.pidfd_open(answer["up"])
 
-    async def _start(self, slot: Slot, log: Path, entered: str, server: ForkServer | None) -> dict[str, Any]:
+    async def _start(self, slot: Slot, log: int, entered: str, server: ForkServer | None) -> dict[str, Any]:
         """The first message of a new sandbox, which a fork server forks, where there is one."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
         self._socket, self._up = ours, asyncio.get_running_loop().create_future()
         asyncio.get_running_loop().add_reader(ours, self._receive)
-        with theirs, atomic.appended(log) as stderr:
+        with theirs:
             if server is not None:
                 with contextlib.suppress(OSError):
-                    server.fork(theirs, stderr.fileno(), slot.name, entered)
+                    server.fork(theirs, log, slot.name, entered)
             else:
                 module = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox"]
                 self._child = subprocess.Popen(
@@ -85,7 +81,7 @@ class SandboxClient:
                     pass_fds=(theirs.fileno(), *slot.descriptors),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
-                    stderr=stderr,
+                    stderr=log,
                     start_new_session=True,
                     env={**own_environment(), "PYTHONPATH": package_path(), SLOT_VARIABLE: slot.name},
                 )

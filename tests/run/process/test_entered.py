@@ -26,7 +26,7 @@ def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) ->
     """It may lie below ``/tmp``, which is another one there; what only the application names is not shown."""
     shown: list[Entered | None] = []
 
-    async def opened(_client: SandboxClient, _slot: Slot, _folder: Path, entered: Entered | None) -> None:
+    async def opened(_client: SandboxClient, _slot: Slot, _log: int, entered: Entered | None) -> None:
         shown.append(entered)
 
     monkeypatch.setattr(SandboxClient, "open", opened)
