@@ -1,6 +1,8 @@
 """What counts the processes of an application: an own user id, and control groups where there are some."""
 
 import os
+import subprocess
+import sys
 import time
 from contextlib import suppress
 from dataclasses import replace
@@ -10,6 +12,7 @@ import pytest
 
 from dodo_dsl.run.process import places, process_group
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
+from tests.run.desk import ROOT
 from tests.run.helpers import PASS, READY, WAIT, Bench
 
 as_root = pytest.mark.skipif(os.getuid() != 0, reason="who is no root has one user id")
@@ -45,6 +48,16 @@ def test_the_tests_own_limit_holds(tmp_path: Path, processes: int) -> None:
     else:
         assert outcome.outcome == "error", outcome
         assert outcome.reason.startswith("service 'app' could not be started: its sandbox cannot be set up: bwrap: ")
+
+
+@as_root
+@pytest.mark.proof
+def test_the_limit_holds_without_control_groups() -> None:
+    """The kernel then counts by user."""
+    hidden = ["bwrap", "--dev-bind", "/", "/", "--tmpfs", "/sys/fs/cgroup", "--cap-add", "ALL"]
+    test = [sys.executable, "-m", "pytest", "-q", f"{__file__}::test_the_tests_own_limit_holds"]
+    done = subprocess.run([*hidden, *test], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stdout
 
 
 @pytest.mark.slow
