@@ -9,7 +9,6 @@ import errno
 import os
 import shutil
 import socket
-import struct
 import subprocess
 import tempfile
 import time
@@ -44,6 +43,7 @@ class Capability:
 
 
 _RECEIVE_S = 1.0
+_CID = 254
 _BUSES = "225.0.0.0/24"
 """The groups of all sessions."""
 _NO_ROUTE = (errno.ENETUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL)
@@ -63,16 +63,11 @@ def namespaces() -> Iterator[Capability]:
 
 def multicast() -> Iterator[Capability]:
     """Whether a datagram to a multicast group is received."""
-    bus, mark = group(254), os.urandom(16)
-    membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
+    mark = os.urandom(16)
     try:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-            receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            receiver.bind(bus)
-            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        with host_isolation.joined(_CID) as receiver, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             receiver.settimeout(_RECEIVE_S)
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-                sender.sendto(mark, bus)
+            sender.sendto(mark, group(_CID))
             deadline = time.monotonic() + _RECEIVE_S
             while receiver.recv(65_535) != mark:
                 if time.monotonic() > deadline:

@@ -8,7 +8,7 @@ import shutil
 import socket
 import struct
 import subprocess
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -184,22 +184,28 @@ def is_claimed(name: str) -> bool:
     return claim is None
 
 
-def listen(cid: int, seconds: float = PROBE_S) -> str:
-    """The address of the first sender on a CID's group within ``seconds``; empty when nobody sends."""
+@contextlib.contextmanager
+def joined(cid: int) -> Iterator[socket.socket]:
+    """A socket that receives what is sent on a CID's group; raises OSError."""
     bus = group(cid)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            receiver.bind(bus)
-            membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
-            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-        except OSError as error:
-            raise BackendError(
-                f"multicast does not work on this machine ({error.strerror}); 'dodo doctor' says what to do"
-            ) from error
-        receiver.settimeout(seconds)
-        try:
+        receiver.bind(bus)
+        membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        yield receiver
+
+
+def listen(cid: int, seconds: float = PROBE_S) -> str:
+    """The address of the first sender on a CID's group within ``seconds``; empty when nobody sends."""
+    try:
+        with joined(cid) as receiver:
+            receiver.settimeout(seconds)
             _, (address, port) = receiver.recvfrom(65_535)
-        except TimeoutError:
-            return ""
-        return f"{address}:{port}"
+            return f"{address}:{port}"
+    except TimeoutError:
+        return ""
+    except OSError as error:
+        raise BackendError(
+            f"multicast does not work on this machine ({error.strerror}); 'dodo doctor' says what to do"
+        ) from error
