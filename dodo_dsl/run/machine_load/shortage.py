@@ -84,7 +84,7 @@ def _of_users(proc: Path, others: Collection[int]) -> Iterator[Shortage]:
             used[user] += number
             by_others[user] += number * (pid in others)
         for user in (os.getuid(),) if count is _threads else [user for user, _ in used.most_common(1)]:
-            if user not in range(places.FIRST, places.LAST + 1):
+            if not places.is_own(user):
                 yield _full(f"{what} of user {user}", used[user], limit, by_others[user])
 
 

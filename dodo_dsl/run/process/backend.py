@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from dodo_dsl import atomic
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.plan.added_services import TIME
@@ -26,18 +27,19 @@ from dodo_dsl.run.process.commands import Command, Commands, changes, needed_pat
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
+from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off
 from dodo_dsl.spec.model import VIRTUAL
 
+LOG = "sandbox.log"
 USE_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
-_OF_SANDBOX = ("bwrap:", "setpriv:")
-"""How lines of the programs begin that confine an application's."""
+_NO_PROGRAM = "bwrap: execvp "
+"""How bubblewrap says that it cannot start the application's program."""
 
 
 class ProcessBackend:
@@ -86,9 +88,7 @@ class ProcessBackend:
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
-        self._sandbox = SandboxClient(
-            isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
-        )
+        self._sandbox = SandboxClient(self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server)
 
     @property
     def is_on_host(self) -> bool:
@@ -102,7 +102,8 @@ class ProcessBackend:
             self._commands = replace(self._commands, time=time)
             needed += [time.library.parent, time.agent.parent]
         entered = None if self.is_on_host else Entered.with_own(container, *needed)
-        await self._sandbox.open(self.slot, self.report, entered)
+        with atomic.appended(self.report / LOG) as log:
+            await self._sandbox.open(self.slot, log.fileno(), entered)
 
     def _take(self, message: dict[str, Any]) -> None:
         if "started" in message:
@@ -138,9 +139,10 @@ class ProcessBackend:
             if self.is_on_host and MOUNT_GONE.match(said) and len(starts) < MOST_TRIES:
                 self._start(starts[-1])
                 return
-            is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
-            what = "its sandbox cannot be set up: " if is_of_sandbox else ""
-            self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
+            why = f"its sandbox cannot be set up: {said or f'exit code {code}'}"
+            if said.startswith(_NO_PROGRAM):
+                why = said.removeprefix(_NO_PROGRAM)
+            self._events.put_nowait(Unstartable(exited, why))
             self._conditions.failed(exited)
             return
         if used:
@@ -274,7 +276,7 @@ class ProcessBackend:
         limits = application.limits
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
-        confined = confinement(command.folder, self.isolation, self.cid, limits, hidden)
+        confined = confinement(command.folder, limits, hidden)
         if self._has_time:
             confined = replace(confined, time=self._commands.time_folder)
         return asdict(replace(confined, masked=command.masked))

@@ -8,17 +8,15 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
-                        {"do": "close"}; {"do": "probe"}; {"do": "send", "to", "data"};
+                        {"do": "close"}; {"do": "send", "to", "data"};
                         {"do": "relay", "cid"}; {"do": "line", "data"}; {"do": "listeners"};
                         {"do": "use", "names": services of which memory is measured, too};
                         {"do": "keep"} with the descriptors of outputs and logs
-    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
+    sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
                         {"relay": [host, port] of what sends lines, or null};
                         {"listeners": names of what listens on a bus, or null};
-                        {"use": snapshot or null};
-                        {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
-                        ``confined.missing`` has it}
+                        {"use": snapshot or null}
 """
 
 import contextlib
@@ -41,7 +39,7 @@ import msgspec
 from dodo_dsl.opendlv.relay import Relay
 from dodo_dsl.run.listeners import listening
 from dodo_dsl.run.machine_load.service_use import UseReader
-from dodo_dsl.run.process import confined_process, namespaces, places
+from dodo_dsl.run.process import namespaces, places
 from dodo_dsl.run.process.children import Children
 from dodo_dsl.run.process.confined_process import PERIOD_S
 from dodo_dsl.run.process.confinement import Confinement
@@ -49,6 +47,7 @@ from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.slot import Entered
 
+HOST = "host"
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
 UMASK = 0o022
@@ -58,12 +57,12 @@ UMASK = 0o022
 class Sandbox:
     """The main loop of the sandbox's process."""
 
-    def __init__(self, channel: socket.socket, isolation: str, forks: bool = False) -> None:
+    def __init__(self, channel: socket.socket, is_on_host: bool, forks: bool) -> None:
         """``forks`` means that this process has loaded what services need."""
         self.channel = channel
-        self.isolation = isolation
+        self.is_on_host = is_on_host
         self.forks = forks
-        umask = UMASK if isolation == "network" else -1
+        umask = -1 if is_on_host else UMASK
         self.use = UseReader()
         self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), umask)
         self.places: Places | None = None
@@ -107,7 +106,7 @@ class Sandbox:
                 if not self.keep:
                     break
                 sources.remove(self.channel)
-        self.children.end_all(self.isolation == "network" and os.getpid() == 1, self._wait)
+        self.children.end_all(not self.is_on_host, self._wait)
 
     def _drain_wakeup(self) -> None:
         with contextlib.suppress(BlockingIOError):
@@ -152,13 +151,9 @@ class Sandbox:
     def _confine(
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
-        if confined.isolation == "network" and self.places is None:
-            self.places = Places(places.own_user(confined.cid))
+        if self.places is None and not self.is_on_host:
+            self.places = Places(confined.folder, places.own_user())
         return self.children.confine(name, words, environment, output, confined, self.places)
-
-    def _do_probe(self, _descriptors: list[int]) -> None:
-        why = confined_process.confinement_problem()
-        self.send(probe=why, missing=confined_process.missing() if why else "")
 
     def _do_send(self, _descriptors: list[int], to: list[tuple[str, int]], data: str) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
@@ -221,10 +216,7 @@ def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
     child = os.fork()
     if child == 0:
         namespaces.die_with_parent(signal.SIGKILL)
-        if entered.process:
-            namespaces.furnish_entered(trees, entered.shown)
-        else:
-            namespaces.furnish(entered.shown)
+        namespaces.furnish(entered.shown, trees)
         return
     channel.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -234,22 +226,18 @@ def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
 
 
 def main(argv: list[str]) -> int:
-    """``sandbox DESCRIPTOR network|host [--forks] [--enter=JSON]``: serves the runner at the other end.
-
-    ``--enter`` is an ``Entered``.
-    """
+    """``sandbox DESCRIPTOR host|ENTERED [--forks]``: serves the runner at the other end."""
     channel = socket.socket(fileno=int(argv[0]))
-    isolation, outside, forks = argv[1], os.getpid(), "--forks" in argv
+    is_on_host, outside = argv[1] == HOST, os.getpid()
     try:
-        if isolation == "network":
-            _in_namespaces(channel, Entered.among(argv) or Entered.with_own(0))
+        if not is_on_host:
+            _in_namespaces(channel, Entered.of(argv[1]))
         else:
             namespaces.adopt_orphans()
     except OSError as error:
-        missing = confined_process.NAMESPACES if namespaces.refusal() else ""
-        channel.send(json.dumps({"down": str(error.strerror or error), "missing": missing}).encode())
+        channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
         return 1
-    sandbox = Sandbox(channel, isolation, forks)
+    sandbox = Sandbox(channel, is_on_host, "--forks" in argv)
     sandbox.send(up=outside)
     sandbox.run()
     return 0

@@ -8,7 +8,7 @@ import json
 import os
 import secrets
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -40,7 +40,6 @@ class Slot:
     key: bytes = field(default_factory=new_key, repr=False)
 
 
-_FLAG = "--enter="
 _VARIABLES = ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV", "HOME", "DODO_FIRMWARE")
 """Where DoDo's services find programs, libraries, settings and the emulated rig; no other variable shows a folder."""
 
@@ -64,17 +63,14 @@ class Entered:
         return cls(process, tuple(sorted({folder / parts[0] for folder, parts in inside if parts})))
 
     def word(self) -> str:
-        """The word of a sandbox's command line."""
-        return _FLAG + json.dumps([self.process, *map(str, self.shown)])
+        """For a sandbox's command line."""
+        return json.dumps([self.process, *map(str, self.shown)])
 
     @classmethod
-    def among(cls, words: Sequence[str]) -> Self | None:
-        """The one among the words of a sandbox's command line."""
-        for word in words:
-            if word.startswith(_FLAG):
-                process, *shown = json.loads(word.removeprefix(_FLAG))
-                return cls(process, tuple(map(Path, shown)))
-        return None
+    def of(cls, word: str) -> Self:
+        """As in a sandbox's command line."""
+        process, *shown = json.loads(word)
+        return cls(process, tuple(map(Path, shown)))
 
 
 def named_paths(words: Iterable[str]) -> list[Path]:
