@@ -17,6 +17,7 @@ from dodo_dsl.diagnostics import Diagnostic, Severity, Span
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, entries, part, path_of, plain, read
 from dodo_dsl.spec import rig
 from dodo_dsl.spec.manifest import MANIFEST
+from dodo_dsl.spec.registry import refuse_yaml
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.slips import mended
@@ -96,11 +97,15 @@ def build_command(prefix: str, tag: str, *names: str) -> str:
 
 
 def find_deployment(start: Path, paths: Iterable[Path] = ()) -> Path | None:
-    """The nearest ``dodo.yml`` at or above a folder; if there is none, the one that is above all ``paths``."""
+    """The nearest ``dodo.yml`` at or above a folder; if there is none, the one that is above all ``paths``.
+
+    Raises RegistryError for a ``dodo.yaml``.
+    """
     folder = start.resolve()
     for candidate in (folder, *folder.parents):
         if (candidate / FILE_NAME).is_file():
             return candidate / FILE_NAME
+        refuse_yaml((candidate / FILE_NAME).with_suffix(".yaml"))
     above = {find_deployment(path if path.is_dir() else path.parent) for path in paths}
     return above.pop() if len(above) == 1 else None
 

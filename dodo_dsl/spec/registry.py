@@ -17,8 +17,14 @@ SUFFIX = ".dodo.yml"
 MAX_FOLDERS = 10_000
 
 
-class RegistryTooLarge(Exception):
-    """A folder has too many folders below it to be a registry; one sentence."""
+class RegistryError(Exception):
+    """A folder is too large for a registry, or a file is named as DoDo does not read it; one sentence."""
+
+
+def refuse_yaml(path: Path) -> None:
+    """Raises RegistryError for a file that is called ``.yaml`` where DoDo reads ``.yml``, if it is there."""
+    if path.is_file():
+        raise RegistryError(f"'{shown_path(str(path))}' is not read: call it '{path.with_suffix('.yml').name}'")
 
 
 @dataclass(frozen=True, order=True)
@@ -34,13 +40,17 @@ class Location:
 
 
 def _specs_below(folder: Path) -> Iterator[Path]:
-    """The specs of a folder on its own file system, without hidden folders; raises RegistryTooLarge."""
+    """The specs of a folder on its own file system, without hidden folders; raises RegistryError."""
     found, device = [], folder.stat().st_dev
     for number, (place, folders, files) in enumerate(os.walk(folder), 1):
         if number > MAX_FOLDERS:
-            raise RegistryTooLarge(f"'{folder}' has more than {MAX_FOLDERS} folders: name the folder with the tests")
+            raise RegistryError(f"'{folder}' has more than {MAX_FOLDERS} folders: name the folder with the tests")
         folders[:] = [name for name in folders if not name.startswith(".") and _is_on(device, Path(place, name))]
-        specs = (Path(place, name) for name in files if name.endswith(SUFFIX) and not name.startswith("."))
+        names = [name for name in files if not name.startswith(".")]
+        for name in names:
+            if name.endswith(".dodo.yaml"):
+                refuse_yaml(Path(place, name))
+        specs = (Path(place, name) for name in names if name.endswith(SUFFIX))
         found += [path for path in specs if path.is_file()]
     yield from sorted(found)
 
@@ -73,7 +83,7 @@ def locate(
 ) -> tuple[list[Location], list[Path]]:
     """The specs at or below ``paths`` (all ``registries`` without any), and the paths without specs.
 
-    ``others`` are further registries, which are only the roots of specs. Raises RegistryTooLarge.
+    ``others`` are further registries, which are only the roots of specs. Raises RegistryError.
     """
     own = [r.resolve() for r in registries]
     roots = [*own, *(r.resolve() for r in others)]
