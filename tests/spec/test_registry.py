@@ -54,5 +54,5 @@ def test_an_empty_registry_is_not_reported(folder: Path) -> None:
 def test_a_file_of_the_other_suffix_is_refused(name: str, tmp_path: Path) -> None:
     (tmp_path / "tests" / "x").mkdir(parents=True)
     (tmp_path / name).touch()
-    with pytest.raises(RegistryError, match="is not read: call it '.*[.]yml'"):
+    with pytest.raises(RegistryError, match=r"is not read: call it '.*[.]yml'"):
         locate([tmp_path / "tests"], [find_deployment(tmp_path) or tmp_path])
