@@ -12,7 +12,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
-from dodo_dsl.application.construction import construction_of
+from dodo_dsl.application.construction import Construction
 from dodo_dsl.application.interpolation import filled, literal
 from dodo_dsl.application.model import (
     COMMANDS,
@@ -38,7 +38,9 @@ _HIGHEST = 254
 _INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 
 
-def application_problems(application: ApplicationSource, first: Span) -> Iterator[Diagnostic]:
+def application_problems(
+    application: ApplicationSource, construction: Construction, first: Span
+) -> Iterator[Diagnostic]:
     """Everything wrong with the services and their references; ``first`` is the place of the first service written."""
     if not application.services:
         message = "no service starts, because each one has a profile or is scaled to 0"
@@ -46,13 +48,10 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         return
     found: list[Diagnostic] = []
     of_stack = stack.parts(application)
-    construction = construction_of(application)
     for name, service in application.services.items():
-        own = [*_name(service), *_missing_program(service, application.folder)]
-        begin = len(construction.problems)
-        construction.service(service)
-        own += construction.problems[begin:]
-        del construction.problems[begin:]
+        container = construction.containers[name]
+        container.made()
+        own = [*_name(service), *_missing_program(service, application.folder), *container.problems]
         part = of_stack.get(name)
         found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(construction.check())
@@ -66,8 +65,8 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Services that depend on themselves, directly or through others."""
-    containers, services = dict(application.containers), application.services
-    needs = {n: {o for _, o in references(plain(s.node), containers) if o in services} for n, s in services.items()}
+    services = application.services
+    needs = {n: {other for _, other in references(plain(s.node)) if other in services} for n, s in services.items()}
     try:
         TopologicalSorter(needs).prepare()
     except CycleError as error:

@@ -187,14 +187,14 @@ Statements = tuple[tuple[str, str | None], ...]
 """The names and values of a file of variables, in order; None takes the value from outside."""
 
 
-def statements_of(file: Path, *, raw: bool = False) -> Statements:
+def statements_of(file: Path) -> Statements:
     """What a regular file sets; symlinks are not followed."""
-    return tuple(dotenv(text_of(file), raw=raw)[0])
+    return tuple(dotenv(text_of(file))[0])
 
 
-def dotenv_problems(file: Path, *, raw: bool = False) -> Iterator[Diagnostic]:
+def dotenv_problems(file: Path) -> Iterator[Diagnostic]:
     """What compose refuses in a file of variables; it shows nothing of the line, which may be a secret."""
-    if problem := dotenv(text_of(file), raw=raw)[1]:
+    if problem := dotenv(text_of(file))[1]:
         yield Diagnostic(Span(str(file), problem.line, 1, 0), "application-file", problem.what, problem.hint)
 
 

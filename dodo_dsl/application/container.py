@@ -10,23 +10,20 @@ from typing import TYPE_CHECKING, Any
 from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
 from dodo_dsl.application.compose_files import dotenv_problems
-from dodo_dsl.application.compose_merge import as_pairs, as_waits
 from dodo_dsl.application.compose_paths import escaped, filled_node
 from dodo_dsl.application.model import (
     FILES,
-    NAMESPACES,
     OFFSCREEN,
     SANDBOX,
     ComposeService,
-    borrowed,
     env_files,
     environment,
     plain,
-    reference,
     text,
 )
+from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import Part, spot
+from dodo_dsl.application.part import OFF, Part
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
 from dodo_dsl.source import Node, Scalar
@@ -47,12 +44,14 @@ class Container(Part):
     """The service while it is made."""
 
     def __init__(self, project: "Construction", service: ComposeService) -> None:
-        super().__init__(project, service.name, service.span)
+        super().__init__(project, service.name, service.span, [])
         self.service = service
         self.own: dict[str, Any] = {}
         variables = dict(project.setting.given)
         cids = dict.fromkeys(opendlv_flags.CID_VARIABLES, str(project.setting.cid))
         self.known = {**project.application.known, **variables, **cids}
+        node = service.node.get("volumes")
+        self.mounts = mounts(self, node) if node else []
 
     def made(self) -> dict[str, Any]:
         """What the container has."""
@@ -61,13 +60,12 @@ class Container(Part):
                 value = _CARRIED[key](self, entry.value) if not _is_null(entry.value) else None
                 self.own.update({} if value is None else {key: value})
             elif key in _REFUSED:
-                if not _is_off(entry.value):
-                    self.refuse(spot(entry), f"'{key}' of '{self.name}' {_REFUSED[key]}", _WITHOUT)
+                self.is_refused(key, entry, f"'{self.name}'", (_REFUSED[key], _WITHOUT))
             elif key in _LEFT_OUT:
-                self.left += [(key, entry.key)] if not _is_off(entry.value) else []
+                self.left += [(key, entry.key)] if plain(entry.value) not in OFF else []
             elif key != "profiles":
                 self.unknown_key(key, self.service.node, f"'{self.name}'", (*_CARRIED, *_REFUSED, *_LEFT_OUT))
-        for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
+        for step in (_own_environment, _own_mounts, limits.own_limits, _own_namespaces, _own_dependencies):
             step(self)
         if self.left:
             keys = list(dict.fromkeys(key for key, _ in self.left))
@@ -91,26 +89,23 @@ class Container(Part):
             self.bad(span, message, did_you_mean(name, others), fix)
         return name if name in others else ""
 
-    def joined(self, key: str, kind: str, name: str, span: Span) -> str:
-        """The same for the name of a service or of a container, which has to be one of the application."""
-        containers = self.project.application.containers
-        if kind == "container" and name not in containers:
+    def joined(self, key: str, word: str, span: Span) -> str:
+        """The same for ``service:x``; a container has to be one of the application, which reads as its service."""
+        kind, _, name = word.partition(":")
+        if kind == "container":
             message = f"'{key}' joins the container '{name}', which is not part of the application"
             self.refuse(span, message, "make it a service of the application")
             return ""
-        return self.other(key, containers[name] if kind == "container" else name, span)
+        return self.other(key, name, span)
 
 
+_RUNTIMES = ("nvidia", "runc", "runsc")
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 _WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"
 
 
 def _is_null(node: Node) -> bool:
     return isinstance(node, Scalar) and node.value is None
-
-
-def _is_off(node: Node) -> bool:
-    return plain(node) in (None, False, "", "false", [], {})
 
 
 def _command(c: Container, key: str, node: Node) -> Any:
@@ -141,17 +136,18 @@ def _healthcheck(c: Container, node: Node) -> Any:
 
 def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
+    for item in c.items(node):
+        c.fields(
+            item, f"'env_file' of '{c.name}'", "path required", "", {"format": ("is not read", "write NAME=value")}
+        )
     for file in env_files(c.service.node):
         if path := c.path(file.path, file.span):
             place = c.project.application.folder / file.path
-            for problem in dotenv_problems(place, raw=file.raw):
-                c.add(problem)
+            c.problems.extend(dotenv_problems(place))
             if file.required and not place.is_file():
                 hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
                 c.bad(file.span, f"there is no file '{file.path}'", hint)
-            about = {"path": path, **({} if file.required else {"required": False})}
-            about |= {"format": "raw"} if file.raw else {}
-            made.append(about if len(about) > 1 else path)
+            made.append(path if file.required else {"path": path, "required": False})
     return made
 
 
@@ -167,23 +163,25 @@ def _own_environment(c: Container) -> None:
 
 
 def _namespace(c: Container, key: str, node: Node) -> Any:
-    """Another service's namespace; that of a container of the application is its service's."""
+    """Another service's namespace."""
     word = c.literal(node) or ""
-    kind, name = reference(word)
-    if kind:
-        found = c.joined(key, kind, name, node.span)
+    if word.startswith(("service:", "container:")):
+        found = c.joined(key, word, node.span)
         return f"service:{found}" if found else None
     if key == "pid" and word == "host":
         c.refuse(node.span, "'pid: host' gives access to the processes of all tests", "remove it")
-    elif key == "network_mode" and word == "none":
-        return word
-    return None
+    return word if (key, word) == ("network_mode", "none") else None
 
 
 def _volumes_from(c: Container, node: Node) -> Any:
-    named = [(item, *borrowed(word)) for item in c.items(node) if (word := c.literal(item))]
-    made = [(c.joined("volumes_from", kind, name, item.span), options) for item, kind, name, options in named]
-    return [escaped(name + options) for name, options in made if name] or None
+    made = []
+    for item in c.items(node):
+        name, sign, options = (c.literal(item) or "").removeprefix("service:").partition(":")
+        if name == "container":
+            c.joined("volumes_from", f"{name}:{options}", item.span)
+        elif name and (found := c.other("volumes_from", name, item.span)):
+            made.append(escaped(found + sign + options))
+    return made or None
 
 
 def _networks(c: Container, node: Node) -> Any:
@@ -199,7 +197,7 @@ def _links(c: Container, node: Node) -> Any:
 
 
 def _depends_on(c: Container, node: Node) -> Any:
-    made, services = {}, source.entries(as_waits(node))
+    made, services = {}, source.entries(node)
     for name, entry in services.items():
         about = source.entries(entry.value)  # nothing of a test is restarted
         found = {key: plain(about[key].value) for key in ("condition", "required") if key in about}
@@ -217,7 +215,7 @@ def _depends_on(c: Container, node: Node) -> Any:
 
 
 def _sysctls(c: Container, node: Node) -> Any:
-    found = source.entries(as_pairs(node))
+    found = source.entries(node)
     is_own = c.project.setting.own_network
     return {key: plain(each.value) for key, each in found.items() if is_own or not key.startswith("net.")} or None
 
@@ -231,6 +229,29 @@ def _secrets(c: Container, node: Node, key: str) -> Any:
             message = f"'{c.name}' takes the {key[:-1]} '{word.text}', which the top-level '{key}' do not declare"
             c.bad(word.span, message, did_you_mean(word.text, known))
     return plain(node)
+
+
+def _runtime(c: Container, node: Node) -> Any:
+    word = c.literal(node)
+    if word not in (*_RUNTIMES, "", None):
+        message = f"the runtime '{word}' may not isolate the container"
+        c.refuse(node.span, message, f"remove it, or use one of {', '.join(_RUNTIMES)}")
+    return word if word in _RUNTIMES else None
+
+
+def _security(c: Container, node: Node) -> Any:
+    """Options of the engine's confinement, on a rig that allows them; without them it stays as it is."""
+    if c.project.setting.keeps_privileges:
+        return plain(node)
+    if not all(str(plain(item)).startswith("no-new-privileges") for item in c.items(node)):
+        c.left.append(("security_opt", c.service.node.entries["security_opt"].key))
+    return None
+
+
+def _own_mounts(c: Container) -> None:
+    settled = map(c.project.settled, c.mounts)
+    if made := {(mount.source, mount.target): mount.written() for mount in settled}:
+        c.own["volumes"] = list(made.values())
 
 
 def _own_namespaces(c: Container) -> None:
@@ -279,7 +300,6 @@ _CARRIED: dict[str, Key] = {
     "configs": lambda c, n: _secrets(c, n, "configs"),
     "depends_on": _depends_on,
     "deploy": limits.deploy,
-    "device_cgroup_rules": hardware.device_rules,
     "devices": hardware.devices,
     "entrypoint": lambda c, n: _command(c, "entrypoint", n),
     "env_file": _env_file,
@@ -290,14 +310,14 @@ _CARRIED: dict[str, Key] = {
     "links": _links,
     "networks": _networks,
     "privileged": hardware.privileged,
-    "runtime": hardware.runtime,
+    "runtime": _runtime,
     "secrets": lambda c, n: _secrets(c, n, "secrets"),
-    "security_opt": hardware.security,
+    "security_opt": _security,
     "sysctls": _sysctls,
     "tmpfs": limits.tmpfs,
     "ulimits": limits.ulimits,
     "volumes_from": _volumes_from,
-    "volumes": lambda c, n: mounts(c, n) or None,
+    "volumes": lambda c, n: None,
     **{key: lambda c, n, key=key: _namespace(c, key, n) for key in NAMESPACES},  # type: ignore[misc]
 }
 """What the container has for a key, by the key; None for nothing."""
@@ -310,7 +330,7 @@ _REFUSED = {
 }
 _LEFT_OUT = (
     "annotations", "attach", "blkio_config", "cgroup", "cgroup_parent", "container_name", "cpu_count", "cpu_percent",
-    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "isolation", "label_file",
+    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "device_cgroup_rules", "isolation", "label_file",
     "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness", "memswap_limit", "oom_kill_disable",
     "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop", "pull_policy", "pull_refresh_after", "restart",
     "scale", "storage_opt", "userns_mode", "uts",

@@ -110,14 +110,12 @@ class HostPaths:
             return NUL
         return "" if self.is_own(text) else f"'{written or text}' {self._where(text)}"
 
-    def mount_problem(self, text: str) -> tuple[str, str]:
-        """Why a path may not be mounted, and what to do; empty when it may, if only to be read."""
-        if "\0" in text:
-            return NUL, "remove it"
+    def mount_problem(self, text: str) -> tuple[str, str] | None:
+        """Why a path may not be mounted, if only to be read, and what to do."""
         if any(name in _WHOLE or _below(name, _OF_KERNEL) or _SOCKET.search(name) for name in self.names(text)):
             return f"'{text}' belongs to the host, so tests would share it", _WITHOUT
-        if self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
-            return "", ""
+        if self.is_own(text) or self.whole(text) in _PLAIN_DEVICES or self._is_to_read(text):
+            return None
         return f"'{text}' {self._where(text)}, so tests would share it", ASK
 
     @property
@@ -176,9 +174,6 @@ def real(path: str | Path) -> str:
 
 _WAYS = ("/dev/serial", "/dev/bus/usb")
 """Folders where a port has its other names, and where its USB device can be spoken to directly."""
-_TERMINALS = frozenset((*range(4, 6), 166, 188, 189, 204, 205))
-"""The kernel's numbers of serial ports and of USB devices (Documentation/admin-guide/devices.txt)."""
-_RULE = re.compile(r"[ac] ([0-9]+|\*):([0-9]+|\*) [rwm]+")
 
 
 def is_port(device: str, ports: Iterable[str]) -> bool:
@@ -193,28 +188,8 @@ def holds_port(folder: str, ports: Iterable[str]) -> bool:
     return is_port(folder, files) or any(_below(file, names) for file in files)
 
 
-def is_rule_for_port(written: object, ports: Iterable[str]) -> bool:
-    """Whether a rule of ``device_cgroup_rules`` lets a container open a port."""
-    found = _RULE.fullmatch(str(written))
-    files = list(_files(ports))
-    if found is None or not files:
-        return False
-    major, minor = found.groups()
-    return major == "*" or int(major) in _TERMINALS or (int(major), minor) in set(_numbers(files))
-
-
 def _files(ports: Iterable[str]) -> Iterator[str]:
     """All names of those ports that are device files."""
     for port in ports:
         if port.startswith("/"):
             yield from dict.fromkeys((os.path.normpath(port), real(port)))
-
-
-def _numbers(files: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """The kernel's numbers of ports that are there: of each one its own, and all others."""
-    for file in files:
-        try:
-            number = Path(file).stat().st_rdev
-        except OSError:
-            continue
-        yield from ((os.major(number), minor) for minor in (str(os.minor(number)), "*"))

@@ -4,10 +4,9 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_merge import as_pairs
 from dodo_dsl.application.compose_paths import escaped, is_local
 from dodo_dsl.application.model import environment, image_variable, plain, text
-from dodo_dsl.diagnostics import Diagnostic
+from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node
 
 if TYPE_CHECKING:
@@ -26,62 +25,49 @@ def image(c: "Container", node: Node) -> Any:
 
 
 def build(c: "Container", node: Node) -> Any:
-    image = c.service.node.get("image")
+    image, paths = c.service.node.get("image"), c.project.paths
     name = _AROUND_NAME.sub("", text(plain(image))) if image is not None else ""
     if name.startswith("dodo/") or name in _BASES:
         which = "one of DoDo's own" if name.startswith("dodo/") else "one on which others are built"
         c.refuse(node.span, f"the image '{name}' of '{c.name}' would replace {which}", "give the image another name")
-    if "image" not in c.service.node.entries:
+    if image is None:
         c.own["image"] = f"${{{image_variable(c.name)}:-}}"
     fields = c.fields(
-        node, f"the build of '{c.name}'",
-        "context dockerfile dockerfile_inline args target additional_contexts network platforms secrets extra_hosts",
-        "cache_from cache_to entitlements isolation labels no_cache no_cache_filter privileged provenance pull sbom"
-        " shm_size ssh tags ulimits",
-    ) if isinstance(node, source.Mapping) else {"context": node}  # fmt: skip
-    kept = ("dockerfile_inline", "target", "platforms", "secrets", "extra_hosts")
-    made = {key: plain(fields[key]) for key in kept if key in fields}
-    context = c.literal(fields["context"]) if "context" in fields else "."
-    if context is not None:
-        made = {"context": _context(c, fields.get("context"), context), **made}
-        own = c.project.paths
-        if is_local(context) and own.is_own(context) and not (own.folder / context).is_dir():
+        node, f"the build of '{c.name}'", "context dockerfile dockerfile_inline args target additional_contexts secrets",
+        "cache_from cache_to entitlements extra_hosts isolation labels no_cache no_cache_filter platforms privileged"
+        " provenance pull sbom shm_size ssh tags ulimits",
+        {"network": ("reaches services of the host", "remove it", "default", "none")},
+    )  # fmt: skip
+    made = {key: plain(fields[key]) for key in ("dockerfile_inline", "target", "secrets", "network") if key in fields}
+    if (context := c.literal(fields["context"]) if "context" in fields else ".") is not None:
+        span = fields["context"].span if "context" in fields else node.span
+        made = {"context": _context(c, span, context), **made}
+        if is_local(context) and paths.is_own(context) and not (paths.folder / context).is_dir():
             hint = "create it, or remove 'build'; paths are relative to this file"
             message = f"there is no folder '{context}'"  # a warning, as an image or a variable for it may stand in
-            c.add(Diagnostic(fields["context"].span, "application-file", message, hint, "warning"))
+            c.add(Diagnostic(span, "application-file", message, hint, "warning"))
         if "dockerfile" in fields and (file := c.literal(fields["dockerfile"])):
             if not context.startswith(_REMOTE):
                 c.path(file, fields["dockerfile"].span, base=context)
             made["dockerfile"] = escaped(file)
     if "args" in fields:
         made["args"] = _arguments(c, plain(fields["args"]))
-    if "additional_contexts" in fields:
-        made["additional_contexts"] = {
-            name: _context(c, each.value, word)
-            for name, each in source.entries(as_pairs(fields["additional_contexts"])).items()
-            if (word := c.literal(each.value)) is not None
-        }  # fmt: skip
-    network = c.literal(fields["network"]) if "network" in fields else None
-    if network not in ("", "default", "none", None):
-        message = f"a build of '{c.name}' on the network '{network}' reaches services of the host"
-        c.refuse(fields["network"].span, message, "remove it")
-    elif network:
-        made["network"] = network
+    others = source.entries(fields.get("additional_contexts"))
+    if found := {name: _context(c, e.value.span, word) for name, e in others.items() if (word := c.literal(e.value))}:
+        made["additional_contexts"] = found
     return made
 
 
-def _context(c: "Container", node: Node | None, context: str) -> str:
+def _context(c: "Container", span: Span, context: str) -> str:
     """What is built: a folder of the repository, an image or a URL."""
     paths = c.project.paths
     is_here = any((place / context).exists() for place in (paths.folder, *paths.roots)) if "\0" not in context else True
     if context.startswith(_REMOTE) and ".." not in context.split("/") and not is_here:
         return escaped(context)
-    span = node.span if node is not None else c.span
-    problem = f"'{context}' is of a kind that may be a file of the host" if "://" in context else ""
-    if problem := problem or paths.file_problem(context):
-        c.refuse(span, problem, "keep it in the repository, or allow it with 'paths' in dodo.yml")
-    c.project.show(context, span)
-    return escaped(c.project.rebased(context))
+    if "://" in context:
+        c.refuse(span, f"'{context}' is of a kind that may be a file of the host", "keep it in the repository")
+        return ""
+    return c.path(context, span) or ""
 
 
 def _arguments(c: "Container", written: Any) -> dict[str, str | None]:

@@ -10,7 +10,6 @@ from dodo_dsl import source
 from dodo_dsl.application.compose_paths import escaped
 from dodo_dsl.application.hardware import gpus
 from dodo_dsl.source import Node
-from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 if TYPE_CHECKING:
     from dodo_dsl.application.container import Container
@@ -21,8 +20,7 @@ _SIZE = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?)\s*([kmgtp]?)(?:i?b)?\s*", re.I
 _OF_SANDBOX = {"fsize": "file-size", "nofile": "files", "memlock": "memory"}
 _MESSAGE_QUEUES = 819_200
 """The kernel's default, in bytes (RLIMIT_MSGQUEUE)."""
-_SIZES_OF_TMPFS = ("size=", "nr_blocks=")
-_TMPFS_OPTIONS = re.compile(r"(size|mode|uid|gid|nr_inodes|nr_blocks)=[\w%]+|nosuid|nodev|noexec|exec|rw|ro|noatime")
+_TMPFS_OPTIONS = re.compile(r"(mode|uid|gid)=\w+|nosuid|nodev|noexec|exec|rw|ro|noatime")
 LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
 """What is kept of a service's log: two files of 50 MB."""
 
@@ -59,16 +57,6 @@ def limit(
     return int(value) if float(value).is_integer() else value
 
 
-def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
-    """Options of a file system in memory, as mount(8) reads them, with a size; whether that was cut; an unknown one."""
-    words = [word.strip() for word in options.split(",") if word.strip()]
-    unknown = next((word for word in words if not _TMPFS_OPTIONS.fullmatch(word)), "")
-    sizes = [word for word in words if word.startswith(_SIZES_OF_TMPFS)]
-    if sizes and all(0 < size(word.removeprefix("size=")) <= limits.memory for word in sizes):
-        return ",".join(words), False, unknown
-    return ",".join([*(word for word in words if word not in sizes), f"size={limits.memory}"]), bool(sizes), unknown
-
-
 def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
     """Highest limits of a process, those of the test and no core dumps where it sets none.
 
@@ -102,37 +90,29 @@ def deploy(c: "Container", node: Node) -> Any:
     """Limits as those of the service, and reservations of graphics processors."""
     what = f"'deploy' of '{c.name}'"
     left = "endpoint_mode labels mode replicas rollback_config update_config placement restart_policy"
-    resources = c.fields(node, what, "resources", left).get("resources")
-    parts = c.fields(resources, f"'resources' of '{c.name}'", "limits reservations")
-    own = c.fields(parts.get("limits"), f"'limits' of '{c.name}'", "cpus memory pids")
+    resources = c.fields(c.fields(node, what, "resources", left).get("resources"), what, "limits reservations")
+    own = c.fields(resources.get("limits"), what, "cpus memory pids")
     for key, name in (("cpus", "cpus"), ("memory", "mem_limit"), ("pids", "pids_limit")):
         if key in own:
             c.own[name] = LIMITS[name](c, own[key])
-    reserved = c.fields(
-        parts.get("reservations"), f"'reservations' of '{c.name}'", "devices", "cpus memory generic_resources"
-    )
+    reserved = c.fields(resources.get("reservations"), what, "devices", "cpus memory generic_resources")
     found = gpus(c, reserved["devices"]) if "devices" in reserved else None
     return {"resources": {"reservations": {"devices": found}}} if found else None
 
 
-def cpus(c: "Container", node: Node) -> Any:
-    return limit(c, node, float("inf") if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus")
-
-
 def tmpfs(c: "Container", node: Node) -> Any:
-    made = []
+    """File systems in memory, each with a size; other options than those that are known stay out."""
+    made, most = [], c.limits.memory
     for item in c.items(node):
-        if not (word := c.literal(item)):
-            continue
-        target, _, options = word.partition(":")
-        allowed, is_cut, unknown = tmpfs_options(options, c.limits)
-        if unknown:
-            message = f"a tmpfs of '{c.name}' has the unknown option '{unknown}'"
-            c.refuse(item.span, message, "name a size, mode, uid or gid")
-            continue
-        if is_cut:
-            c.cut(item.span, "tmpfs", c.limits.memory, "memory")
-        made.append(escaped(f"{target}:{allowed}"))
+        target, _, options = (c.literal(item) or "").partition(":")
+        words = [word.strip() for word in options.split(",") if word.strip()]
+        sizes = [word for word in words if word.startswith(("size=", "nr_blocks="))]
+        wanted = [size(word.removeprefix("size=")) for word in sizes] or [most]
+        if not all(0 < one <= most for one in wanted):
+            c.cut(item.span, "tmpfs", most, "memory")
+            wanted = [most]
+        kept = [word for word in words if _TMPFS_OPTIONS.fullmatch(word)]
+        made += [escaped(f"{target}:{','.join([*kept, f'size={int(wanted[-1])}'])}")] if target else []
     return made or None
 
 
@@ -145,9 +125,7 @@ def own_limits(c: "Container") -> None:
     if "ulimits" not in own:
         own["ulimits"] = ulimits(c)
     if not c.project.setting.keeps_privileges:
-        words = own.get("security_opt") or []
-        if not any(str(word).startswith("no-new-privileges") for word in words):
-            own["security_opt"] = [*words, "no-new-privileges:true"]
+        own["security_opt"] = ["no-new-privileges:true"]
         dropped = [str(word) for word in own.get("cap_drop") or ()]
         taken = {word.upper().removeprefix("CAP_") for word in dropped}
         own["cap_drop"] = [*dropped, *(name for name in _DROPPED if not taken & {name, "ALL"})]
@@ -155,7 +133,7 @@ def own_limits(c: "Container") -> None:
 
 
 LIMITS: dict[str, Callable[["Container", Node], Any]] = {
-    "cpus": cpus,
+    "cpus": lambda c, n: limit(c, n, math.inf if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus"),
     "mem_limit": lambda c, n: limit(c, n, c.limits.memory, "mem_limit", "memory", size),
     "pids_limit": lambda c, n: limit(c, n, c.limits.processes, "pids_limit", "processes", whole),
     "shm_size": lambda c, n: limit(c, n, c.limits.memory, "shm_size", "memory", size),

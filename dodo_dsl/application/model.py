@@ -14,6 +14,7 @@ from dodo_dsl import source
 from dodo_dsl.application.compose_files import Statements, is_late, statements_of
 from dodo_dsl.application.host_paths import HostPaths, repository
 from dodo_dsl.application.interpolation import literal
+from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.opendlv_flags import split
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node, Scalar
@@ -26,7 +27,6 @@ KEYS = ("x-dodo", "x-dodo-process")
 OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
 """The variable by which programs that draw with Qt need no display."""
 COMMANDS = ("x-dodo-process", "entrypoint", "command")
-NAMESPACES = ("network_mode", "ipc", "pid")
 _FALSE = ("false", "f", "0", "no", "n", "off", "")
 
 _ABOUT_NO_MESSAGES = {"tune", "cid", "display", "timed"}
@@ -86,15 +86,11 @@ class Declared:
 
 @dataclass(frozen=True)
 class EnvFile:
-    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file.
-
-    ``raw`` is the format whose values are as they are written.
-    """
+    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file."""
 
     path: str
     span: Span
     required: bool
-    raw: bool = False
 
 
 @dataclass(frozen=True)
@@ -145,7 +141,7 @@ class ApplicationSource:
     """The merged compose files, which are all that rules and the planner see of the application.
 
     ``services`` are those that start, by name. Paths are relative to ``folder``. ``dropped`` has the reasons why
-    services do not start, by name, ``containers`` the services by their ``container_name``, and ``secrets`` the
+    services do not start, by name, ``shown`` the paths of the host that it asks for, and ``secrets`` the
     files that set variables which no compiled test holds. ``known`` are all variables whose values are known,
     ``access`` is what the deployment allows, ``limits`` are the highest that the services may set. ``named`` are the
     files as ``dodo.yml`` names them, ``without`` the services that it leaves out. ``cids`` are declared to be built
@@ -155,7 +151,7 @@ class ApplicationSource:
     path: Path
     services: Mapping[str, ComposeService]
     dropped: Mapping[str, str] = field(default_factory=dict)
-    containers: Mapping[str, str] = field(default_factory=dict)
+    shown: tuple[tuple[str, Span, str], ...] = ()
     secrets: Mapping[str, Path] = field(default_factory=dict)
     known: Mapping[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
@@ -224,36 +220,18 @@ def is_true(value: object) -> bool:
     return value is True or (isinstance(value, str) and value.strip().lower() not in _FALSE)
 
 
-def reference(value: object) -> tuple[str, str]:
-    """``service:x`` and ``container:x`` as kind and name; two empty strings for other values."""
-    kind, sign, name = str(value or "").partition(":")
-    return (kind, name) if sign and kind in ("service", "container") else ("", "")
-
-
-def borrowed(entry: object) -> tuple[str, str, str]:
-    """An entry of ``volumes_from`` as kind, name and options."""
-    kind, name = reference(entry)
-    name, sign, options = (name if kind else str(entry)).partition(":")
-    return kind or "service", name, sign + options
-
-
-def references(service: dict[str, Any], containers: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """The services that a service needs, each with its key; containers of the application count as its services."""
+def references(service: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """The services that a service needs, each with its key."""
     for key in NAMESPACES:
-        kind, name = reference(service.get(key))
-        if kind == "service" or name in containers:
-            yield key, containers.get(name, name) if kind == "container" else name
-    for entry in service.get("volumes_from") or ():
-        kind, name, _ = borrowed(entry)
-        if kind == "service" or name in containers:
-            yield "volumes_from", containers.get(name, name) if kind == "container" else name
-    for link in service.get("links") or ():
-        yield "links", str(link).partition(":")[0]
-    waits = service.get("depends_on") or {}
-    for name in waits:
-        options = waits[name] if isinstance(waits, dict) else {}
+        kind, _, name = str(service.get(key)).partition(":")
+        if kind == "service":
+            yield key, name
+    for key, prefix in (("volumes_from", "service:"), ("links", "")):
+        names = (str(entry).removeprefix(prefix).partition(":")[0] for entry in service.get(key) or ())
+        yield from ((key, name) for name in names if name != "container")
+    for name, options in (service.get("depends_on") or {}).items():
         if not isinstance(options, dict) or options.get("required") is not False:
-            yield "depends_on", str(name)
+            yield "depends_on", name
 
 
 def plain(node: Node) -> Any:
@@ -280,11 +258,8 @@ def text(value: object) -> str:
 
 
 def environment(raw: Any) -> dict[str, str | None]:
-    """``environment`` as a map; None takes the value from DoDo's own environment."""
-    if isinstance(raw, list):
-        pairs = (str(item).partition("=") for item in raw)
-        return {name: value if sign else None for name, sign, value in pairs}
-    return {str(k): None if v is None else text(v) for k, v in (raw or {}).items()}
+    """``environment`` with texts; None takes the value from DoDo's own environment."""
+    return {name: None if value is None else text(value) for name, value in (raw or {}).items()}
 
 
 def words_of(node: Node | None) -> Iterator[tuple[str, Scalar]]:
@@ -344,23 +319,16 @@ def image_variable(service: str) -> str:
 def env_files(service: source.Mapping) -> Iterator[EnvFile]:
     """The files of ``env_file``."""
     node = service.get("env_file")
-    for item in node.items if isinstance(node, source.Sequence) else (node,):
-        about = item.get if isinstance(item, source.Mapping) else {"path": item}.get
-        path, required, form = about("path"), about("required"), about("format")
+    for item in node.items if isinstance(node, source.Sequence) else ():
+        path, required = source.part(item, "path"), source.part(item, "required")
         if isinstance(path, Scalar) and isinstance(path.value, str):
-            optional = isinstance(required, Scalar) and not is_true(required.value)
-            yield EnvFile(
-                literal(path.text) or path.text,
-                path.span,
-                not optional,
-                isinstance(form, Scalar) and form.value == "raw",
-            )
+            is_required = not isinstance(required, Scalar) or is_true(required.value)
+            yield EnvFile(literal(path.text) or path.text, path.span, is_required)
 
 
 def file_statements(files: Iterable[EnvFile], folder: Path) -> tuple[Statements, ...]:
     """What files next to the compose file set, in order."""
-    own = (file for file in files if not file.path.startswith(("/", "~")))
-    return tuple(statements_of(folder / file.path, raw=file.raw) for file in own)
+    return tuple(statements_of(folder / file.path) for file in files if not file.path.startswith(("/", "~")))
 
 
 def with_entry(node: source.Mapping, key: str, value: Node) -> source.Mapping:

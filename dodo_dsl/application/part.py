@@ -15,16 +15,20 @@ from dodo_dsl.spec.sandbox_limits import SandboxLimits
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
 
-NO_PORT = "is left out of all tests: only the service that moves the rig opens its port"
-WITHOUT_HARDWARE = "is left out of sil and dil tests, which have no hardware"
 ASK_KEY = "your own keys begin with x-, such as x-{}; docs/reference/compose-keys.md has compose's"
+
+OFF = (None, False, "", "false", [], {})
+"""Values of keys that say nothing."""
+Refused = tuple[str, ...]
+"""Why a key is refused, what to write instead, and the values that are not."""
+NOTHING: Mapping[str, Refused] = {}
 
 
 class Part:
     """A service, a volume, a secret or a config, by its ``name``; ``span`` is the place of its key."""
 
-    def __init__(self, project: "Construction", name: str, span: Span) -> None:
-        self.project, self.name, self.span = project, name, span
+    def __init__(self, project: "Construction", name: str, span: Span, problems: list[Diagnostic]) -> None:
+        self.project, self.name, self.span, self.problems = project, name, span, problems
         self.left: list[tuple[str, Span]] = []
         """The keys that a test does not carry, each with its place."""
 
@@ -33,7 +37,7 @@ class Part:
         return self.project.setting.limits
 
     def add(self, problem: Diagnostic) -> None:
-        self.project.problems.append(problem)
+        self.problems.append(problem)
 
     def bad(self, span: Span, message: str, hint: str = "", fix: Fix | None = None) -> None:
         self.add(Diagnostic(span, "application-file", message, hint, fix=fix))
@@ -89,7 +93,7 @@ class Part:
         yield from (i for i in (node.items if isinstance(node, source.Sequence) else (node,)) if _is_set(i))
 
     def fields(
-        self, node: Node | None, what: str, known: str, left_out: str = "", *, refused: Mapping[str, str] | None = None
+        self, node: Node | None, what: str, known: str, left_out: str = "", refused: Mapping[str, Refused] = NOTHING
     ) -> dict[str, Node]:
         """The fields of a mapping that a test carries; problems of those that it cannot have, and of unknown ones."""
         found: dict[str, Node] = {}
@@ -97,14 +101,22 @@ class Part:
         for key, entry in source.entries(node).items():
             if key in words:
                 found.update({key: entry.value} if _is_set(entry.value) else {})
-            elif refused and key in refused:
-                if not (isinstance(entry.value, Scalar) and entry.value.value in (None, False, "")):
-                    self.refuse(spot(entry), f"'{key}' of {what} cannot be isolated: {refused[key]}", "remove it")
+            elif key in refused:
+                found.update({} if self.is_refused(key, entry, what, refused[key]) else {key: entry.value})
             elif key in gone:
                 self.left.append((key, entry.key))
             elif isinstance(node, source.Mapping):
-                self.unknown_key(key, node, what, (*words, *gone, *(refused or ())))
+                self.unknown_key(key, node, what, (*words, *gone, *refused))
         return found
+
+    def is_refused(self, key: str, entry: source.Entry, what: str, refused: Refused) -> bool:
+        """Whether a key says anything but a value that a test has; a problem where something else would run."""
+        why, fix, *allowed = refused
+        if plain(entry.value) in allowed:
+            return False
+        if plain(entry.value) not in OFF:
+            self.refuse(spot(entry), f"'{key}' of {what} {why}", fix)
+        return True
 
 
 def spot(entry: source.Entry) -> Span:

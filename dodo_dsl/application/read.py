@@ -3,6 +3,7 @@
 import itertools
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,10 @@ from dodo_dsl.application import declarations as declared
 from dodo_dsl.application import secret_problems
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles
+from dodo_dsl.application.construction import Construction, Setting
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.load import as_item, load, unread
+from dodo_dsl.application.merge import normal
 from dodo_dsl.application.model import (
     Access,
     ApplicationSource,
@@ -71,16 +74,15 @@ def read_application(
         return None, found
     root = Path(access.roots[0]) if access.roots else None
     dropped = {name: why for name, entry in services.items() if (why := _why_dropped(plain(entry.value)))}
-    kept = {
-        name: _service(name, entry, files, paths[0].resolve().parent)
-        for name, entry in services.items()
-        if name not in dropped
-    }
+    started = {name: entry for name, entry in services.items() if name not in dropped}
+    named = {name: source.part(entry.value, "container_name") for name, entry in started.items()}
+    containers = {node.text: name for name, node in named.items() if isinstance(node, source.Scalar)}
+    folder = paths[0].resolve().parent
+    kept = {name: _service(name, entry, files, folder, containers) for name, entry in started.items()}
     application = ApplicationSource(
         path=paths[0].resolve(),
         services=kept,
         dropped={**dropped, **gone},
-        containers={str(c): n for n, s in kept.items() if (c := plain(s.node).get("container_name"))},
         secrets=files.secrets,
         known={name: value for name, value in files.known.items() if name not in files.secrets},
         access=access,
@@ -91,7 +93,9 @@ def read_application(
         cids=tuple(filter(None, map(declared_cid, [document, *(service.node for service in kept.values())]))),
     )
     found.extend(() if "COMPOSE_FILE" in files.known else unread(paths, root))
-    found.extend(application_problems(application, next(iter(services.values())).key))
+    construction = Construction(application, Setting(1, "network", application.folder, limits=limits))
+    found.extend(application_problems(application, construction, next(iter(services.values())).key))
+    application = replace(application, shown=tuple(construction.shown))
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
     nodes = [*(service.node for service in application.services.values()), *application.rest.values()]
@@ -114,9 +118,9 @@ def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
             yield Diagnostic(Span(str(path)), "application-isolation", message, INSIDE)
 
 
-def _service(name: str, entry: Entry, files: ComposeFiles, folder: Path) -> ComposeService:
-    node = entry.value
-    assert isinstance(node, source.Mapping)
+def _service(name: str, entry: Entry, files: ComposeFiles, folder: Path, containers: dict[str, str]) -> ComposeService:
+    assert isinstance(entry.value, source.Mapping)
+    node = normal(entry.value, containers)
     raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
     node = with_values(node, raw, files.known, files.is_late)
     own = tuple(env_files(node))

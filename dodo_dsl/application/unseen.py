@@ -4,7 +4,6 @@ import os
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from dodo_dsl.application.construction import construction_of
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment import Deployment
@@ -29,11 +28,7 @@ def unseen_problems(
 ) -> Iterator[Diagnostic]:
     """Mounts, configs, secrets, files of variables and builds' contexts in a folder that no application sees."""
     hidden = unseen_folders(application, deployment, registries)
-    construction = construction_of(application)
-    for service in application.services.values():
-        construction.service(service)
-    construction.rest()
-    for source, span, _ in construction.shown:
+    for source, span, _ in application.shown:
         if application.paths.is_writable(source):
             continue
         names = map(Path, application.paths.names(source))

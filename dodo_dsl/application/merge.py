@@ -1,13 +1,17 @@
-"""Compose files merged as ``docker compose -f a.yml -f b.yml`` does (compose specification, chapter 13)."""
+"""Compose files merged as ``docker compose -f a.yml -f b.yml`` does (compose specification, chapter 13).
+
+Keys that may be written in several forms are brought into one: to be merged, and once more for all that reads them.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
 
+from dodo_dsl.application.compose_paths import is_path
 from dodo_dsl.application.interpolation import split_outside
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, plain
 
 Path = tuple[str, ...]
-
+NAMESPACES = ("network_mode", "ipc", "pid")
 _OUTSIDE = ("",)
 
 
@@ -30,6 +34,31 @@ def settled(node: Node) -> Node:
     if isinstance(node, Sequence):
         return Sequence(node.span, tuple(settled(i) for i in node.items if i.tag != "!reset"), tag)
     return replace(node, tag=tag) if node.tag else node
+
+
+def normal(service: Mapping, containers: dict[str, str]) -> Mapping:
+    """A service with one form of each key; a container of the application is its service, by ``containers``."""
+
+    def own(node: Node) -> Node:
+        if isinstance(node, Sequence):
+            return replace(node, items=tuple(map(own, node.items)))
+        kind, *rest = node.text.split(":", 2) if isinstance(node, Scalar) else ("",)
+        if kind != "container" or rest[0] not in containers:
+            return node
+        text = ":".join(["service", containers[rest[0]], *rest[1:]])
+        return Scalar(node.span, text, text)
+
+    def formed(node: Node, place: Path) -> Node:
+        if place in _FORMS and not (isinstance(node, Scalar) and node.value is None):
+            node = _FORMS[place](node)
+        if place in ((), ("build",)) and isinstance(node, Mapping):
+            entries = {key: Entry(e.key, formed(e.value, (*place, key))) for key, e in node.entries.items()}
+            return replace(node, entries=entries)
+        return own(node) if place[0] in (*NAMESPACES, "volumes_from") else node
+
+    made = formed(service, ())
+    assert isinstance(made, Mapping)
+    return made
 
 
 def _merge(base: Node, over: Node, path: Path) -> Node:
@@ -78,7 +107,7 @@ def _target(item: Node) -> str:
     return parts[1] if len(parts) > 1 else parts[0]
 
 
-def as_pairs(node: Node) -> Node:
+def _as_pairs(node: Node) -> Node:
     """``[A=1, B]`` as ``{A: 1, B: null}``."""
     if not isinstance(node, Sequence):
         return node
@@ -101,36 +130,70 @@ def _as_hosts(node: Node) -> Node:
     return Sequence(node.span, tuple(Scalar(span, text, text) for span, text in texts))
 
 
-def as_waits(node: Node) -> Node:
+def _as_keys(node: Node) -> Node:
+    """``[a]`` as ``{a: }``."""
+    return _each(node, lambda item: Scalar(item.span, None, ""))
+
+
+def _as_waits(node: Node) -> Node:
     """``[a]`` as ``{a: {condition: service_started}}``."""
-    started = Scalar(node.span, "service_started", "service_started")
-    return _as_keys(node, Mapping(node.span, {"condition": Entry(node.span, started)}))
+    return _each(node, lambda item: _as_fields(item, condition="service_started"))
 
 
-def _as_keys(node: Node, value: Node | None = None) -> Node:
-    """``[a]`` as ``{a: }``, or with another value."""
+def _each(node: Node, made: Callable[[Scalar], Node]) -> Node:
     if not isinstance(node, Sequence):
         return node
-    empty = value or Scalar(node.span, None, "")
-    return Mapping(node.span, {i.text: Entry(i.span, empty) for i in node.items if isinstance(i, Scalar)})
+    return Mapping(node.span, {i.text: Entry(i.span, made(i)) for i in node.items if isinstance(i, Scalar)})
+
+
+def _as_fields(node: Node, **fields: str | bool | Node) -> Mapping:
+    """A short form as fields, each in the place of the whole."""
+    values = {k: v if isinstance(v, Mapping) else Scalar(node.span, v, str(v)) for k, v in fields.items()}
+    return Mapping(node.span, {key: Entry(node.span, value) for key, value in values.items()})
 
 
 def _as_build(node: Node) -> Node:
     return Mapping(node.span, {"context": Entry(node.span, node)}) if isinstance(node, Scalar) else node
 
 
+def _as_files(node: Node) -> Node:
+    """``a.env`` as ``[{path: a.env}]``."""
+    items = node.items if isinstance(node, Sequence) else (node,)
+    return Sequence(node.span, tuple(_as_fields(i, path=i.text) if isinstance(i, Scalar) else i for i in items))
+
+
+def _as_mounts(node: Node) -> Node:
+    """``[./a:/b:ro]`` as ``[{type: bind, source: ./a, target: /b, read_only: true}]``."""
+    if not isinstance(node, Sequence):
+        return node
+    return replace(node, items=tuple(_as_mount(item) if isinstance(item, Scalar) else item for item in node.items))
+
+
+def _as_mount(item: Scalar) -> Node:
+    source, target, options, *_ = [*split_outside(item.text, ":"), "", ""]
+    if ":" not in item.text:
+        return _as_fields(item, type="volume", target=item.text)
+    words = options.split(",")
+    is_read = [word for word in words if word in ("ro", "rw")][-1:] == ["ro"]
+    about = {"volume": _as_fields(item, nocopy=True)} if "nocopy" in words else {}
+    kind = "bind" if is_path(source) else "volume"
+    return _as_fields(item, type=kind, source=source, target=target, read_only=is_read, **about)
+
+
 _REPLACED = {("command",), ("entrypoint",), ("healthcheck", "test")}
 _BY_TARGET = {("volumes",), ("devices",), ("secrets",), ("configs",)}
 _LISTS = (
-    "cap_add", "cap_drop", "device_cgroup_rules", "dns", "dns_opt", "dns_search", "env_file", "expose",
-    "group_add", "links", "profiles", "security_opt", "tmpfs", "volumes_from",
+    "cap_add", "cap_drop", "device_cgroup_rules", "dns", "dns_opt", "dns_search", "expose", "group_add", "links",
+    "profiles", "security_opt", "tmpfs", "volumes_from",
 )  # fmt: skip
 _FORMS: dict[Path, Callable[[Node], Node]] = {
-    **{(key,): as_pairs for key in ("environment", "sysctls")},
-    **{("build", key): as_pairs for key in ("args", "additional_contexts")},
+    **{(key,): _as_pairs for key in ("environment", "sysctls")},
+    **{("build", key): _as_pairs for key in ("args", "additional_contexts")},
     **{(key,): _as_list for key in _LISTS},
     ("build",): _as_build,
-    ("depends_on",): as_waits,
-    ("networks",): _as_keys,
+    ("depends_on",): _as_waits,
+    ("env_file",): _as_files,
     ("extra_hosts",): _as_hosts,
+    ("networks",): _as_keys,
+    ("volumes",): _as_mounts,
 }
