@@ -10,21 +10,21 @@ from dodo_dsl.application.interpolation import filled
 from dodo_dsl.source import Entry, Node, Scalar
 
 Place = tuple[str, ...]
-Change = Callable[[Scalar, Place, Node | None], str]
+Change = Callable[[Scalar, Place], str]
 
 _REMOTE = ("/", "~", "$", "git@", "github.com/", "service:", "target:")
 
 
-def changed(node: Node, change: Change, place: Place = (), holder: Node | None = None) -> Node:
-    """A node with each text changed, by the keys that lead to it and by what holds it; every part keeps its place."""
+def changed(node: Node, change: Change, place: Place = ()) -> Node:
+    """A node with each text changed, by the keys that lead to it; every part keeps its place."""
     if isinstance(node, source.Mapping):
-        entries = {k: Entry(e.key, changed(e.value, change, (*place, k), node)) for k, e in node.entries.items()}
+        entries = {k: Entry(e.key, changed(e.value, change, (*place, k))) for k, e in node.entries.items()}
         return replace(node, entries=entries)
     if isinstance(node, source.Sequence):
-        return replace(node, items=tuple(changed(item, change, place, node) for item in node.items))
+        return replace(node, items=tuple(changed(item, change, place) for item in node.items))
     if not isinstance(node.value, str):
         return node
-    text = change(node, place, holder)
+    text = change(node, place)
     return node if text == node.value else replace(node, value=text, text=text)
 
 
@@ -34,32 +34,18 @@ def filled_node(node: Node, known: Mapping[str, str], late: Callable[[str], bool
 
 
 def relocated(document: source.Mapping, base: str) -> Node:
-    """A file with its paths as seen from the folder from which ``base`` leads to its own."""
+    """A file in normal form with its paths as seen from the folder from which ``base`` leads to its own."""
 
-    def moved(word: Scalar, place: Place, holder: Node | None) -> str:
-        text, key = str(word.value), (place[0], *place[2:4]) if place else ()
-        if key in _PATHS or (key in _BINDS and _is_bind(holder, _BINDS[key])):
-            return rebased(text, base)
-        if key == ("services", "build", "additional_contexts") and len(place) == len(key) + 1:
-            name, sign, path = text.partition("=")
-            return name + sign + rebased(path, base)
-        if key == ("services", "volumes"):
-            origin, sign, rest = text.partition(":")
-            return f"{rebased(origin, base)}{sign}{rest}" if sign and is_path(origin) else text
-        return rebased(text, base) if key == ("services", "build", "additional_contexts") else text
+    def moved(word: Scalar, place: Place) -> str:
+        text, key = str(word.value), (place[0], *place[2:]) if place else ()
+        is_mount = key == ("services", "volumes", "source") and is_path(text)
+        return rebased(text, base) if key in _PATHS or key[:3] == _CONTEXTS or is_mount else text
 
     return changed(document, moved)
 
 
-_PATHS = {("services", "build"), ("services", "build", "context"), ("services", "env_file"),
-          ("services", "env_file", "path"), ("secrets", "file"), ("configs", "file")}  # fmt: skip
-_BINDS = {("services", "volumes", "source"): "type", ("volumes", "driver_opts", "device"): "o"}
-"""Paths if the key beside them says ``bind``."""
-
-
-def _is_bind(holder: Node | None, key: str) -> bool:
-    word = source.part(holder, key)
-    return isinstance(word, Scalar) and "bind" in word.text
+_PATHS = {("services", "build", "context"), ("services", "env_file", "path"), ("secrets", "file"), ("configs", "file")}
+_CONTEXTS = ("services", "build", "additional_contexts")
 
 
 def rebased(path: str, base: str) -> str:

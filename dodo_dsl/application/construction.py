@@ -37,7 +37,7 @@ _OF_SERVICES = {"image", "build", "command", "x-dodo", "x-dodo-process"}
 
 @dataclass(frozen=True)
 class Setting:
-    """What a test's copy of the application depends on; ``folder`` is the compiled test's, None where paths are whole.
+    """What a test's copy of the application depends on; ``folder`` is the compiled test's.
 
     ``waits`` are the services of DoDo after which the application starts. Devices stay only with ``hil``, privileges
     only with ``privileged_allowed`` as well. ``limits`` is what a service gets that sets none, and ``given`` are
@@ -46,7 +46,7 @@ class Setting:
 
     cid: int
     isolation: str
-    folder: Path | None = None
+    folder: Path
     waits: tuple[str, ...] = ()
     hil: bool = False
     privileged_allowed: bool = False
@@ -64,15 +64,16 @@ class Setting:
 
 
 class Construction:
-    """One test's application while it is made; ``copies`` are volumes, each with the folder that it has at the start.
+    """One test's application while it is made, with whole paths if it ``is_whole``.
 
+    ``copies`` are volumes, each with the folder that it has at the start.
     ``shown`` are the paths of the host that it asks for, each with its place and the service that writes to it, if any.
     """
 
-    def __init__(self, application: ApplicationSource, setting: Setting) -> None:
-        self.application, self.setting = application, setting
+    def __init__(self, application: ApplicationSource, setting: Setting, *, is_whole: bool = False) -> None:
+        self.application, self.setting, self._is_whole = application, setting, is_whole
         self.paths, self.ports = application.paths, application.access.ports
-        self.base = os.path.relpath(application.folder, setting.folder) if setting.folder else str(application.folder)
+        self.base = os.path.relpath(application.folder, setting.folder)
         self.problems: list[Diagnostic] = []
         self.shown: list[tuple[str, Span, str]] = []
         self.copies: dict[str, str] = {}
@@ -86,8 +87,8 @@ class Construction:
             yield name, entry.value, entry.key
 
     def rebased(self, path: str) -> str:
-        """A path of the application as seen from the compiled test's folder, a whole one if there is none."""
-        if not self.setting.folder:
+        """A path of the application as seen from the compiled test's folder."""
+        if self._is_whole:
             return self.paths.whole(path)
         if path.startswith(("/", "~")):
             return path
@@ -123,7 +124,10 @@ class Construction:
 
     def rest(self) -> dict[str, Any]:
         """The top-level keys beside ``services``."""
-        made = {key: {n: self._file(key, n, *at) for n, *at in self._named(key)} for key in ("secrets", "configs")}
+        made = {
+            key: {name: self._file(key, name, node, span) for name, node, span in self._named(key)}
+            for key in ("secrets", "configs")
+        }
         volumes = {own_name(name): made for name, made in self.volumes.items()} | {name: {} for name in self.copies}
         return {key: value for key, value in {"volumes": volumes, **made}.items() if value}
 
@@ -157,11 +161,10 @@ class Construction:
             return {"content": compose_paths.escaped(known[variable])}
         if variable:
             hint = f"pass it with environment: [{variable}] in dodo.yml, or set it in .env"
-            rule, severity = "application-secret", "warning"
-            if secret_variables.is_of_pipeline(variable):
-                rule, severity = "application-isolation", "error"
+            is_refused = secret_variables.is_of_pipeline(variable)
+            rule = "application-isolation" if is_refused else "application-secret"
             message = f"{what} is empty in a test, as it has no variable '{variable}'"
-            of.add(Diagnostic(fields["environment"].span, rule, message, hint, severity))
+            of.add(Diagnostic(fields["environment"].span, rule, message, hint, "error" if is_refused else "warning"))
         if not (isinstance(node, Mapping) and node.entries):
             of.bad(span, f"{what} has neither 'file' nor 'environment'", f"for example {name}: {{file: ./{name}.txt}}")
         return {"file": "/dev/null"}
@@ -194,7 +197,7 @@ def checked_builds(application: ApplicationSource) -> dict[str, Any]:
 
     Variables whose values are not known are empty: each builder has others in the environment.
     """
-    made = Construction(application, Setting(1, "network"))
+    made = Construction(application, Setting(1, "network", application.folder), is_whole=True)
     builds = {name: {"build": each["build"]} for name, each in made.services().items() if "build" in each}
     secrets = made.rest().get("secrets")
     document = {"services": builds} | ({"secrets": secrets} if secrets else {})

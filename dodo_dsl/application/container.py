@@ -11,6 +11,7 @@ from dodo_dsl import source
 from dodo_dsl.application import hardware, image, limits, opendlv_flags
 from dodo_dsl.application.compose_files import dotenv_problems
 from dodo_dsl.application.compose_paths import escaped, filled_node
+from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.model import (
     FILES,
     OFFSCREEN,
@@ -21,7 +22,6 @@ from dodo_dsl.application.model import (
     plain,
     text,
 )
-from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.mounts import mounts
 from dodo_dsl.application.part import OFF, Part
 from dodo_dsl.application.variables import variables_with_cid
@@ -330,9 +330,9 @@ _REFUSED = {
 }
 _LEFT_OUT = (
     "annotations", "attach", "blkio_config", "cgroup", "cgroup_parent", "container_name", "cpu_count", "cpu_percent",
-    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "device_cgroup_rules", "isolation", "label_file",
-    "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness", "memswap_limit", "oom_kill_disable",
-    "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop", "pull_policy", "pull_refresh_after", "restart",
-    "scale", "storage_opt", "userns_mode", "uts",
+    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "device_cgroup_rules",
+    "isolation", "label_file", "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness",
+    "memswap_limit", "oom_kill_disable", "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop",
+    "pull_policy", "pull_refresh_after", "restart", "scale", "storage_opt", "userns_mode", "uts",
 )  # fmt: skip
 """Keys of the compose specification that a test has no use for."""

@@ -33,12 +33,15 @@ def build(c: "Container", node: Node) -> Any:
     if image is None:
         c.own["image"] = f"${{{image_variable(c.name)}:-}}"
     fields = c.fields(
-        node, f"the build of '{c.name}'", "context dockerfile dockerfile_inline args target additional_contexts secrets",
+        node, f"the build of '{c.name}'",
+        "context dockerfile dockerfile_inline args target additional_contexts secrets",
         "cache_from cache_to entitlements extra_hosts isolation labels no_cache no_cache_filter platforms privileged"
         " provenance pull sbom shm_size ssh tags ulimits",
         {"network": ("reaches services of the host", "remove it", "default", "none")},
     )  # fmt: skip
-    made = {key: plain(fields[key]) for key in ("dockerfile_inline", "target", "secrets", "network") if key in fields}
+    made: dict[str, Any] = {
+        key: plain(fields[key]) for key in ("dockerfile_inline", "target", "secrets", "network") if key in fields
+    }
     if (context := c.literal(fields["context"]) if "context" in fields else ".") is not None:
         span = fields["context"].span if "context" in fields else node.span
         made = {"context": _context(c, span, context), **made}

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from dodo_dsl.application.compose_paths import is_path
 from dodo_dsl.application.interpolation import split_outside
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, plain
+from dodo_dsl.source import Entry, Mapping, Node, Plain, Scalar, Sequence, plain
 
 Path = tuple[str, ...]
 NAMESPACES = ("network_mode", "ipc", "pid")
@@ -36,29 +36,39 @@ def settled(node: Node) -> Node:
     return replace(node, tag=tag) if node.tag else node
 
 
-def normal(service: Mapping, containers: dict[str, str]) -> Mapping:
-    """A service with one form of each key; a container of the application is its service, by ``containers``."""
+def normal(document: Mapping) -> Mapping:
+    """A file with one form of each key of its services; what has none of the forms stays, to be reported."""
+    services = document.get("services")
+    if not isinstance(services, Mapping):
+        return document
+    entries = {name: Entry(entry.key, _formed(entry.value, ())) for name, entry in services.entries.items()}
+    made = Entry(document.entries["services"].key, replace(services, entries=entries))
+    return replace(document, entries={**document.entries, "services": made})
 
-    def own(node: Node) -> Node:
+
+def _formed(node: Node, place: Path) -> Node:
+    if place in _FORMS and not (isinstance(node, Scalar) and node.value is None):
+        node = replace(_FORMS[place](node), tag=node.tag)
+    if place not in ((), ("build",)) or not isinstance(node, Mapping):
+        return node
+    return replace(node, entries={k: Entry(e.key, _formed(e.value, (*place, k))) for k, e in node.entries.items()})
+
+
+def joined(service: Mapping, containers: dict[str, str]) -> Mapping:
+    """A service that names other services where it names their containers, by ``containers``."""
+
+    def named(node: Node) -> Node:
         if isinstance(node, Sequence):
-            return replace(node, items=tuple(map(own, node.items)))
+            return replace(node, items=tuple(map(named, node.items)))
         kind, *rest = node.text.split(":", 2) if isinstance(node, Scalar) else ("",)
         if kind != "container" or rest[0] not in containers:
             return node
         text = ":".join(["service", containers[rest[0]], *rest[1:]])
         return Scalar(node.span, text, text)
 
-    def formed(node: Node, place: Path) -> Node:
-        if place in _FORMS and not (isinstance(node, Scalar) and node.value is None):
-            node = _FORMS[place](node)
-        if place in ((), ("build",)) and isinstance(node, Mapping):
-            entries = {key: Entry(e.key, formed(e.value, (*place, key))) for key, e in node.entries.items()}
-            return replace(node, entries=entries)
-        return own(node) if place[0] in (*NAMESPACES, "volumes_from") else node
-
-    made = formed(service, ())
-    assert isinstance(made, Mapping)
-    return made
+    keys = service.entries.keys() & {*NAMESPACES, "volumes_from"} if containers else ()
+    own = {key: Entry(service.entries[key].key, named(service.entries[key].value)) for key in keys}
+    return replace(service, entries=service.entries | own)
 
 
 def _merge(base: Node, over: Node, path: Path) -> Node:
@@ -67,9 +77,6 @@ def _merge(base: Node, over: Node, path: Path) -> Node:
         return over
     if isinstance(over, Scalar) and over.value is None:
         return base
-    form = _FORMS.get(place)
-    if form is not None:
-        base, over = form(base), form(over)
     if isinstance(base, Mapping) and isinstance(over, Mapping):
         return _merge_mappings(base, over, path)
     if isinstance(base, Sequence) and isinstance(over, Sequence):
@@ -91,11 +98,8 @@ def _merge_mappings(base: Mapping, over: Mapping, path: Path) -> Mapping:
 
 def _appended(base: Sequence, over: Sequence, place: Path) -> tuple[Node, ...]:
     items = (*base.items, *over.items)
-    if place in _BY_TARGET:
-        return tuple({_target(item): item for item in items}.values())
-    if place in _FORMS:
-        return tuple({repr(plain(item)): item for item in items}.values())
-    return items
+    key = _target if place in _BY_TARGET else lambda item: repr(plain(item))
+    return tuple({key(item): item for item in items}.values())
 
 
 def _target(item: Node) -> str:
@@ -103,13 +107,13 @@ def _target(item: Node) -> str:
     value = plain(item)
     if isinstance(value, dict):
         return str(value.get("target", value.get("source")))
-    parts = split_outside(str(value), ":")
+    parts = str(value).split(":")
     return parts[1] if len(parts) > 1 else parts[0]
 
 
 def _as_pairs(node: Node) -> Node:
     """``[A=1, B]`` as ``{A: 1, B: null}``."""
-    if not isinstance(node, Sequence):
+    if not isinstance(node, Sequence) or not all(isinstance(item, Scalar) for item in node.items):
         return node
     entries = {}
     for item in node.items:
@@ -146,7 +150,7 @@ def _each(node: Node, made: Callable[[Scalar], Node]) -> Node:
     return Mapping(node.span, {i.text: Entry(i.span, made(i)) for i in node.items if isinstance(i, Scalar)})
 
 
-def _as_fields(node: Node, **fields: str | bool | Node) -> Mapping:
+def _as_fields(node: Node, **fields: Plain | Mapping) -> Mapping:
     """A short form as fields, each in the place of the whole."""
     values = {k: v if isinstance(v, Mapping) else Scalar(node.span, v, str(v)) for k, v in fields.items()}
     return Mapping(node.span, {key: Entry(node.span, value) for key, value in values.items()})
@@ -159,32 +163,38 @@ def _as_build(node: Node) -> Node:
 def _as_files(node: Node) -> Node:
     """``a.env`` as ``[{path: a.env}]``."""
     items = node.items if isinstance(node, Sequence) else (node,)
-    return Sequence(node.span, tuple(_as_fields(i, path=i.text) if isinstance(i, Scalar) else i for i in items))
+    return Sequence(node.span, tuple(_as_fields(i, path=i.value) if isinstance(i, Scalar) else i for i in items))
 
 
 def _as_mounts(node: Node) -> Node:
     """``[./a:/b:ro]`` as ``[{type: bind, source: ./a, target: /b, read_only: true}]``."""
-    if not isinstance(node, Sequence):
-        return node
-    return replace(node, items=tuple(_as_mount(item) if isinstance(item, Scalar) else item for item in node.items))
+    return replace(node, items=tuple(map(_as_mount, node.items))) if isinstance(node, Sequence) else node
 
 
-def _as_mount(item: Scalar) -> Node:
+def _as_mount(item: Node) -> Node:
+    if isinstance(item, Mapping):
+        kind, word = item.get("type"), item.get("source")
+        if not isinstance(word, Scalar) or kind is None or plain(kind) != "bind" or is_path(word.text or "."):
+            return item
+        path = replace(word, value=f"./{word.text}", text=f"./{word.text}")
+        return replace(item, entries=item.entries | {"source": Entry(item.entries["source"].key, path)})
+    if not isinstance(item, Scalar) or not isinstance(item.value, str):
+        return item
     source, target, options, *_ = [*split_outside(item.text, ":"), "", ""]
     if ":" not in item.text:
         return _as_fields(item, type="volume", target=item.text)
     words = options.split(",")
     is_read = [word for word in words if word in ("ro", "rw")][-1:] == ["ro"]
     about = {"volume": _as_fields(item, nocopy=True)} if "nocopy" in words else {}
-    kind = "bind" if is_path(source) else "volume"
-    return _as_fields(item, type=kind, source=source, target=target, read_only=is_read, **about)
+    return _as_fields(
+        item, type="bind" if is_path(source) else "volume", source=source, target=target, read_only=is_read, **about
+    )
 
 
 _REPLACED = {("command",), ("entrypoint",), ("healthcheck", "test")}
 _BY_TARGET = {("volumes",), ("devices",), ("secrets",), ("configs",)}
 _LISTS = (
-    "cap_add", "cap_drop", "device_cgroup_rules", "dns", "dns_opt", "dns_search", "expose", "group_add", "links",
-    "profiles", "security_opt", "tmpfs", "volumes_from",
+    "cap_add", "dns", "dns_opt", "dns_search", "expose", "group_add", "links", "security_opt", "tmpfs", "volumes_from",
 )  # fmt: skip
 _FORMS: dict[Path, Callable[[Node], Node]] = {
     **{(key,): _as_pairs for key in ("environment", "sysctls")},

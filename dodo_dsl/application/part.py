@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 ASK_KEY = "your own keys begin with x-, such as x-{}; docs/reference/compose-keys.md has compose's"
 
-OFF = (None, False, "", "false", [], {})
+OFF: tuple[object, ...] = (None, False, "", "false", [], {})
 """Values of keys that say nothing."""
 Refused = tuple[str, ...]
 """Why a key is refused, what to write instead, and the values that are not."""

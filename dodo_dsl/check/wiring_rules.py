@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
-from dodo_dsl.application import opendlv_flags, secret_problems
+from dodo_dsl.application import opendlv_flags, secret_variables
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
@@ -268,7 +268,7 @@ def check_variables(context: RuleContext) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, _RULE, message, "set a variable that the application itself reads")
         elif isinstance(entry.value, Scalar):
             yield from _value(context, name, entry.value)
-            yield from secret_problems.written([entry.value])
+            yield from secret_variables.written([entry.value])
 
 
 def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnostic]:
