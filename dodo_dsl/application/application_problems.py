@@ -5,7 +5,6 @@ A service has a name and a program; together they have cycles of dependencies, a
 
 import os
 import re
-import shlex
 from collections.abc import Collection, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -207,33 +206,19 @@ def _warning(item: Scalar, message: str, hint: str) -> Diagnostic:
 
 
 def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
-    """Warnings of the program and its script, which are seen from the compose file's ``folder``."""
+    """A warning of a program or a script that is not there, as seen from the compose file's ``folder``."""
     process = service.node.get("x-dodo-process")
-    items = process.items if isinstance(process, source.Sequence) else ()
-    words = [word for word in items if isinstance(word, Scalar)]
-    if not words or "$" in words[0].text:
+    words = [word for word in process.items if isinstance(word, Scalar)] if isinstance(process, source.Sequence) else []
+    is_script = bool(words) and words[0].text in _INTERPRETERS
+    word = words[is_script] if len(words) > is_script else None
+    if word is None or "$" in word.text or word.text.startswith("-"):
         return
-    program = words[0]
-    if program.text in _INTERPRETERS:
-        yield from _missing_script(program.text, words[1:], folder)
-    elif " " in program.text.strip() and not (folder / program.text).exists():
-        parts = ", ".join(program.text.split())
-        yield _cannot_start(program, f"there is no program '{program.text}', which is one word", f"write [{parts}]")
-    elif "/" in program.text:
-        own = folder / program.text
-        if own.is_file() and not os.access(own, os.X_OK):
-            hint = f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
-            yield _cannot_start(program, f"'{program.text}' is not executable", hint)
-        elif not own.exists() and "build" not in service.node.entries:  # which a pipeline's check never sees
-            yield _cannot_start(program, f"there is no program '{program.text}'", "build it first")
-
-
-def _missing_script(interpreter: str, words: list[Scalar], folder: Path) -> Iterator[Diagnostic]:
-    name = words[0].text if words else ""
-    if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
+    own = folder / word.text
+    is_here = own.is_file() and (is_script or os.access(own, os.X_OK))
+    if is_script and not is_here:
+        message = f"there is no file '{word.text}' for {words[0].text} to run"
         hint = "without it the application starts in containers only"
-        yield _cannot_start(words[0], f"there is no file '{name}' for {interpreter} to run", hint)
-
-
-def _cannot_start(word: Scalar, message: str, hint: str) -> Diagnostic:
-    return Diagnostic(word.span, "application-file", message, hint, "warning")
+        yield Diagnostic(word.span, "application-file", message, hint, "warning")
+    elif {"/", " "} & {*word.text} and not is_here and "build" not in service.node.entries:
+        hint = f"a program is one word, without its arguments; build it first, or run: chmod +x {word.text}"
+        yield Diagnostic(word.span, "application-file", f"there is no program '{word.text}'", hint, "warning")

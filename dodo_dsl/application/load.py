@@ -168,32 +168,26 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
     Its hint names files as ``dodo.yml`` does, which is in ``root`` or else next to them.
     """
     folder = paths[0].parent
-    named = [_whole_file(path) for path in paths]
     there = (
-        [_whole_file(folder / name) for name in names if (folder / name).is_file()] for names in (_NAMES, _OVERRIDES)
+        next((folder / name for name in names if (folder / name).is_file()), None) for names in (_NAMES, _OVERRIDES)
     )
-    found = [files[0] for files in there if files]
-    others = [path for path in found if path not in named]
-    if not others or len(others) == len(found):
-        return
-    names = listed([f"'{os.path.relpath(path, folder)}'" for path in others])
-    items = [as_item(path, root or folder) for path in [*found, *(path for path in named if path not in found)]]
-    own = as_item(next(path for path in named if path in found), folder)
-    yield Diagnostic(
-        Span(str(paths[0])),
-        "application-override",
-        f"'docker compose' also reads {names}, which it finds next to this file; DoDo does not",
-        f"write application: [{', '.join(items)}] in dodo.yml; to test without it, name another file there that has "
-        f"include: [{own}]",
-        "warning",
-    )
-
-
-def _whole_file(path: Path) -> Path:
-    return Path(os.path.normpath(path.absolute()))
+    found = [path for path in there if path]
+    others = [path for path in found if path not in paths]
+    if others and len(others) < len(found):
+        names = listed([f"'{path.name}'" for path in others])
+        items = [as_item(path, root or folder) for path in dict.fromkeys([*found, *paths])]
+        own = next(path.name for path in found if path in paths)
+        yield Diagnostic(
+            Span(str(paths[0])),
+            "application-override",
+            f"'docker compose' also reads {names}, which it finds next to this file; DoDo does not",
+            f"write application: [{', '.join(items)}] in dodo.yml; to test without it, name another file there that "
+            f"has include: [{own}]",
+            "warning",
+        )
 
 
 def as_item(path: Path, folder: Path) -> str:
     """A path as an item of a list in YAML."""
-    text = os.path.relpath(path, _whole_file(folder))
+    text = os.path.relpath(path, folder)
     return text if _PLAIN.fullmatch(text) else f'"{text}"'

@@ -7,8 +7,7 @@ from dodo_dsl.application import opendlv_flags, secret_variables
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
-from dodo_dsl.application.opendlv_flags import CID_VARIABLES
-from dodo_dsl.application.pictures import FORMATS, AskedPictures, pictures_of
+from dodo_dsl.application.opendlv_flags import CID_VARIABLES, FORMATS, AskedPictures, pictures_of
 from dodo_dsl.application.variables import owner, split_by, with_variables
 from dodo_dsl.check.context import RuleContext
 from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
