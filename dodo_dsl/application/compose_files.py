@@ -6,10 +6,9 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application import compose_paths
 from dodo_dsl.application.host_paths import HostPaths
-from dodo_dsl.application.interpolation import dotenv, filled, literal, slip_in
-from dodo_dsl.application.merge import normal
+from dodo_dsl.application.interpolation import Place, changed, dotenv, escaped, filled, literal, slip_in
+from dodo_dsl.application.merge import normal, rebased, relocated
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Reader, Scalar
@@ -120,16 +119,16 @@ class ComposeFiles:
         return self._documents[key]
 
     def _changed(self, node: source.Mapping, folder: Path) -> source.Mapping | None:
-        filled = compose_paths.changed(node, self._filled)
+        filled = changed(node, self._filled)
         document = normal(filled) if isinstance(filled, source.Mapping) else node
-        moved = document if folder == self.folder else compose_paths.relocated(document, self.relative(folder))
+        moved = document if folder == self.folder else relocated(document, self.relative(folder))
         return moved if isinstance(moved, source.Mapping) else None
 
     def relative(self, folder: Path) -> str:
         """A folder as seen from the application's own, as compose reads it."""
-        return compose_paths.rebased(".", compose_paths.escaped(Path(os.path.relpath(folder, self.folder)).as_posix()))
+        return rebased(".", escaped(Path(os.path.relpath(folder, self.folder)).as_posix()))
 
-    def _filled(self, word: Scalar, place: compose_paths.Place) -> str:
+    def _filled(self, word: Scalar, place: Place) -> str:
         """A text with variables filled in, but for keys of services that each test fills in, and for own keys."""
         text = str(word.value)
         if "$" not in text or not place or place[0] not in _FILLED:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application import compose_paths, secret_variables
+from dodo_dsl.application import secret_variables
 from dodo_dsl.application.container import TOP_LEFT_OUT, Container
-from dodo_dsl.application.interpolation import interpolate
+from dodo_dsl.application.interpolation import escaped, interpolate, mapped_texts
 from dodo_dsl.application.model import ApplicationSource, is_true
 from dodo_dsl.application.mounts import COPY, Mount, nested, own_name
 from dodo_dsl.application.part import Part
@@ -107,7 +107,7 @@ class Construction:
         is_kept = self.paths.is_writable(source) or not self.paths.is_own(source) or Path(place).is_file()
         if not is_kept and place not in self._copied:
             self._copied[place] = f"{COPY}{len(self.copies)}"
-            self.copies[self._copied[place]] = compose_paths.escaped(self.rebased(source))
+            self.copies[self._copied[place]] = escaped(self.rebased(source))
 
     def settled(self, mount: Mount) -> Mount:
         """A mount of the test: of a copy, or of the host's file or folder."""
@@ -158,7 +158,7 @@ class Construction:
         if variable and self.application.is_late(variable):
             return {"environment": variable}
         if variable and variable in known and key == "configs":
-            return {"content": compose_paths.escaped(known[variable])}
+            return {"content": escaped(known[variable])}
         if variable:
             hint = f"pass it with environment: [{variable}] in dodo.yml, or set it in .env"
             is_refused = secret_variables.is_of_pipeline(variable)
@@ -201,7 +201,5 @@ def checked_builds(application: ApplicationSource) -> dict[str, Any]:
     builds = {name: {"build": each["build"]} for name, each in made.services().items() if "build" in each}
     secrets = made.rest().get("secrets")
     document = {"services": builds} | ({"secrets": secrets} if secrets else {})
-    found: dict[str, Any] = compose_paths.mapped_texts(
-        document, lambda text: compose_paths.escaped(interpolate(text, {}))
-    )
+    found: dict[str, Any] = mapped_texts(document, lambda text: escaped(interpolate(text, {})))
     return found

@@ -8,9 +8,9 @@ from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application import hardware, image, limits, opendlv_flags
+from dodo_dsl.application import image, limits, opendlv_flags
 from dodo_dsl.application.compose_files import dotenv_problems
-from dodo_dsl.application.compose_paths import escaped, filled_node
+from dodo_dsl.application.interpolation import escaped, filled_node
 from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.model import (
     FILES,
@@ -295,21 +295,21 @@ _CARRIED: dict[str, Key] = {
     **dict.fromkeys(_AS_WRITTEN, lambda _, n: plain(n)),
     **limits.LIMITS,
     "build": image.build,
-    "cap_add": hardware.capabilities,
+    "cap_add": limits.capabilities,
     "command": lambda c, n: _command(c, "command", n),
     "configs": lambda c, n: _secrets(c, n, "configs"),
     "depends_on": _depends_on,
     "deploy": limits.deploy,
-    "devices": hardware.devices,
+    "devices": limits.devices,
     "entrypoint": lambda c, n: _command(c, "entrypoint", n),
     "env_file": _env_file,
     "environment": lambda c, _: None,
-    "gpus": hardware.gpus,
+    "gpus": limits.gpus,
     "healthcheck": _healthcheck,
     "image": image.image,
     "links": _links,
     "networks": _networks,
-    "privileged": hardware.privileged,
+    "privileged": limits.privileged,
     "runtime": _runtime,
     "secrets": lambda c, n: _secrets(c, n, "secrets"),
     "security_opt": _security,

@@ -7,7 +7,7 @@ import contextlib
 import os
 import pwd
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -176,20 +176,12 @@ _WAYS = ("/dev/serial", "/dev/bus/usb")
 """Folders where a port has its other names, and where its USB device can be spoken to directly."""
 
 
-def is_port(device: str, ports: Iterable[str]) -> bool:
-    """Whether a path is a rig's port, one of its names, or a way to it; a rig is moved by its own service alone."""
-    files, names = list(_files(ports)), (os.path.normpath(device), real(device))
-    return bool(files) and any(name in files or _below(name, _WAYS) for name in names)
+def is_port(path: str, ports: Iterable[str], *, within: bool = False) -> bool:
+    """Whether a path is a rig's port, one of its names, or a way to it; a rig is moved by its own service alone.
 
-
-def holds_port(folder: str, ports: Iterable[str]) -> bool:
-    """The same, and of a folder whether it holds a port: an engine gives a container all devices in it."""
-    files, names = list(_files(ports)), (os.path.normpath(folder), real(folder))
-    return is_port(folder, files) or any(_below(file, names) for file in files)
-
-
-def _files(ports: Iterable[str]) -> Iterator[str]:
-    """All names of those ports that are device files."""
-    for port in ports:
-        if port.startswith("/"):
-            yield from dict.fromkeys((os.path.normpath(port), real(port)))
+    Or whether a port lies ``within`` a folder, as an engine gives a container all devices in it.
+    """
+    files = [name for port in ports if port.startswith("/") for name in (os.path.normpath(port), real(port))]
+    names = (os.path.normpath(path), real(path))
+    is_way = any(name in files or _below(name, _WAYS) for name in names)
+    return bool(files) and (is_way or (within and any(_below(file, names) for file in files)))

@@ -4,7 +4,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_paths import escaped, is_local
+from dodo_dsl.application.interpolation import escaped
+from dodo_dsl.application.merge import is_local
 from dodo_dsl.application.model import environment, image_variable, plain, text
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node

@@ -3,7 +3,14 @@
 import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+from dodo_dsl import source
+from dodo_dsl.source import Entry, Node, Scalar
+
+Place = tuple[str, ...]
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _VARIABLE_NAME = re.compile(rf"\$\$|\$\{{?({_NAME.pattern})")
@@ -214,3 +221,35 @@ def _unescaped(match: re.Match[str]) -> str:
     if octal is None:
         return _ESCAPES.get(match[0][1], match[0][1])
     return chr(int(octal, 8)) if re.fullmatch("[0-3][0-7]{2}", octal) else f"\\{octal}"
+
+
+def changed(node: Node, change: Callable[[Scalar, Place], str], place: Place = ()) -> Node:
+    """A node with each text changed, by the keys that lead to it; every part keeps its place."""
+    if isinstance(node, source.Mapping):
+        entries = {k: Entry(e.key, changed(e.value, change, (*place, k))) for k, e in node.entries.items()}
+        return replace(node, entries=entries)
+    if isinstance(node, source.Sequence):
+        return replace(node, items=tuple(changed(item, change, place) for item in node.items))
+    if not isinstance(node.value, str):
+        return node
+    text = change(node, place)
+    return node if text == node.value else replace(node, value=text, text=text)
+
+
+def filled_node(node: Node, known: Mapping[str, str], late: Callable[[str], bool]) -> Node:
+    """A node with its variables filled in."""
+    return changed(node, lambda word, *_: filled(str(word.value), known, late))
+
+
+def escaped(text: str) -> str:
+    """A path as a compose file has it, in which a dollar sign alone begins a variable."""
+    return text.replace("$", "$$")
+
+
+def mapped_texts(value: Any, change: Callable[[str], str]) -> Any:
+    """Values of JSON with ``change`` applied to each text."""
+    if isinstance(value, dict):
+        return {key: mapped_texts(each, change) for key, each in value.items()}
+    if isinstance(value, list):
+        return [mapped_texts(each, change) for each in value]
+    return change(value) if isinstance(value, str) else value

@@ -3,14 +3,15 @@
 Keys that may be written in several forms are brought into one: to be merged, and once more for all that reads them.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 
-from dodo_dsl.application.compose_paths import is_path
-from dodo_dsl.application.interpolation import split_outside
+from dodo_dsl.application.interpolation import changed, split_outside
 from dodo_dsl.source import Entry, Mapping, Node, Plain, Scalar, Sequence, plain
 
 Path = tuple[str, ...]
+_REMOTE = ("/", "~", "$", "git@", "github.com/", "service:", "target:")
 NAMESPACES = ("network_mode", "ipc", "pid")
 _OUTSIDE = ("",)
 
@@ -207,3 +208,36 @@ _FORMS: dict[Path, Callable[[Node], Node]] = {
     ("networks",): _as_keys,
     ("volumes",): _as_mounts,
 }
+
+
+def relocated(document: Mapping, base: str) -> Node:
+    """A file in normal form with its paths as seen from the folder from which ``base`` leads to its own."""
+
+    def moved(word: Scalar, place: Path) -> str:
+        text, key = str(word.value), (place[0], *place[2:]) if place else ()
+        is_mount = key == ("services", "volumes", "source") and is_path(text)
+        return rebased(text, base) if key in _PATHS or key[:3] == _CONTEXTS or is_mount else text
+
+    return changed(document, moved)
+
+
+_PATHS = {("services", "build", "context"), ("services", "env_file", "path"), ("secrets", "file"), ("configs", "file")}
+_CONTEXTS = ("services", "build", "additional_contexts")
+
+
+def rebased(path: str, base: str) -> str:
+    """A path as seen from another folder, from which ``base`` is the path's own; absolute paths and URLs stay."""
+    if (path.startswith(_REMOTE) and not path.startswith("$$")) or "://" in path:
+        return path
+    joined = os.path.normpath(f"{base}/{path}")
+    return joined if joined.startswith((".", "/")) else f"./{joined}"
+
+
+def is_path(text: str) -> bool:
+    """Whether a volume's source is a path; other words name a volume."""
+    return text.startswith((".", "/", "~"))
+
+
+def is_local(context: str) -> bool:
+    """Whether what is built is a folder, and not known to be elsewhere."""
+    return "://" not in context and not context.startswith(_REMOTE)

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dodo_dsl.application.compose_paths import escaped, is_path
-from dodo_dsl.application.hardware import is_kept
 from dodo_dsl.application.host_paths import MEMORY, NUL, TMP, is_port, is_token
-from dodo_dsl.application.limits import size
+from dodo_dsl.application.interpolation import escaped
+from dodo_dsl.application.limits import capped, is_kept, size
+from dodo_dsl.application.merge import is_path
 from dodo_dsl.application.model import is_true, plain
 from dodo_dsl.diagnostics import Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Mapping, Node, Scalar
@@ -107,11 +107,8 @@ def _clean(path: str) -> str:
 
 def _memory(of: "Container", node: Node | None) -> tuple[tuple[str, Any], ...]:
     fields, most = of.fields(node, "'tmpfs' of a mount", "size mode"), of.limits.memory
-    wanted = size(of.literal(fields["size"])) if "size" in fields else most
-    if not 0 < wanted <= most:
-        of.cut(fields["size"].span, "volumes.tmpfs.size", most, "memory")
-    mode = (("mode", plain(fields["mode"])),) if "mode" in fields else ()
-    return (("size", int(wanted) if 0 < wanted <= most else most), *mode)
+    made = capped(of, fields["size"], "volumes.tmpfs.size", most, "memory", size) if "size" in fields else most
+    return (("size", made), *((("mode", plain(fields["mode"])),) if "mode" in fields else ()))
 
 
 def _carried(of: "Container", mount: Mount) -> Mount | None:

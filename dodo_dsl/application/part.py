@@ -5,8 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.interpolation import literal
+from dodo_dsl.application.interpolation import escaped, literal
 from dodo_dsl.application.model import plain, text
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Node, Scalar

@@ -10,8 +10,7 @@ from dataclasses import replace
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.compose_paths import filled_node
-from dodo_dsl.application.interpolation import filled, literal, names
+from dodo_dsl.application.interpolation import filled, filled_node, literal, names
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import holds_secret, is_steering

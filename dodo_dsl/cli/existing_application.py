@@ -16,7 +16,7 @@ from pathlib import Path
 from dodo_dsl import source
 from dodo_dsl.application import stack
 from dodo_dsl.application.application_problems import on_other_buses, takes_cid, written_cids
-from dodo_dsl.application.compose_paths import is_local
+from dodo_dsl.application.merge import is_local
 from dodo_dsl.application.model import ApplicationSource, ComposeService
 from dodo_dsl.application.opendlv_flags import pictures_of
 from dodo_dsl.application.read import as_written

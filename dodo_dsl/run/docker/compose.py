@@ -17,9 +17,8 @@ from typing import Any
 
 from dodo_dsl import advice, atomic
 from dodo_dsl.application import secret_variables
-from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.host_paths import holds_port, is_port
-from dodo_dsl.application.interpolation import EnvironmentProblem, interpolate
+from dodo_dsl.application.host_paths import is_port
+from dodo_dsl.application.interpolation import EnvironmentProblem, escaped, interpolate
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.opendlv.authentication import KEY_VARIABLE
@@ -115,7 +114,9 @@ class Compose:
             paths = [
                 whole(str(d["source"] if isinstance(d, dict) else d).partition(":")[0], self.folder) for d in devices
             ]
-            if any(holds_port(path, ports) for path in paths) or any(is_port(bind.source, ports) for bind in mounted):
+            if any(is_port(path, ports, within=True) for path in paths) or any(
+                is_port(bind.source, ports) for bind in mounted
+            ):
                 raise BackendError(f"service '{name}' may not have the port of a rig, which only its service opens")
             for bind in mounted:
                 if link := self._paths.link(bind.source):
