@@ -61,7 +61,9 @@ def capped(
     """A limit of at most ``most``, which also takes the place of none; ``key`` of ``sandbox`` sets it, if one does."""
     written = c.literal(node)
     found = measure(written)
-    if found > most and written is not None:
+    if math.isinf(found) and written and not written.startswith("-"):
+        c.bad(node.span, f"'{written}' is not a limit, expected a number")
+    elif found > most and written is not None:
         c.cut(node.span, what, most, key)
     value = found if least <= found <= most else most
     return int(value) if float(value).is_integer() else value
