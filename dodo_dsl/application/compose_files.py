@@ -2,13 +2,13 @@
 
 import os
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application.host_paths import HostPaths
-from dodo_dsl.application.interpolation import Place, changed, dotenv, escaped, filled, literal, slip_in
-from dodo_dsl.application.merge import normal, rebased, relocated
+from dodo_dsl.application.interpolation import dotenv, escaped, filled, literal, slip_in
+from dodo_dsl.application.merge import Place, changed, normal, rebased, relocated
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Reader, Scalar
@@ -170,9 +170,10 @@ class ComposeFiles:
 
     def gather(self, file: Path, taken: Collection[str] = ()) -> dict[str, str]:
         """The variables of an ``.env`` file, if there is one, without secrets, as those that are ``taken`` for one."""
-        self.problems.extend(dotenv_problems(file))
+        statements, problems = variables_in(file)
+        self.problems += problems
         own: dict[str, str] = {}
-        for name, value in statements_of(file):
+        for name, value in statements:
             if value is None or name in self.passed:
                 continue
             text = literal(self.filled(value, own))
@@ -183,24 +184,19 @@ class ComposeFiles:
         return own
 
 
-Statements = tuple[tuple[str, str | None], ...]
+Statements = Sequence[tuple[str, str | None]]
 """The names and values of a file of variables, in order; None takes the value from outside."""
 
 
-def statements_of(file: Path) -> Statements:
-    """What a regular file sets; symlinks are not followed."""
-    return tuple(dotenv(text_of(file))[0])
+def variables_in(file: Path) -> tuple[Statements, list[Diagnostic]]:
+    """What a regular file sets, and what compose refuses in it, which shows nothing of the line: it may be a secret.
 
-
-def dotenv_problems(file: Path) -> Iterator[Diagnostic]:
-    """What compose refuses in a file of variables; it shows nothing of the line, which may be a secret."""
-    if problem := dotenv(text_of(file))[1]:
-        yield Diagnostic(Span(str(file), problem.line, 1, 0), "application-file", problem.what, problem.hint)
-
-
-def text_of(file: Path) -> str:
-    """The start of a regular file; empty if there is none, and for symlinks."""
+    Symlinks are not followed.
+    """
     if file.is_symlink() or not file.is_file():
-        return ""
+        return [], []
     with file.open("rb") as stream:
-        return stream.read(_MAX_ENV).decode("utf-8", "replace")
+        found, problem = dotenv(stream.read(_MAX_ENV).decode("utf-8", "replace"))
+    if problem is None:
+        return found, []
+    return found, [Diagnostic(Span(str(file), problem.line, 1, 0), "application-file", problem.what, problem.hint)]

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
 from dodo_dsl.application import image, limits, opendlv_flags
-from dodo_dsl.application.compose_files import dotenv_problems
-from dodo_dsl.application.interpolation import escaped, filled_node
-from dodo_dsl.application.merge import NAMESPACES
+from dodo_dsl.application.interpolation import escaped
+from dodo_dsl.application.merge import NAMESPACES, filled_node
 from dodo_dsl.application.model import (
     FILES,
     OFFSCREEN,
     SANDBOX,
     ComposeService,
-    env_files,
     environment,
     plain,
     text,
@@ -137,14 +135,13 @@ def _healthcheck(c: Container, node: Node) -> Any:
 def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
     for item in c.items(node):
-        c.fields(
-            item, f"'env_file' of '{c.name}'", "path required", "", {"format": ("is not read", "write NAME=value")}
-        )
-    for file in env_files(c.service.node):
+        fields = c.fields(item, f"'env_file' of '{c.name}'", "path required format")
+        if "format" in fields:
+            c.bad(fields["format"].span, "'format' of a file of variables is not read", "write NAME=value, with quotes")
+    for file in c.service.env_files:
         if path := c.path(file.path, file.span):
-            place = c.project.application.folder / file.path
-            c.problems.extend(dotenv_problems(place))
-            if file.required and not place.is_file():
+            c.problems.extend(file.problems)
+            if file.required and not (c.project.application.folder / file.path).is_file():
                 hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
                 c.bad(file.span, f"there is no file '{file.path}'", hint)
             made.append(path if file.required else {"path": path, "required": False})
@@ -212,12 +209,6 @@ def _depends_on(c: Container, node: Node) -> Any:
             is_there = bool(c.other("depends_on", name, entry.key, services))
         made.update({name: own or {"condition": _CONDITIONS[0]}} if is_there else {})
     return made
-
-
-def _sysctls(c: Container, node: Node) -> Any:
-    found = source.entries(node)
-    is_own = c.project.setting.own_network
-    return {key: plain(each.value) for key, each in found.items() if is_own or not key.startswith("net.")} or None
 
 
 def _secrets(c: Container, node: Node, key: str) -> Any:
@@ -313,7 +304,6 @@ _CARRIED: dict[str, Key] = {
     "runtime": _runtime,
     "secrets": lambda c, n: _secrets(c, n, "secrets"),
     "security_opt": _security,
-    "sysctls": _sysctls,
     "tmpfs": limits.tmpfs,
     "ulimits": limits.ulimits,
     "volumes_from": _volumes_from,
@@ -333,6 +323,6 @@ _LEFT_OUT = (
     "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "device_cgroup_rules",
     "isolation", "label_file", "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness",
     "memswap_limit", "oom_kill_disable", "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop",
-    "pull_policy", "pull_refresh_after", "restart", "scale", "storage_opt", "userns_mode", "uts",
+    "pull_policy", "pull_refresh_after", "restart", "scale", "storage_opt", "sysctls", "userns_mode", "uts",
 )  # fmt: skip
 """Keys of the compose specification that a test has no use for."""

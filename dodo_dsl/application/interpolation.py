@@ -3,14 +3,8 @@
 import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-from dodo_dsl import source
-from dodo_dsl.source import Entry, Node, Scalar
-
-Place = tuple[str, ...]
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _VARIABLE_NAME = re.compile(rf"\$\$|\$\{{?({_NAME.pattern})")
@@ -221,24 +215,6 @@ def _unescaped(match: re.Match[str]) -> str:
     if octal is None:
         return _ESCAPES.get(match[0][1], match[0][1])
     return chr(int(octal, 8)) if re.fullmatch("[0-3][0-7]{2}", octal) else f"\\{octal}"
-
-
-def changed(node: Node, change: Callable[[Scalar, Place], str], place: Place = ()) -> Node:
-    """A node with each text changed, by the keys that lead to it; every part keeps its place."""
-    if isinstance(node, source.Mapping):
-        entries = {k: Entry(e.key, changed(e.value, change, (*place, k))) for k, e in node.entries.items()}
-        return replace(node, entries=entries)
-    if isinstance(node, source.Sequence):
-        return replace(node, items=tuple(changed(item, change, place) for item in node.items))
-    if not isinstance(node.value, str):
-        return node
-    text = change(node, place)
-    return node if text == node.value else replace(node, value=text, text=text)
-
-
-def filled_node(node: Node, known: Mapping[str, str], late: Callable[[str], bool]) -> Node:
-    """A node with its variables filled in."""
-    return changed(node, lambda word, *_: filled(str(word.value), known, late))
 
 
 def escaped(text: str) -> str:

@@ -4,13 +4,14 @@ Keys that may be written in several forms are brought into one: to be merged, an
 """
 
 import os
+from collections import abc
 from collections.abc import Callable
 from dataclasses import replace
 
-from dodo_dsl.application.interpolation import changed, split_outside
+from dodo_dsl.application.interpolation import filled, split_outside
 from dodo_dsl.source import Entry, Mapping, Node, Plain, Scalar, Sequence, plain
 
-Path = tuple[str, ...]
+Place = tuple[str, ...]
 _REMOTE = ("/", "~", "$", "git@", "github.com/", "service:", "target:")
 NAMESPACES = ("network_mode", "ipc", "pid")
 _OUTSIDE = ("",)
@@ -47,7 +48,7 @@ def normal(document: Mapping) -> Mapping:
     return replace(document, entries={**document.entries, "services": made})
 
 
-def _formed(node: Node, place: Path) -> Node:
+def _formed(node: Node, place: Place) -> Node:
     if place in _FORMS and not (isinstance(node, Scalar) and node.value is None):
         node = replace(_FORMS[place](node), tag=node.tag)
     if place not in ((), ("build",)) or not isinstance(node, Mapping):
@@ -72,7 +73,7 @@ def joined(service: Mapping, containers: dict[str, str]) -> Mapping:
     return replace(service, entries=service.entries | own)
 
 
-def _merge(base: Node, over: Node, path: Path) -> Node:
+def _merge(base: Node, over: Node, path: Place) -> Node:
     place = path[2:] if path[:1] == ("services",) else _OUTSIDE
     if over.tag == "!override" or place in _REPLACED:
         return over
@@ -85,7 +86,7 @@ def _merge(base: Node, over: Node, path: Path) -> Node:
     return over
 
 
-def _merge_mappings(base: Mapping, over: Mapping, path: Path) -> Mapping:
+def _merge_mappings(base: Mapping, over: Mapping, path: Place) -> Mapping:
     entries = dict(base.entries)
     for key, entry in over.entries.items():
         if entry.value.tag == "!reset":
@@ -97,7 +98,7 @@ def _merge_mappings(base: Mapping, over: Mapping, path: Path) -> Mapping:
     return replace(base, entries=entries)
 
 
-def _appended(base: Sequence, over: Sequence, place: Path) -> tuple[Node, ...]:
+def _appended(base: Sequence, over: Sequence, place: Place) -> tuple[Node, ...]:
     items = (*base.items, *over.items)
     key = _target if place in _BY_TARGET else lambda item: repr(plain(item))
     return tuple({key(item): item for item in items}.values())
@@ -197,8 +198,8 @@ _BY_TARGET = {("volumes",), ("devices",), ("secrets",), ("configs",)}
 _LISTS = (
     "cap_add", "dns", "dns_opt", "dns_search", "expose", "group_add", "links", "security_opt", "tmpfs", "volumes_from",
 )  # fmt: skip
-_FORMS: dict[Path, Callable[[Node], Node]] = {
-    **{(key,): _as_pairs for key in ("environment", "sysctls")},
+_FORMS: dict[Place, Callable[[Node], Node]] = {
+    ("environment",): _as_pairs,
     **{("build", key): _as_pairs for key in ("args", "additional_contexts")},
     **{(key,): _as_list for key in _LISTS},
     ("build",): _as_build,
@@ -210,10 +211,28 @@ _FORMS: dict[Path, Callable[[Node], Node]] = {
 }
 
 
+def changed(node: Node, change: Callable[[Scalar, Place], str], place: Place = ()) -> Node:
+    """A node with each text changed, by the keys that lead to it; every part keeps its place."""
+    if isinstance(node, Mapping):
+        entries = {k: Entry(e.key, changed(e.value, change, (*place, k))) for k, e in node.entries.items()}
+        return replace(node, entries=entries)
+    if isinstance(node, Sequence):
+        return replace(node, items=tuple(changed(item, change, place) for item in node.items))
+    if not isinstance(node.value, str):
+        return node
+    text = change(node, place)
+    return node if text == node.value else replace(node, value=text, text=text)
+
+
+def filled_node(node: Node, known: abc.Mapping[str, str], late: Callable[[str], bool]) -> Node:
+    """A node with its variables filled in."""
+    return changed(node, lambda word, *_: filled(str(word.value), known, late))
+
+
 def relocated(document: Mapping, base: str) -> Node:
     """A file in normal form with its paths as seen from the folder from which ``base`` leads to its own."""
 
-    def moved(word: Scalar, place: Path) -> str:
+    def moved(word: Scalar, place: Place) -> str:
         text, key = str(word.value), (place[0], *place[2:]) if place else ()
         is_mount = key == ("services", "volumes", "source") and is_path(text)
         return rebased(text, base) if key in _PATHS or key[:3] == _CONTEXTS or is_mount else text

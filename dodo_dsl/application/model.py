@@ -5,18 +5,18 @@ Variables are the one for a service's image, those that files set, and those tha
 
 import functools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_files import Statements, is_late, statements_of
+from dodo_dsl.application.compose_files import Statements, is_late, variables_in
 from dodo_dsl.application.host_paths import HostPaths, repository
 from dodo_dsl.application.interpolation import literal
 from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.opendlv_flags import split
-from dodo_dsl.diagnostics import Span
+from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -86,19 +86,24 @@ class Declared:
 
 @dataclass(frozen=True)
 class EnvFile:
-    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file."""
+    """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file.
+
+    ``statements`` are what the file sets, ``problems`` what compose refuses in it.
+    """
 
     path: str
     span: Span
     required: bool
+    statements: Statements
+    problems: Sequence[Diagnostic]
 
 
 @dataclass(frozen=True)
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo, or if that says nothing of messages. ``statements`` are those of its
-    ``env_files``. Variables are filled in but for those in ``raw``, the values of TEST_FILLED as they are written.
+    ``declared`` is None without x-dodo, or if that says nothing of messages. Variables are filled in but for those in
+    ``raw``, the values of TEST_FILLED as they are written.
     """
 
     name: str
@@ -106,7 +111,6 @@ class ComposeService:
     span: Span
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
-    statements: tuple[Statements, ...] = ()
     raw: Mapping[str, Node] = field(default_factory=dict)
 
     @functools.cached_property
@@ -117,7 +121,7 @@ class ComposeService:
     @functools.cached_property
     def file_variables(self) -> Mapping[str, str | None]:
         """The variables that its files set; None takes the value from outside."""
-        return {name: value for statements in self.statements for name, value in statements}
+        return {name: value for file in self.env_files for name, value in file.statements}
 
     @property
     def has_display(self) -> bool:
@@ -316,19 +320,15 @@ def image_variable(service: str) -> str:
     return "DODO_IMAGE_" + re.sub(r"[^A-Z0-9_]", "_", service.upper())
 
 
-def env_files(service: source.Mapping) -> Iterator[EnvFile]:
-    """The files of ``env_file``."""
+def env_files(service: source.Mapping, folder: Path) -> Iterator[EnvFile]:
+    """The files of ``env_file``, which are relative to ``folder``."""
     node = service.get("env_file")
     for item in node.items if isinstance(node, source.Sequence) else ():
         path, required = source.part(item, "path"), source.part(item, "required")
         if isinstance(path, Scalar) and isinstance(path.value, str):
             is_required = not isinstance(required, Scalar) or is_true(required.value)
-            yield EnvFile(literal(path.text) or path.text, path.span, is_required)
-
-
-def file_statements(files: Iterable[EnvFile], folder: Path) -> tuple[Statements, ...]:
-    """What files next to the compose file set, in order."""
-    return tuple(statements_of(folder / file.path) for file in files if not file.path.startswith(("/", "~")))
+            text = literal(path.text) or path.text
+            yield EnvFile(text, path.span, is_required, *variables_in(folder / text))
 
 
 def with_entry(node: source.Mapping, key: str, value: Node) -> source.Mapping:

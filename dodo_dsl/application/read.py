@@ -28,7 +28,6 @@ from dodo_dsl.application.model import (
     declared,
     declared_cid,
     env_files,
-    file_statements,
     plain,
     with_entry,
 )
@@ -132,8 +131,7 @@ def _service(name: str, entry: Entry, files: ComposeFiles, folder: Path, contain
     node = joined(entry.value, containers)
     raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
     node = with_values(node, raw, files.known, files.is_late)
-    own = tuple(env_files(node))
-    return ComposeService(name, node, entry.key, declared(node), own, file_statements(own, folder), raw)
+    return ComposeService(name, node, entry.key, declared(node), tuple(env_files(node, folder)), raw)
 
 
 def _why_dropped(service: dict[str, Any]) -> str:

@@ -1,14 +1,8 @@
 """Variables that look like secrets: the pipeline's own, tokens, passwords and keys."""
 
-import itertools
 import re
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
 from fnmatch import fnmatchcase
-
-from dodo_dsl import source
-from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Node
 
 PIPELINE = "CI_*"
 PATTERNS = (
@@ -63,18 +57,6 @@ def secret_kind(value: str) -> str:
     """What a value looks like: an address with a password, a private key, or a token; empty for others."""
     found = _SECRET_VALUE.search(value)
     return _KINDS[found.lastgroup or ""] if found else ""
-
-
-def written(nodes: Collection[Node]) -> Iterator[Diagnostic]:
-    """Values in tests that look like secrets; each once, though anchors and merges repeat it."""
-    seen: set[Span] = set()
-    for part in itertools.chain.from_iterable(map(source.walk, nodes)):
-        kind = secret_kind(part.text) if isinstance(part, source.Scalar) else ""
-        if kind and part.span not in seen:
-            seen.add(part.span)
-            message = f"this looks like {kind}, which everybody with access to the repository can read"
-            hint = "keep it out of the repository, and pass a variable with 'environment' of dodo.yml"
-            yield Diagnostic(replace(part.span, length=0), "application-secret", message, hint, "warning")
 
 
 def passed_secrets(variables: Mapping[str, str], passed: Collection[str]) -> Iterator[str]:

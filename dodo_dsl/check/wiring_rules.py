@@ -1,6 +1,7 @@
 """Rules on what services and application give one another: messages, shared memories, and the test's variables."""
 
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from dodo_dsl.application import opendlv_flags, secret_variables
@@ -254,7 +255,7 @@ _GIVEN = ("command", "entrypoint", "environment")
 """Keys whose variables a test may set."""
 
 
-_HARDWARE = ("cap_add", "device_cgroup_rules", "devices", "privileged", "security_opt")
+_HARDWARE = ("cap_add", "devices", "privileged", "security_opt")
 """Keys that only rigs carry."""
 
 
@@ -267,7 +268,11 @@ def check_variables(context: RuleContext) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, _RULE, message, "set a variable that the application itself reads")
         elif isinstance(entry.value, Scalar):
             yield from _value(context, name, entry.value)
-            yield from secret_variables.written([entry.value])
+            if kind := secret_variables.secret_kind(entry.value.text):
+                message = f"this looks like {kind}, which everybody with access to the repository can read"
+                hint = "keep it out of the repository, and pass a variable with 'environment' of dodo.yml"
+                span = replace(entry.value.span, length=0)
+                yield Diagnostic(span, "application-secret", message, hint, "warning")
 
 
 def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnostic]:

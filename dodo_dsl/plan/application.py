@@ -8,7 +8,7 @@ from typing import Any
 
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.construction import Construction, Setting
-from dodo_dsl.application.interpolation import filled_node
+from dodo_dsl.application.merge import filled_node
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
