@@ -231,12 +231,13 @@ def _runtime(c: Container, node: Node) -> Any:
 
 
 def _security(c: Container, node: Node) -> Any:
-    """Options of the engine's confinement, on a rig that allows them; without them it stays as it is."""
-    if c.project.setting.keeps_privileges:
-        return plain(node)
-    if not all(str(plain(item)).startswith("no-new-privileges") for item in c.items(node)):
+    """Options of the engine's confinement: all on a rig that allows them, else those of ``no-new-privileges``."""
+    words = [word for item in c.items(node) if (word := c.literal(item))]
+    is_kept = c.project.setting.keeps_privileges
+    made = [escaped(word) for word in words if is_kept or word.startswith("no-new-privileges")]
+    if len(made) < len(words):
         c.left.append(("security_opt", c.service.node.entries["security_opt"].key))
-    return None
+    return made or None
 
 
 def _own_mounts(c: Container) -> None:

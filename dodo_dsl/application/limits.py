@@ -132,7 +132,7 @@ def own_limits(c: "Container") -> None:
     if "ulimits" not in own:
         own["ulimits"] = ulimits(c)
     if not c.project.setting.keeps_privileges:
-        own["security_opt"] = ["no-new-privileges:true"]
+        own.setdefault("security_opt", ["no-new-privileges:true"])
         dropped = [str(word) for word in own.get("cap_drop") or ()]
         taken = {word.upper().removeprefix("CAP_") for word in dropped}
         own["cap_drop"] = [*dropped, *(name for name in _DROPPED if not taken & {name, "ALL"})]
