@@ -135,10 +135,6 @@ class HostPaths:
         """Whether an absolute path is a robot's device, its settings in the kernel, or a user's sound and screen."""
         return text.startswith(("/", "~")) and all(_is_hardware(name, read_only) for name in self.names(text))
 
-    def is_of_machine(self, text: str) -> bool:
-        """Whether a device is one of the host's disks, its memory or its kernel, under whatever name."""
-        return any(_OF_MACHINE.fullmatch(name) for name in self.names(text))
-
 
 def is_token(source: str, target: str) -> bool:
     """A mount of a file of ``/tmp`` at its own place, by which programs find shared memory; the test's own has it."""
@@ -148,7 +144,7 @@ def is_token(source: str, target: str) -> bool:
 def _is_hardware(name: str, read_only: bool) -> bool:
     if _below(name, [MEMORY]) or name in _PLAIN_DEVICES or name == "/sys" or _below(name, _OF_KERNEL):
         return False
-    is_device = _below(name, ["/dev"]) or bool(_OF_DESKTOP.fullmatch(name))
+    is_device = (_below(name, ["/dev"]) and not _OF_MACHINE.fullmatch(name)) or bool(_OF_DESKTOP.fullmatch(name))
     return is_device or (_below(name, ["/sys"]) and not read_only)
 
 

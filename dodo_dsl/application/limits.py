@@ -147,11 +147,9 @@ LIMITS: dict[str, Callable[["Container", Node], Any]] = {
 }
 
 
-def is_kept(c: "Container", path: str, span: Span, called: str, is_of_rig: bool) -> bool:
+def is_kept(c: "Container", span: Span, called: str, is_of_rig: bool) -> bool:
     """Whether a test has a device of the host: a rig's, but for its port; with a problem where it has not."""
-    if c.project.paths.is_of_machine(path):
-        c.refuse(span, f"{called} gives access to the host's disks or memory", "remove it")
-    elif is_of_rig:
+    if is_of_rig:
         c.hardware(span, f"{called} of '{c.name}' {_NO_PORT}", "give the application another device")
     elif c.project.setting.hil:
         return True
@@ -167,9 +165,9 @@ def devices(c: "Container", node: Node) -> Any:
         if about is None or not (word := c.literal(about)):
             continue
         path = word.partition(":")[0]
-        if not (paths.is_hardware(path) or paths.is_of_machine(path)):
-            c.refuse(about.span, f"device '{word}' of '{c.name}' is no device of the host", "name a file below /dev")
-        elif is_kept(c, path, about.span, f"device '{word}'", is_port(paths.whole(path), c.project.ports, within=True)):
+        if not paths.is_hardware(path):
+            c.refuse(about.span, f"device '{word}' of '{c.name}' is none of a robot, but of the host", "remove it")
+        elif is_kept(c, about.span, f"device '{word}'", is_port(paths.whole(path), c.project.ports, within=True)):
             made.append(plain(item))
     return made or None
 

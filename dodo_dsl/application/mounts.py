@@ -146,9 +146,9 @@ def _bound(of: "Container", mount: Mount) -> Mount | None:
         if own_network:
             return replace(mount, kind="volume", source="tmp", target=target, nocopy=True, is_required=False)
         return replace(mount, source=TMP, target=target)
-    elif paths.is_of_machine(source) or paths.is_hardware(source, read_only=mount.read_only):
+    elif paths.is_hardware(source, read_only=mount.read_only):
         is_own = is_port(paths.whole(source), project.ports)
-        return mount if is_kept(of, source, mount.span, f"'{source}'", is_own) else None
+        return mount if is_kept(of, mount.span, f"'{source}'", is_own) else None
     elif found := paths.mount_problem(source):
         of.refuse(mount.span, *found)
     elif mount.is_required and not os.path.lexists(paths.whole(source)):
