@@ -4,24 +4,26 @@ Each key has one function, which gives what the container has for it. All other 
 them; those without which something else would run are refused.
 """
 
+import re
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application import image, limits, opendlv_flags
+from dodo_dsl.application import limits, opendlv_flags
 from dodo_dsl.application.interpolation import escaped
-from dodo_dsl.application.merge import NAMESPACES, filled_node
+from dodo_dsl.application.merge import NAMESPACES, filled_node, is_local
 from dodo_dsl.application.model import (
     FILES,
     OFFSCREEN,
     SANDBOX,
     ComposeService,
     environment,
+    image_variable,
     plain,
     text,
 )
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import OFF, Part
+from dodo_dsl.application.part import OFF, Part, is_set
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
 from dodo_dsl.source import Node, Scalar
@@ -55,7 +57,7 @@ class Container(Part):
         """What the container has."""
         for key, entry in self.service.node.entries.items():
             if key in _CARRIED:
-                value = _CARRIED[key](self, entry.value) if not _is_null(entry.value) else None
+                value = _CARRIED[key](self, entry.value) if is_set(entry.value) else None
                 self.own.update({} if value is None else {key: value})
             elif key in _REFUSED:
                 self.is_refused(key, entry, f"'{self.name}'", (_REFUSED[key], _WITHOUT))
@@ -79,31 +81,26 @@ class Container(Part):
         return None if node is None else plain(filled_node(node, self.known, self.project.application.is_late))
 
     def other(self, key: str, name: str, span: Span, taken: Collection[str] = ()) -> str:
-        """A service that a key names, if it starts; a problem if there is none."""
+        """A service that a key names, if it starts; a problem if there is none, as of a container of others."""
         others = self.project.application.services
-        if name not in others and name not in self.project.application.dropped:
+        if name.startswith("container:"):
+            message = f"'{key}' joins the {name.replace(':', ' ', 1)}, which is not part of the application"
+            self.refuse(span, message, "make it a service of the application")
+        elif name not in others and name not in self.project.application.dropped:
             message = f"'{key}' of '{self.name}' names the unknown service '{name}'"
             fix = only_fix(name, others, (self.name, *(taken or [name])))
             self.bad(span, message, did_you_mean(name, others), fix)
         return name if name in others else ""
 
-    def joined(self, key: str, word: str, span: Span) -> str:
-        """The same for ``service:x``; a container has to be one of the application, which reads as its service."""
-        kind, _, name = word.partition(":")
-        if kind == "container":
-            message = f"'{key}' joins the container '{name}', which is not part of the application"
-            self.refuse(span, message, "make it a service of the application")
-            return ""
-        return self.other(key, name, span)
 
-
+_REMOTE = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
+_AROUND_NAME = re.compile(r"^(index\.)?docker\.io/|:[^/:@]*(@.*)?\Z|@.*\Z", re.DOTALL)
+"""The registry that the engine takes by default, tag and digest."""
+_BASES = ("python", "library/python", "debian", "library/debian")
+"""What DoDo's images, and those of many others, are built on."""
 _RUNTIMES = ("nvidia", "runc", "runsc")
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 _WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"
-
-
-def _is_null(node: Node) -> bool:
-    return isinstance(node, Scalar) and node.value is None
 
 
 def _command(c: Container, key: str, node: Node) -> Any:
@@ -163,7 +160,7 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
     """Another service's namespace."""
     word = c.literal(node) or ""
     if word.startswith(("service:", "container:")):
-        found = c.joined(key, word, node.span)
+        found = c.other(key, word.removeprefix("service:"), node.span)
         return f"service:{found}" if found else None
     if key == "pid" and word == "host":
         c.refuse(node.span, "'pid: host' gives access to the processes of all tests", "remove it")
@@ -173,10 +170,9 @@ def _namespace(c: Container, key: str, node: Node) -> Any:
 def _volumes_from(c: Container, node: Node) -> Any:
     made = []
     for item in c.items(node):
-        name, sign, options = (c.literal(item) or "").removeprefix("service:").partition(":")
-        if name == "container":
-            c.joined("volumes_from", f"{name}:{options}", item.span)
-        elif name and (found := c.other("volumes_from", name, item.span)):
+        text = (c.literal(item) or "").removeprefix("service:")
+        name, sign, options = (text, "", "") if text.startswith("container:") else text.partition(":")
+        if name and (found := c.other("volumes_from", name, item.span)):
             made.append(escaped(found + sign + options))
     return made or None
 
@@ -246,6 +242,72 @@ def _own_mounts(c: Container) -> None:
         c.own["volumes"] = list(made.values())
 
 
+def _image(c: Container, node: Node) -> Any:
+    """The image of the file, unless a pipeline sets another one."""
+    return f"${{{image_variable(c.name)}:-{text(plain(node))}}}"
+
+
+def _build(c: Container, node: Node) -> Any:
+    image, paths = c.service.node.get("image"), c.project.paths
+    name = _AROUND_NAME.sub("", text(plain(image))) if image is not None else ""
+    if name.startswith("dodo/") or name in _BASES:
+        which = "one of DoDo's own" if name.startswith("dodo/") else "one on which others are built"
+        c.refuse(node.span, f"the image '{name}' of '{c.name}' would replace {which}", "give the image another name")
+    if image is None:
+        c.own["image"] = f"${{{image_variable(c.name)}:-}}"
+    fields = c.fields(
+        node, f"the build of '{c.name}'",
+        "context dockerfile dockerfile_inline args target additional_contexts secrets",
+        "cache_from cache_to entitlements extra_hosts isolation labels no_cache no_cache_filter platforms privileged"
+        " provenance pull sbom shm_size ssh tags ulimits",
+        {"network": ("reaches services of the host", "remove it", "default", "none")},
+    )  # fmt: skip
+    made: dict[str, Any] = {
+        key: plain(fields[key]) for key in ("dockerfile_inline", "target", "secrets", "network") if key in fields
+    }
+    if (context := c.literal(fields["context"]) if "context" in fields else ".") is not None:
+        span = fields["context"].span if "context" in fields else node.span
+        made = {"context": _context(c, span, context), **made}
+        if is_local(context) and paths.is_own(context) and not (paths.folder / context).is_dir():
+            hint = "create it, or remove 'build'; paths are relative to this file"
+            message = f"there is no folder '{context}'"  # a warning, as an image or a variable for it may stand in
+            c.add(Diagnostic(span, "application-file", message, hint, "warning"))
+        if "dockerfile" in fields and (file := c.literal(fields["dockerfile"])):
+            if not context.startswith(_REMOTE):
+                c.path(file, fields["dockerfile"].span, base=context)
+            made["dockerfile"] = escaped(file)
+    if "args" in fields:
+        made["args"] = _arguments(c, plain(fields["args"]))
+    others = source.entries(fields.get("additional_contexts"))
+    if found := {name: _context(c, e.value.span, word) for name, e in others.items() if (word := c.literal(e.value))}:
+        made["additional_contexts"] = found
+    return made
+
+
+def _context(c: Container, span: Span, context: str) -> str:
+    """What is built: a folder of the repository, an image or a URL."""
+    paths = c.project.paths
+    is_here = any((place / context).exists() for place in (paths.folder, *paths.roots)) if "\0" not in context else True
+    if context.startswith(_REMOTE) and ".." not in context.split("/") and not is_here:
+        return escaped(context)
+    if "://" in context:
+        c.refuse(span, f"'{context}' is of a kind that may be a file of the host", "keep it in the repository")
+        return ""
+    return c.path(context, span) or ""
+
+
+def _arguments(c: Container, written: Any) -> dict[str, str | None]:
+    """Arguments of a build; those without a value have that of the variable of their name, or are left out."""
+    application = c.project.application
+    made: dict[str, str | None] = {}
+    for name, value in environment(written).items():
+        if value is not None or application.is_late(name):
+            made[name] = value
+        elif name in application.known:
+            made[name] = application.known[name].replace("$", "$$")
+    return made
+
+
 def _own_namespaces(c: Container) -> None:
     """Network and IPC of the test, unless the service has those of another one, or none."""
     own, setting = c.own, c.project.setting
@@ -286,7 +348,7 @@ _AS_WRITTEN = (
 _CARRIED: dict[str, Key] = {
     **dict.fromkeys(_AS_WRITTEN, lambda _, n: plain(n)),
     **limits.LIMITS,
-    "build": image.build,
+    "build": _build,
     "cap_add": limits.capabilities,
     "command": lambda c, n: _command(c, "command", n),
     "configs": lambda c, n: _secrets(c, n, "configs"),
@@ -298,7 +360,7 @@ _CARRIED: dict[str, Key] = {
     "environment": lambda c, _: None,
     "gpus": limits.gpus,
     "healthcheck": _healthcheck,
-    "image": image.image,
+    "image": _image,
     "links": _links,
     "networks": _networks,
     "privileged": limits.privileged,

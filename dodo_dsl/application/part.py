@@ -89,7 +89,7 @@ class Part:
 
     def items(self, node: Node) -> Iterator[Node]:
         """The items of a list, or the single value."""
-        yield from (i for i in (node.items if isinstance(node, source.Sequence) else (node,)) if _is_set(i))
+        yield from (i for i in (node.items if isinstance(node, source.Sequence) else (node,)) if is_set(i))
 
     def fields(
         self, node: Node | None, what: str, known: str, left_out: str = "", refused: Mapping[str, Refused] = NOTHING
@@ -99,7 +99,7 @@ class Part:
         words, gone = known.split(), left_out.split()
         for key, entry in source.entries(node).items():
             if key in words:
-                found.update({key: entry.value} if _is_set(entry.value) else {})
+                found.update({key: entry.value} if is_set(entry.value) else {})
             elif key in refused:
                 found.update({} if self.is_refused(key, entry, what, refused[key]) else {key: entry.value})
             elif key in gone:
@@ -126,5 +126,5 @@ def spot(entry: source.Entry) -> Span:
     return node.span if isinstance(node, Scalar) and node.text else entry.key
 
 
-def _is_set(node: Node) -> bool:
+def is_set(node: Node) -> bool:
     return not (isinstance(node, Scalar) and node.value is None)
