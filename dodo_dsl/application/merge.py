@@ -115,13 +115,17 @@ def _target(item: Node) -> str:
 
 def _as_pairs(node: Node) -> Node:
     """``[A=1, B]`` as ``{A: 1, B: null}``."""
-    if not isinstance(node, Sequence) or not all(isinstance(item, Scalar) for item in node.items):
+    if not isinstance(node, Sequence) or (items := _texts(node)) is None:
         return node
-    entries = {}
-    for item in node.items:
-        name, sign, value = (item.text if isinstance(item, Scalar) else "").partition("=")
-        entries[name] = Entry(item.span, Scalar(item.span, value if sign else None, value))
+    parts = ((item.span, *item.text.partition("=")) for item in items)
+    entries = {name: Entry(span, Scalar(span, value if sign else None, value)) for span, name, sign, value in parts}
     return Mapping(node.span, entries)
+
+
+def _texts(node: Sequence) -> list[Scalar] | None:
+    """The items of a list that has texts alone."""
+    found = [item for item in node.items if isinstance(item, Scalar) and isinstance(item.value, str)]
+    return found if len(found) == len(node.items) else None
 
 
 def _as_list(node: Node) -> Node:
@@ -147,9 +151,9 @@ def _as_waits(node: Node) -> Node:
 
 
 def _each(node: Node, made: Callable[[Scalar], Node]) -> Node:
-    if not isinstance(node, Sequence):
+    if not isinstance(node, Sequence) or (items := _texts(node)) is None:
         return node
-    return Mapping(node.span, {i.text: Entry(i.span, made(i)) for i in node.items if isinstance(i, Scalar)})
+    return Mapping(node.span, {item.text: Entry(item.span, made(item)) for item in items})
 
 
 def _as_fields(node: Node, **fields: Plain | Mapping) -> Mapping:
