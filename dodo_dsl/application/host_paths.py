@@ -4,6 +4,7 @@ Only paths that are allowed here are carried into a test, so that there is no li
 """
 
 import contextlib
+import functools
 import os
 import pwd
 import re
@@ -90,7 +91,8 @@ class HostPaths:
 
     def is_of_repository(self, text: str) -> bool:
         """Whether a path that is the application's own is a file of the repository, and so nobody's to write to."""
-        roots = [name for root in self.roots for name in (str(root), real(root))]
+        count = len(self.roots)
+        roots = (*self._places[:count], *self._real_places[:count])
         return any(_below(name, roots) for name in self.names(text))
 
     def is_writable(self, text: str) -> bool:
@@ -101,8 +103,7 @@ class HostPaths:
         """Where symbolic links lead to that leave the repository and the allowed paths; empty without such a link."""
         if not _below(self.whole(text), self._places):
             return ""
-        places = [real(place) for place in self._places]
-        return next((name for name in self.names(text)[1:] if not _below(name, places)), "")
+        return next((name for name in self.names(text)[1:] if not _below(name, self._real_places)), "")
 
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
@@ -118,9 +119,13 @@ class HostPaths:
             return None
         return f"'{text}' {self._where(text)}, so tests would share it", ASK
 
-    @property
-    def _places(self) -> tuple[Path, ...]:
-        return (*self.roots, *self.allowed)
+    @functools.cached_property
+    def _places(self) -> tuple[str, ...]:
+        return tuple(map(str, (*self.roots, *self.allowed)))
+
+    @functools.cached_property
+    def _real_places(self) -> tuple[str, ...]:
+        return tuple(map(real, self._places))
 
     def _is_to_read(self, text: str) -> bool:
         places = (*TO_READ, *map(real, TO_READ))
@@ -148,8 +153,8 @@ def _is_hardware(name: str, read_only: bool) -> bool:
     return is_device or (_below(name, ["/sys"]) and not read_only)
 
 
-def _below(path: str, places: "Sequence[Path | str]") -> bool:
-    return any(path == str(place) or path.startswith(f"{str(place).rstrip('/')}/") for place in places)
+def _below(path: str, places: Sequence[str]) -> bool:
+    return any(path == place or path.startswith(f"{place.rstrip('/')}/") for place in places)
 
 
 def _expanded(text: str) -> str:
