@@ -65,7 +65,7 @@ class Container(Part):
                 self.left += [(key, entry.key)] if plain(entry.value) not in OFF else []
             elif key != "profiles":
                 self.unknown_key(key, self.service.node, f"'{self.name}'", (*_CARRIED, *_REFUSED, *_LEFT_OUT))
-        for step in (_own_environment, _own_mounts, limits.own_limits, _own_namespaces, _own_dependencies):
+        for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
             step(self)
         if self.left:
             keys = list(dict.fromkeys(key for key, _ in self.left))
@@ -236,10 +236,9 @@ def _security(c: Container, node: Node) -> Any:
     return made or None
 
 
-def _own_mounts(c: Container) -> None:
+def _volumes(c: Container) -> Any:
     settled = map(c.project.settled, c.mounts)
-    if made := {(mount.source, mount.target): mount.written() for mount in settled}:
-        c.own["volumes"] = list(made.values())
+    return list({(mount.source, mount.target): mount.written() for mount in settled}.values()) or None
 
 
 def _image(c: Container, node: Node) -> Any:
@@ -370,7 +369,7 @@ _CARRIED: dict[str, Key] = {
     "tmpfs": limits.tmpfs,
     "ulimits": limits.ulimits,
     "volumes_from": _volumes_from,
-    "volumes": lambda c, n: None,
+    "volumes": lambda c, _: _volumes(c),
     **{key: lambda c, n, key=key: _namespace(c, key, n) for key in NAMESPACES},  # type: ignore[misc]
 }
 """What the container has for a key, by the key; None for nothing."""
