@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dodo_dsl import package_data
+from dodo_dsl.application import hidden_paths
 from dodo_dsl.application.model import Access, ApplicationSource
 from dodo_dsl.application.read import read_application
-from dodo_dsl.application.unseen import unseen_problems
 from dodo_dsl.check import check, file_rules
 from dodo_dsl.check.resolve import ResolvedTest, known_ids, resolve
 from dodo_dsl.check.service_rules import unknown_messages
@@ -178,7 +178,7 @@ def load(
         )
         found = [*found, *of_application]
         if source:
-            found += unseen_problems(source, deployment, {location.root for location in locations})
+            found += hidden_paths.problems(source, deployment, {location.root for location in locations})
     if settings.emulate:
         rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
         deployment = replace(deployment, rigs=rigs)

@@ -1,8 +1,10 @@
 """Variables in compose files, ``${NAME:-default}``: found, and filled in as compose does; and ``.env`` files."""
 
+import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _VARIABLE_NAME = re.compile(rf"\$\$|\$\{{?({_NAME.pattern})")
@@ -10,7 +12,6 @@ _SHOWN = 60
 _BLANKS = r"[ \t\v\f\r\x85\xa0]*"
 _SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
 _NAMED = re.compile(rf"(?:export\s+)?(?P<name>(?:[\w.\[\]-]|{_BLANKS[:-1]})*)(?P<sign>[=:\n]|\Z){_BLANKS}")
-_RAW_NAME = re.compile(r"(?P<name>[^=\n]*)(?P<sign>=|\Z|(?=\n))")
 _QUOTED = re.compile(r"""(?P<quote>["'])(?P<body>(?:\\.|(?!(?P=quote))[^\\])*)(?P=quote)""", re.DOTALL)
 _ESCAPE = re.compile(r'\\(?:[abfnrtv$"\\]|0(?P<octal>\d{0,3}))', re.ASCII)
 VARIABLE = re.compile(
@@ -37,8 +38,9 @@ def end_of_variable(text: str, start: int) -> int:
 
 def split_outside(text: str, sign: str) -> list[str]:
     """A string split at a sign, but not within variables: ``${A:-b:c}:d`` has two parts at the colons."""
-    hidden = _replaced(text, lambda match: match[0].replace(sign, "\0"))
-    return [part.replace("\0", sign) for part in hidden.split(sign)]
+    hidden = _replaced(text, lambda match: " " * len(match[0]))
+    places = [-1, *(place for place, character in enumerate(hidden) if character == sign), len(text)]
+    return [text[start + 1 : end] for start, end in itertools.pairwise(places)]
 
 
 def names(text: str) -> set[str]:
@@ -147,27 +149,25 @@ class DotenvProblem(EnvironmentProblem):
         super().__init__(f"line {self.line}: {what}; {hint}")
 
 
-def dotenv(text: str, *, raw: bool = False) -> tuple[list[tuple[str, str | None]], DotenvProblem | None]:
+def dotenv(text: str) -> tuple[list[tuple[str, str | None]], DotenvProblem | None]:
     """The variables of a ``.env`` file as compose reads it, up to the first problem; a literal ``$`` is doubled.
 
-    None takes the value from outside. ``raw`` is the format in which values are as they are written.
+    None takes the value from outside.
     """
     found: list[tuple[str, str | None]] = []
     try:
-        found.extend(_statements(text, raw))
+        found.extend(_statements(text))
     except DotenvProblem as problem:
         return found, problem
     return found, None
 
 
-def dotenv_file(
-    path: Path, known: Mapping[str, str], before: Mapping[str, str] | None = None, *, raw: bool = False
-) -> dict[str, str]:
+def dotenv_file(path: Path, known: Mapping[str, str], before: Mapping[str, str] | None = None) -> dict[str, str]:
     """The variables of a ``.env`` file, interpolated with ``known`` first, then with earlier ones and those ``before``.
 
     Empty without a file; raises EnvironmentProblem for what compose refuses.
     """
-    written, problem = dotenv(path.read_bytes().decode(errors="replace") if path.is_file() else "", raw=raw)
+    written, problem = dotenv(path.read_bytes().decode(errors="replace") if path.is_file() else "")
     if problem:
         raise EnvironmentProblem(f"'{path.name}', {problem}")
     found: dict[str, str] = {}
@@ -177,31 +177,29 @@ def dotenv_file(
     return found
 
 
-def _statements(text: str, raw: bool) -> Iterator[tuple[str, str | None]]:
+def _statements(text: str) -> Iterator[tuple[str, str | None]]:
     """The variables with their values; raises DotenvProblem."""
     text, place = text.removeprefix("\ufeff"), 0
     while (place := _SKIPPED.match(text, place).end()) < len(text):  # type: ignore[union-attr]
-        match = (_RAW_NAME if raw else _NAMED).match(text, place)
-        name = match["name"].rstrip("\r" if raw else None) if match else ""
+        match = _NAMED.match(text, place)
+        name = match["name"].rstrip() if match else ""
         if not match or not name or any(character.isspace() for character in name):
             raise DotenvProblem(text, place, "a variable has no name", "write NAME=value, one on each line")
-        if not match["sign"] and not raw:
+        if not match["sign"]:
             raise DotenvProblem(text, place, f"'{name}' has no value, and no line break behind it", f"write {name}=")
         value, place = None, match.end()
         if match["sign"] in ("=", ":"):
-            value, place = _value(text, place, raw)
+            value, place = _value(text, place)
         yield name, value
 
 
-def _value(text: str, start: int, raw: bool) -> tuple[str, int]:
+def _value(text: str, start: int) -> tuple[str, int]:
     """A value, and where it ends; raises DotenvProblem."""
-    quoted = None if raw else _QUOTED.match(text, start)
+    quoted = _QUOTED.match(text, start)
     end = quoted.end() if quoted else (text.find("\n", start) + 1 or len(text) + 1) - 1
     value = quoted["body"] if quoted else text[start:end]
     if "\ufffd" in value:
         raise DotenvProblem(text, start, "the value is not UTF-8 text", "save the file as UTF-8")
-    if raw:
-        return value.removesuffix("\r").replace("$", "$$"), end
     if quoted and quoted["quote"] == "'":
         return value.replace("\\'", "'").replace("$", "$$"), end
     if value.startswith(("'", '"')) and not quoted:
@@ -217,3 +215,17 @@ def _unescaped(match: re.Match[str]) -> str:
     if octal is None:
         return _ESCAPES.get(match[0][1], match[0][1])
     return chr(int(octal, 8)) if re.fullmatch("[0-3][0-7]{2}", octal) else f"\\{octal}"
+
+
+def escaped(text: str) -> str:
+    """A path as a compose file has it, in which a dollar sign alone begins a variable."""
+    return text.replace("$", "$$")
+
+
+def mapped_texts(value: Any, change: Callable[[str], str]) -> Any:
+    """Values of JSON with ``change`` applied to each text."""
+    if isinstance(value, dict):
+        return {key: mapped_texts(each, change) for key, each in value.items()}
+    if isinstance(value, list):
+        return [mapped_texts(each, change) for each in value]
+    return change(value) if isinstance(value, str) else value

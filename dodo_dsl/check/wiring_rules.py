@@ -1,8 +1,9 @@
 """Rules on what services and application give one another: messages, shared memories, and the test's variables."""
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 
-from dodo_dsl.application import opendlv_flags, secret_problems
+from dodo_dsl.application import opendlv_flags, secret_variables
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
@@ -171,7 +172,7 @@ _GIVEN = ("command", "entrypoint", "environment")
 """Keys whose variables a test may set."""
 
 
-_HARDWARE = ("cap_add", "device_cgroup_rules", "devices", "privileged", "security_opt")
+_HARDWARE = ("cap_add", "devices", "privileged", "security_opt")
 """Keys that only rigs carry."""
 
 
@@ -184,7 +185,11 @@ def check_variables(context: RuleContext) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, _RULE, message, "set a variable that the application itself reads")
         elif isinstance(entry.value, Scalar):
             yield from _value(context, name, entry.value)
-            yield from secret_problems.written([entry.value])
+            if kind := secret_variables.secret_kind(entry.value.text):
+                message = f"this looks like {kind}, which everybody with access to the repository can read"
+                hint = "keep it out of the repository, and pass a variable with 'environment' of dodo.yml"
+                span = replace(entry.value.span, length=0)
+                yield Diagnostic(span, "application-secret", message, hint, "warning")
 
 
 def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnostic]:

@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from dodo_dsl.application.compose_paths import escaped
+from dodo_dsl.application.interpolation import escaped
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import LAYERS, Plan
