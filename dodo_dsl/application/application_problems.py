@@ -3,6 +3,7 @@
 A service has a name and a program; together they have cycles of dependencies, and buses.
 """
 
+import difflib
 import os
 import re
 from collections.abc import Collection, Iterator, Sequence
@@ -154,10 +155,11 @@ def takes_cid(service: ComposeService) -> bool:
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
-    """Unknown keys that begin like DoDo's."""
+    """Unknown keys that are like DoDo's."""
     entries = source.entries(service)
     for word, entry in entries.items():
-        if word.startswith("x-dodo") and word not in KEYS:
+        near = word.startswith("x-") and difflib.get_close_matches(word.lower(), KEYS, cutoff=0.8)
+        if (near or word.startswith("x-dodo")) and word not in KEYS:
             hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
             yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, fix=fix)
 

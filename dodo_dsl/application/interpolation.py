@@ -8,6 +8,7 @@ from typing import Any
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _VARIABLE_NAME = re.compile(rf"\$\$|\$\{{?({_NAME.pattern})")
+_BARE_NAME = re.compile(rf"\$\$|\$\{{({_NAME.pattern})\}}|\$({_NAME.pattern})")
 _SHOWN = 60
 _BLANKS = r"[ \t\v\f\r\x85\xa0]*"
 _SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
@@ -46,6 +47,11 @@ def split_outside(text: str, sign: str) -> list[str]:
 def names(text: str) -> set[str]:
     """The variables in a string, those in defaults included."""
     return {match[1] for match in _VARIABLE_NAME.finditer(text) if match[1]}
+
+
+def without_default(text: str) -> set[str]:
+    """The variables in a string that have no default there."""
+    return {match[1] or match[2] for match in _BARE_NAME.finditer(text) if match[0] != "$$"}
 
 
 class EnvironmentProblem(ValueError):

@@ -16,8 +16,9 @@ from dodo_dsl.application import secret_variables
 from dodo_dsl.application.application_problems import application_problems, unknown_keys
 from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles
 from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
-from dodo_dsl.application.interpolation import names
+from dodo_dsl.application.interpolation import names, without_default
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.merge import joined
 from dodo_dsl.application.model import (
@@ -81,7 +82,7 @@ def read_application(
     if not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
         found.extend(validate(document, "application"))
     if has_errors(found):
-        return None, found
+        return None, list(_explained(found, document, files))
     root = Path(access.roots[0]) if access.roots else None
     dropped = {name: why for name, entry in services.items() if (why := _why_dropped(plain(entry.value)))}
     started = {name: entry for name, entry in services.items() if name not in dropped}
@@ -109,7 +110,8 @@ def read_application(
     found.extend(application_problems(application, construction, next(iter(services.values())).key))
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
-    found.extend(problem for problem in _withheld(application, files) if problem.span not in refused)
+    more = (*_withheld(application, files), *_empty(application, files))
+    found = [*_explained(found, document, files), *(p for p in more if p.span not in refused)]
     return (replace(application, shown=tuple(construction.shown)) if kept else None), found
 
 
@@ -209,6 +211,36 @@ def _withheld(application: ApplicationSource, files: ComposeFiles) -> Iterator[D
             message = f"variable '{name}' {why}, so it is unset in a test"
             hint = f"to pass it, write environment: [{name}] in dodo.yml"
             yield Diagnostic(span, "application-secret", message, hint, "warning")
+
+
+def _unset(span: Span, files: ComposeFiles) -> list[str]:
+    """The variables in what is written at a place that have no value there, and are not DoDo's own."""
+    known = {*files.known, *files.included, *files.secrets, *files.passed, *os.environ, *_OF_FOLDER}
+    return sorted(without_default(files.written.get(span, "")) - known)
+
+
+def _explained(problems: Sequence[Diagnostic], document: Node, files: ComposeFiles) -> Iterator[Diagnostic]:
+    """Problems with the variable for want of which a text is as it is."""
+    parts = source.walk(document) if problems else ()
+    values = {e.key: e.value.span for part in parts if isinstance(part, Mapping) for e in part.entries.values()}
+    for problem in problems:
+        unset = _unset(values.get(problem.span, problem.span), files)
+        message = f"variable '{unset[0]}' has no value: {problem.message}" if unset else problem.message
+        yield replace(problem, message=message)
+
+
+def _empty(application: ApplicationSource, files: ComposeFiles) -> Iterator[Diagnostic]:
+    """Variables without a value where no test can give them one."""
+    seen = set[str]()
+    for service in application.services.values():
+        kept = (e.value for key, e in service.node.entries.items() if is_carried(key) and key not in TEST_FILLED)
+        for part in itertools.chain.from_iterable(map(source.walk, kept)):
+            for name in _unset(part.span, files):
+                if name not in seen:
+                    seen.add(name)
+                    message = f"variable '{name}' has no value, so it is empty here"
+                    hint = f"set it in .env beside this file, or write a default: ${{{name}:-...}}"
+                    yield Diagnostic(part.span, "application-required", message, hint, "warning")
 
 
 def _named(node: Node, key: str, texts: dict[Span, str]) -> Iterator[tuple[str, Span]]:
