@@ -27,7 +27,7 @@ from dodo_dsl.application.model import (
     words_of,
 )
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node, Scalar
 
 _GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
@@ -158,10 +158,11 @@ def unknown_keys(service: Node) -> Iterator[Diagnostic]:
     """Unknown keys that are like DoDo's."""
     entries = source.entries(service)
     for word, entry in entries.items():
-        near = word.startswith("x-") and difflib.get_close_matches(word.lower(), KEYS, cutoff=0.8)
-        if (near or word.startswith("x-dodo")) and word not in KEYS:
+        is_near = word.startswith("x-") and difflib.get_close_matches(word.lower(), KEYS, cutoff=0.8)
+        if word not in KEYS and (word.startswith("x-dodo") or is_near):
             hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
-            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, fix=fix)
+            severity: Severity = "error" if word.startswith("x-dodo") else "warning"
+            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, severity, fix=fix)
 
 
 def _name(service: ComposeService) -> Iterator[Diagnostic]:
