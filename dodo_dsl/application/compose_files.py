@@ -188,7 +188,7 @@ Statements = Sequence[tuple[str, str | None]]
 """The names and values of a file of variables, in order; None takes the value from outside."""
 
 
-def variables_in(file: Path) -> tuple[Statements, list[Diagnostic]]:
+def variables_in(file: Path, *, raw: bool = False) -> tuple[Statements, list[Diagnostic]]:
     """What a regular file sets, and what compose refuses in it, which shows nothing of the line: it may be a secret.
 
     Symlinks are not followed.
@@ -196,7 +196,7 @@ def variables_in(file: Path) -> tuple[Statements, list[Diagnostic]]:
     if file.is_symlink() or not file.is_file():
         return [], []
     with file.open("rb") as stream:
-        found, problem = dotenv(stream.read(_MAX_ENV).decode("utf-8", "replace"))
+        found, problem = dotenv(stream.read(_MAX_ENV).decode("utf-8", "replace"), raw=raw)
     if problem is None:
         return found, []
     return found, [Diagnostic(Span(str(file), problem.line, 1, 0), "application-file", problem.what, problem.hint)]

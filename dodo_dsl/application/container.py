@@ -132,16 +132,15 @@ def _healthcheck(c: Container, node: Node) -> Any:
 def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
     for item in c.items(node):
-        fields = c.fields(item, f"'env_file' of '{c.name}'", "path required format")
-        if "format" in fields:
-            c.bad(fields["format"].span, "'format' of a file of variables is not read", "write NAME=value, with quotes")
+        c.fields(item, f"'env_file' of '{c.name}'", "path required format")
     for file in c.service.env_files:
         if path := c.path(file.path, file.span):
             c.problems.extend(file.problems)
             if file.required and not (c.project.application.folder / file.path).is_file():
                 hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
                 c.bad(file.span, f"there is no file '{file.path}'", hint)
-            made.append(path if file.required else {"path": path, "required": False})
+            about = {**({} if file.required else {"required": False}), **({"format": "raw"} if file.raw else {})}
+            made.append({"path": path, **about} if about else path)
     return made
 
 

@@ -13,6 +13,7 @@ _SHOWN = 60
 _BLANKS = r"[ \t\v\f\r\x85\xa0]*"
 _SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
 _NAMED = re.compile(rf"(?:export\s+)?(?P<name>(?:[\w.\[\]-]|{_BLANKS[:-1]})*)(?P<sign>[=:\n]|\Z){_BLANKS}")
+_RAW_NAME = re.compile(r"(?P<name>[^=\n]*)(?P<sign>=|\Z|(?=\n))")
 _QUOTED = re.compile(r"""(?P<quote>["'])(?P<body>(?:\\.|(?!(?P=quote))[^\\])*)(?P=quote)""", re.DOTALL)
 _ESCAPE = re.compile(r'\\(?:[abfnrtv$"\\]|0(?P<octal>\d{0,3}))', re.ASCII)
 VARIABLE = re.compile(
@@ -155,25 +156,27 @@ class DotenvProblem(EnvironmentProblem):
         super().__init__(f"line {self.line}: {what}; {hint}")
 
 
-def dotenv(text: str) -> tuple[list[tuple[str, str | None]], DotenvProblem | None]:
+def dotenv(text: str, *, raw: bool = False) -> tuple[list[tuple[str, str | None]], DotenvProblem | None]:
     """The variables of a ``.env`` file as compose reads it, up to the first problem; a literal ``$`` is doubled.
 
-    None takes the value from outside.
+    None takes the value from outside. ``raw`` is the format in which values are as they are written.
     """
     found: list[tuple[str, str | None]] = []
     try:
-        found.extend(_statements(text))
+        found.extend(_statements(text, raw))
     except DotenvProblem as problem:
         return found, problem
     return found, None
 
 
-def dotenv_file(path: Path, known: Mapping[str, str], before: Mapping[str, str] | None = None) -> dict[str, str]:
+def dotenv_file(
+    path: Path, known: Mapping[str, str], before: Mapping[str, str] | None = None, *, raw: bool = False
+) -> dict[str, str]:
     """The variables of a ``.env`` file, interpolated with ``known`` first, then with earlier ones and those ``before``.
 
     Empty without a file; raises EnvironmentProblem for what compose refuses.
     """
-    written, problem = dotenv(path.read_bytes().decode(errors="replace") if path.is_file() else "")
+    written, problem = dotenv(path.read_bytes().decode(errors="replace") if path.is_file() else "", raw=raw)
     if problem:
         raise EnvironmentProblem(f"'{path.name}', {problem}")
     found: dict[str, str] = {}
@@ -183,29 +186,31 @@ def dotenv_file(path: Path, known: Mapping[str, str], before: Mapping[str, str] 
     return found
 
 
-def _statements(text: str) -> Iterator[tuple[str, str | None]]:
+def _statements(text: str, raw: bool) -> Iterator[tuple[str, str | None]]:
     """The variables with their values; raises DotenvProblem."""
     text, place = text.removeprefix("\ufeff"), 0
     while (place := _SKIPPED.match(text, place).end()) < len(text):  # type: ignore[union-attr]
-        match = _NAMED.match(text, place)
-        name = match["name"].rstrip() if match else ""
+        match = (_RAW_NAME if raw else _NAMED).match(text, place)
+        name = match["name"].rstrip("\r" if raw else None) if match else ""
         if not match or not name or any(character.isspace() for character in name):
             raise DotenvProblem(text, place, "a variable has no name", "write NAME=value, one on each line")
-        if not match["sign"]:
+        if not match["sign"] and not raw:
             raise DotenvProblem(text, place, f"'{name}' has no value, and no line break behind it", f"write {name}=")
         value, place = None, match.end()
         if match["sign"] in ("=", ":"):
-            value, place = _value(text, place)
+            value, place = _value(text, place, raw)
         yield name, value
 
 
-def _value(text: str, start: int) -> tuple[str, int]:
+def _value(text: str, start: int, raw: bool) -> tuple[str, int]:
     """A value, and where it ends; raises DotenvProblem."""
-    quoted = _QUOTED.match(text, start)
+    quoted = None if raw else _QUOTED.match(text, start)
     end = quoted.end() if quoted else (text.find("\n", start) + 1 or len(text) + 1) - 1
     value = quoted["body"] if quoted else text[start:end]
     if "\ufffd" in value:
         raise DotenvProblem(text, start, "the value is not UTF-8 text", "save the file as UTF-8")
+    if raw:
+        return value.removesuffix("\r").replace("$", "$$"), end
     if quoted and quoted["quote"] == "'":
         return value.replace("\\'", "'").replace("$", "$$"), end
     if value.startswith(("'", '"')) and not quoted:

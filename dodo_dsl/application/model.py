@@ -88,12 +88,14 @@ class Declared:
 class EnvFile:
     """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file.
 
-    ``statements`` are what the file sets, ``problems`` what compose refuses in it.
+    ``raw`` is the format whose values are as they are written. ``statements`` are what the file sets, ``problems`` what
+    compose refuses in it.
     """
 
     path: str
     span: Span
     required: bool
+    raw: bool
     statements: Statements
     problems: Sequence[Diagnostic]
 
@@ -324,11 +326,12 @@ def env_files(service: source.Mapping, folder: Path) -> Iterator[EnvFile]:
     """The files of ``env_file``, which are relative to ``folder``."""
     node = service.get("env_file")
     for item in node.items if isinstance(node, source.Sequence) else ():
-        path, required = source.part(item, "path"), source.part(item, "required")
+        path, required, kind = (source.part(item, key) for key in ("path", "required", "format"))
         if isinstance(path, Scalar) and isinstance(path.value, str):
             is_required = not isinstance(required, Scalar) or is_true(required.value)
             text = literal(path.text) or path.text
-            yield EnvFile(text, path.span, is_required, *variables_in(folder / text))
+            raw = isinstance(kind, Scalar)
+            yield EnvFile(text, path.span, is_required, raw, *variables_in(folder / text, raw=raw))
 
 
 def with_entry(node: source.Mapping, key: str, value: Node) -> source.Mapping:

@@ -102,6 +102,7 @@ def _process(
         takes_cid=opendlv_flags.takes_cid((*words, *(v for v in variables.values() if v)), variables),
         takes_memory=opendlv_flags.takes_memory(words),
         env_files=tuple(file.path for file in service.env_files),
+        raw_files=tuple(file.path for file in service.env_files if file.raw),
         inputs=_names(own.inputs) if own else (),
         outputs=_names(own.outputs) if own else (),
         after={**dict.fromkeys(needed, STARTED), **{n: how.get("condition", STARTED) for n, how in waits.items()}},

@@ -68,6 +68,7 @@ class ApplicationService:
 
     ``inputs`` and ``outputs`` are the messages that it declares, each ``name`` or ``name/senderStamp``. ``after`` are
     the services for which it waits, each with its condition; without the ``optional`` ones of them it starts, too.
+    ``raw_files`` are those of ``env_files`` whose values are as they are written.
     """
 
     name: str
@@ -77,6 +78,7 @@ class ApplicationService:
     takes_cid: bool = False
     takes_memory: bool = False
     env_files: tuple[str, ...] = ()
+    raw_files: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     after: dict[str, str] = field(default_factory=dict)

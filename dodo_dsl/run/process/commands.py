@@ -113,7 +113,8 @@ class Commands:
         for path in service.env_files:
             if problem := paths.file_problem(path):
                 raise EnvironmentProblem(f"env_file of '{service.name}': {problem}")
-            own.update(dotenv_file(folder / expanded(path), {**given, **variables}, own))
+            raw = path in service.raw_files
+            own.update(dotenv_file(folder / expanded(path), {**given, **variables}, own, raw=raw))
         own.update(given)
         own = {name: cids.get(name, with_cid_text(value, self.slot.cid)) for name, value in own.items()}
         pairs = ((word, interpolate(word, variables)) for word in service.command)

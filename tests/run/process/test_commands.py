@@ -18,7 +18,7 @@ services:
   planner:
     image: team/planner
     command: run --cid=${CID} --rate=${RATE} --greeting=${GREETING} ${NOTHING} session=${CID}
-    env_file: [car.env, {path: private.env, required: false}, raw.env, last.env]
+    env_file: [car.env, {path: private.env, required: false}, {path: raw.env, format: raw}, last.env]
     environment:
       LEVEL: debug
       FROM_OUTSIDE:
@@ -40,7 +40,7 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *passed: str) -> Co
         "planner.py": "",
         ".env": "CID=111\nRATE=20\nGREETING='costs $5'\n",
         "car.env": "WHEELBASE=0.257\nLEVEL=info\nOD4SESSION_CID=111\nTWICE=${RATE}${RATE}\n",
-        "raw.env": "RAW='$RATE' # all\nLEVEL=raw\n",
+        "raw.env": 'RAW="$RATE" # all\nLEVEL=raw\n',
         "last.env": "SAID=${LEVEL} ${WHEELBASE} ${RAW}\nNOTE=   # of the service, and earlier files\n",
     }
     test = compiled(repository(tmp_path, files), way="host", environment=list(passed))
