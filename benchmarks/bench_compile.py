@@ -1,6 +1,6 @@
 """Compiling and checking 10 to 10,000 instances, beside ``docker compose config -q`` on the output.
 
-Each number of instances is compiled twice: as one spec with a matrix, and as as many specs; 10,000 only as a matrix.
+Each number of instances is compiled twice: by a matrix, and as as many specs; 10,000 only by matrices, of five specs.
 The seconds a test include the start of the command. Everything is written below the system's temporary folder, so its
 file system has a share in the figures; ``--check`` writes nothing.
 """
@@ -21,6 +21,7 @@ from players import ROOT, cost_of
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
+from dodo_dsl.spec.matrix import MAX_INSTANCES
 
 PLUGINS = (Path.home() / ".docker", Path("/usr/local/lib/docker"), Path("/usr/libexec/docker"), Path("/usr/lib/docker"))
 PLUGIN = next((path for folder in PLUGINS if (path := folder / "cli-plugins" / "docker-compose").is_file()), None)
@@ -46,11 +47,13 @@ def write_specs(folder: Path, name: str, number: int, matrix: bool) -> None:
     """A registry of so many instances; each has its own yaw, within the range that the spec varies it in."""
     yaws = [f"{66 + 8 * i / number:.6f} deg" for i in range(number)]
     text = SPEC.read_text()
-    specs = {}
-    if matrix:
-        specs[name] = text.replace("70 deg", '"${matrix.yaw}"') + f"matrix: {{yaw: [{', '.join(yaws)}]}}\n"
-    else:
-        specs = {f"{name}-{i}": text.replace("70 deg", yaw) for i, yaw in enumerate(yaws)}
+    size = MAX_INSTANCES if matrix else 1
+    parts = [yaws[first : first + size] for first in range(0, number, size)]
+    bodies = [text.replace("70 deg", '"${matrix.yaw}"' if matrix else yaw) for yaw, *_ in parts]
+    bodies = (
+        [f"{b}matrix: {{yaw: [{', '.join(p)}]}}\n" for b, p in zip(bodies, parts, strict=True)] if matrix else bodies
+    )
+    specs = {f"{name}-{number}": body for number, body in enumerate(bodies)}
     for spec, body in specs.items():
         path = folder / "tests" / spec / f"{spec}.dodo.yml"
         path.parent.mkdir(parents=True)

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dodo_dsl import package_data
+from dodo_dsl.application import hidden_paths
 from dodo_dsl.application.model import Access, ApplicationSource
 from dodo_dsl.application.read import read_application
-from dodo_dsl.application.unseen import unseen_problems
 from dodo_dsl.check import check, file_rules
 from dodo_dsl.check.resolve import ResolvedTest, known_ids, resolve
 from dodo_dsl.check.service_rules import unknown_messages
-from dodo_dsl.check.suite_rules import check_suite
+from dodo_dsl.check.spec_rules import check_suite
 from dodo_dsl.diagnostics import Diagnostic, has_errors, ordered
 from dodo_dsl.source import Reader, Scalar, read
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
@@ -134,8 +134,13 @@ class Compilation:
 
     compiled: "Compiled"
     jobs: "Pipeline"
-    pipeline: "File"
     problems: tuple[Diagnostic, ...]
+
+    @property
+    def pipeline(self) -> "File":
+        from dodo_dsl.emit.render import render_pipeline
+
+        return render_pipeline(self.jobs)
 
 
 class NoApplication(Exception):
@@ -173,7 +178,7 @@ def load(
         )
         found = [*found, *of_application]
         if source:
-            found += unseen_problems(source, deployment, {location.root for location in locations})
+            found += hidden_paths.problems(source, deployment, {location.root for location in locations})
     if settings.emulate:
         rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
         deployment = replace(deployment, rigs=rigs)
@@ -268,7 +273,6 @@ def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Co
     """
     from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_folder, pipeline_problems
     from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS
-    from dodo_dsl.emit.render import render_pipeline
     from dodo_dsl.plan.build import build
 
     if checked.application is None:
@@ -279,12 +283,11 @@ def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Co
         checked.tests, checked.manifests, deployment, application, out.resolve(), settings, options.from_repository
     )
     jobs = pipeline(compiled.suite, pipeline_folder(out), options)
-    child = render_pipeline(jobs)
     files = {spec.slug: str(spec.path) for spec in checked.specs}
     shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    limits = pipeline_problems(compiled.suite, jobs, child.text)
+    limits = pipeline_problems(compiled.suite, jobs)
     problems = [
         replace(problem, span=replace(problem.span, file=shown.get(problem.span.file, problem.span.file)))
         for problem in [*limits, *artifact_problems(compiled, options)]
     ]
-    return Compilation(compiled, jobs, child, tuple(ordered(problems)))
+    return Compilation(compiled, jobs, tuple(ordered(problems)))

@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from dodo_dsl.diagnostics import Fix
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span
 
 _KINDS = {
-    "escape": "escape",
     "quoted scalar": "quote",
     "simple key": "key",
     "mapping values are not allowed": "colon",
@@ -34,28 +33,13 @@ _LONGEST = 1000
 
 
 @dataclass(frozen=True)
-class Slip:
-    """A mistake in a text: its place, counted from 0, and words about it; ``is_tab`` for indentation with a tab.
-
-    ``fix`` is for the ``length`` characters at the place, if there is exactly one fix.
-    """
-
-    line: int
-    column: int
-    message: str
-    hint: str = ""
-    is_tab: bool = False
-    fix: Fix | None = None
-    length: int = 1
-
-
-@dataclass(frozen=True)
 class Failure:
     """``problem`` and ``context`` are libyaml's words; ``begin`` is where it began to read what failed at ``mark``.
 
     Both are line and column, from 0.
     """
 
+    file: str
     text: str
     problem: str
     mark: tuple[int, int]
@@ -112,6 +96,12 @@ class Failure:
         is_above = self.kind == "mapping" or (self.kind == "colon" and ": " not in self.before)
         return self.above(self.mark[0]) if is_above else -1
 
+    def wrong(
+        self, line: int, column: int, message: str, hint: str, fix: Fix | None = None, length: int = 1
+    ) -> Diagnostic:
+        """What is wrong at a place; ``fix`` is for the ``length`` characters there, if there is exactly one."""
+        return Diagnostic(Span(self.file, line + 1, column + 1, length), "yaml-syntax", message, hint, fix=fix)
+
     @functools.cached_property
     def tokens(self) -> list[Any]:
         """The tokens up to the mark, as far as there are any."""
@@ -154,7 +144,7 @@ class _Pattern(NamedTuple):
     hint: str
     fix: str = ""
 
-    def __call__(self, failure: Failure) -> Slip | None:
+    def __call__(self, failure: Failure) -> Diagnostic | None:
         place = {"mark": failure.mark, "begin": failure.begin}.get(self.where)
         number = place[0] if place else failure.suspect
         line = failure.line(number)
@@ -170,26 +160,29 @@ class _Pattern(NamedTuple):
         column = found.start("at") - line[: found.start("at")].count(_MARK)
         fix = Fix(at, self.fix.format(**words)) if self.fix else None
         message, hint = self.message.format(**words), self.hint.format(**words)
-        return Slip(number, column, message, hint, fix=fix, length=max(1, len(at)))
+        return failure.wrong(number, column, message, hint, fix, max(1, len(at)))
 
 
-def _conflict(failure: Failure) -> Slip | None:
+def _conflict(failure: Failure) -> Diagnostic | None:
     number = next((n for n, line in enumerate(failure.lines) if re.match(r"(<{7}|>{7}|\|{7}) |={7}$", line)), -1)
     hint = "keep one of the two versions, and remove the lines that git added"
-    return Slip(number, 0, "a conflict of git is not resolved", hint) if number >= 0 else None
+    return failure.wrong(number, 0, "a conflict of git is not resolved", hint) if number >= 0 else None
 
 
-def _tab(failure: Failure) -> Slip | None:
-    for number in (failure.mark[0], failure.above(failure.mark[0])):
+def _tab(failure: Failure) -> Diagnostic | None:
+    row, column = failure.mark
+    for number in (row, failure.above(row)):
         line = failure.line(number)
         if "\t" in line[: len(line) - len(line.lstrip())]:
-            return Slip(number, line.index("\t"), "this line is indented with a tab", "indent with spaces", is_tab=True)
+            place = Span(failure.file, number + 1, line.index("\t") + 1)
+            return Diagnostic(place, "yaml-tab", "this line is indented with a tab", "indent with spaces")
     if failure.here.startswith("\t"):
-        return Slip(*failure.mark, "a tab where a space is expected", "write a space", is_tab=True)
+        place = Span(failure.file, row + 1, column + 1)
+        return Diagnostic(place, "yaml-tab", "a tab where a space is expected", "write a space")
     return None
 
 
-def _foreign_blank(failure: Failure) -> Slip | None:
+def _foreign_blank(failure: Failure) -> Diagnostic | None:
     """As word processors and web pages have them."""
     first = failure.begin[0] if failure.begin else failure.mark[0]
     for number in range(min(first, failure.above(failure.mark[0])), failure.mark[0] + 1):
@@ -198,11 +191,11 @@ def _foreign_blank(failure: Failure) -> Slip | None:
             name = unicodedata.name(blank).lower()
             message = f"this blank is not a space but a {name} (U+{ord(blank):04X})"
             new, hint = ("", "remove it") if "zero width" in name else (" ", "write a space")
-            return Slip(number, found.start("blank"), message, hint, fix=Fix(blank, new))
+            return failure.wrong(number, found.start("blank"), message, hint, fix=Fix(blank, new))
     return None
 
 
-def _open_quote(failure: Failure) -> Slip | None:
+def _open_quote(failure: Failure) -> Diagnostic | None:
     """Also where the next quotation mark, lines below, closes it."""
     begin = failure.begin if failure.kind == "quote" else None
     for token in () if begin else failure.tokens:
@@ -214,10 +207,10 @@ def _open_quote(failure: Failure) -> Slip | None:
     if begin is None:
         return None
     quote = failure.line(begin[0])[begin[1] : begin[1] + 1]
-    return Slip(*begin, "this quotation mark is not closed in its line", f"add {quote} at the end of the text")
+    return failure.wrong(*begin, "this quotation mark is not closed in its line", f"add {quote} at the end of the text")
 
 
-def _too_deep(failure: Failure) -> Slip | None:
+def _too_deep(failure: Failure) -> Diagnostic | None:
     number = failure.mark[0]
     above = failure.above(number)
     found = _KEY.fullmatch(failure.line(above))
@@ -226,10 +219,10 @@ def _too_deep(failure: Failure) -> Slip | None:
         return None
     message = f"indented deeper than '{found['key']}' above, which has its value already"
     where = f"indent it by {_spaces(usual)}" if usual else "begin it in the first column"
-    return Slip(number, deep, message, f"{where}, as line {above + 1}, or put a text that goes on in quotes")
+    return failure.wrong(number, deep, message, f"{where}, as line {above + 1}, or put a text that goes on in quotes")
 
 
-def _between_levels(failure: Failure) -> Slip | None:
+def _between_levels(failure: Failure) -> Diagnostic | None:
     """A line whose indentation is that of no line above, or an item among keys."""
     number = failure.mark[0]
     deep = _indent(failure.line(number))
@@ -242,14 +235,14 @@ def _between_levels(failure: Failure) -> Slip | None:
             levels.append(usual)
     if deep in levels:
         message = "'- ' begins an item of a list, expected a key as in the lines above"
-        return Slip(*failure.mark, message, "remove the '- '") if re.match(r"-(\s|$)", failure.here) else None
+        return failure.wrong(*failure.mark, message, "remove the '- '") if re.match(r"-(\s|$)", failure.here) else None
     near = [*[level for level in levels if level < deep][:1], *[level for level in levels if level > deep][-1:]]
     expected = " or ".join(str(level) for level in sorted(near))
     message = f"indented by {_spaces(deep)}, but the lines above by {expected}"
-    return Slip(number, deep, message, "keys of one mapping begin in the same column")
+    return failure.wrong(number, deep, message, "keys of one mapping begin in the same column")
 
 
-def _open_bracket(failure: Failure) -> Slip | None:
+def _open_bracket(failure: Failure) -> Diagnostic | None:
     opening, begin = failure.opening, failure.begin
     if failure.kind != "flow" or begin is None or failure.mark[0] == begin[0]:
         return None
@@ -257,7 +250,7 @@ def _open_bracket(failure: Failure) -> Slip | None:
     if last.strip() and _indent(last) > _indent(first) and first.rstrip()[-1:] in (",", opening):
         return None
     end = failure.above(failure.mark[0]) + 1
-    return Slip(*begin, f"'{opening}' is not closed", f"add '{_CLOSING[opening]}' at the end of line {end}")
+    return failure.wrong(*begin, f"'{opening}' is not closed", f"add '{_CLOSING[opening]}' at the end of line {end}")
 
 
 _NAME = r"(?P<key>[A-Za-z_][\w.-]*)"
@@ -266,15 +259,13 @@ _WRITE = "write '{key}: {value}'"
 _COMMAS = "entries within brackets are separated by commas"
 _SUSPECTS = "key colon"
 
-_SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
+_SLIPS: tuple[_Pattern | Callable[[Failure], Diagnostic | None], ...] = (
     _conflict,
     _tab,
     _foreign_blank,
     _open_quote,
     _Pattern("mapping flow sequence other", "mark", r".*[\"']\s*(?P<at>\0)[^\s,\]}:].*",
              "text stands behind the closing quotation mark", "put the whole text in quotes of the other kind"),
-    _Pattern("escape", "mark", r".*(?P<at>\0)(?P<sign>..?).*", "'{sign}' means nothing within double quotes",
-             "write the text in single quotes, where a backslash is a backslash"),
     _Pattern(_SUSPECTS, "suspect", r" *(?P<at>-)(?P<value>[^-\s].*)",
              "a space is missing after '-'", "write '- {value}'", "- "),
     *(_Pattern(_SUSPECTS, "suspect", rf"(?!.*: )\s*(?:- )?{name}(?P<at>:)(?P<value>(?!//)[^\s:#].*)",
@@ -283,8 +274,6 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
     _Pattern("colon", "mark", r"\s*(?:- )?(?P<key>[^:]*): .*(?P<at>\0).*",
              "a second colon in the value of '{key}', which must be one string",
              "put the text in quotes, or write a mapping in braces or into the next lines"),
-    _Pattern(_SUSPECTS, "suspect", rf"\s*(?:- )?{_NAME}(?P<at>[;\uff1a])\s*(?P<value>\S.*)",
-             "'{at}' stands after '{key}', expected a colon", _WRITE, ": "),
     _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}[\s=]+(?P<value>\S.*)",
              "a colon is missing after '{key}'", _WRITE + ", or indent the line if it goes on with the text above"),
     _Pattern(_SUSPECTS, "suspect", rf"{_NO_COLON}\s*", "a colon is missing after '{key}'",
@@ -296,8 +285,6 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
              "write the list in brackets, or each item into its own line"),
     _Pattern("mapping sequence other", "mark", r".*\0(?P<at>[]}]).*",
              "'{at}' closes nothing", "remove it: there is one bracket too many"),
-    _Pattern("mapping", "suspect", r"\s*(?P<at>\*[\w.-]+)\s*",
-             "'{at}' stands among keys, expected a key before it", "write '<<: {at}'", "<<: {at}"),
     _between_levels,
     _open_bracket,
     _Pattern("flow", "mark", r".*\0(?P<at>[]}]).*", "'{at}' closes what '{opening}' opened", "write '{closing}'"),
@@ -306,12 +293,11 @@ _SLIPS: tuple[_Pattern | Callable[[Failure], Slip | None], ...] = (
              "'${name}' within brackets needs quotes, as braces mean something else in YAML", 'write "${name}"'),
     _Pattern("flow", "mark", r".*\0(?P<at>)\s*\S.*", "a comma is missing, or the text needs quotes", _COMMAS),
     _Pattern("character", "mark", r".*\0(?P<at>.).*", "a text cannot begin with '{at}'", "write the text in quotes"),
-    _Pattern("other", "begin", r".*\0(?P<at>[*&]).*", "a text cannot begin with '{at}'", "write the text in quotes"),
     _Pattern("other", "mark", r".*\0\s*(?P<at>\S).*", "'{at}' is not expected here",
              "remove it, or write the text in quotes"),
 )  # fmt: skip
 
 
-def slip(failure: Failure) -> Slip | None:
+def slip(failure: Failure) -> Diagnostic | None:
     """The first explanation that fits what the parser stumbled over; None when there is none."""
     return next((found for one in _SLIPS if (found := one(failure))), None)

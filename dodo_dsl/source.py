@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest
+from dodo_dsl.diagnostics import Diagnostic, Fix, Span
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
@@ -30,7 +30,6 @@ _DASHES = re.compile(r"-[^-\s]\S*(\s+- ?[^-\s]\S*)+")
 _NAME = re.compile(r"(matrix|vary)\.[a-z][a-z0-9-]*")
 """What a placeholder names."""
 _SECOND = "remove the line, or write what stands below into its own file"
-_CONTROL = {0: "NUL", 8: "backspace", 0xB: "vertical tab", 0xC: "form feed", 0x1B: "escape", 0x7F: "delete"}
 _SPECIAL: dict[str, Plain] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -202,10 +201,7 @@ class _Builder:
         span = self.span(event)
         if event.anchor not in self.anchors:
             message = f"alias '*{event.anchor}' refers to an anchor that is missing or incomplete"
-            near = [f"*{name}" for name in closest(event.anchor, self.anchors)]
-            hint = f"did you mean '{near[0]}'?" if near else "a text that begins with '*' needs quotes"
-            fix = Fix(f"*{event.anchor}", near[0]) if len(near) == 1 else None
-            raise _Stop(span, "yaml-syntax", message, hint, fix)
+            raise _Stop(span, "yaml-syntax", message, "a text that begins with '*' needs quotes")
         node, weight, depth = self.anchors[event.anchor]
         self._check_depth(span, len(self.stack) + depth)
         self._add(node, weight, None, span, depth)
@@ -289,8 +285,7 @@ def _unreadable(file: str, text: str, error: Exception, problem: str) -> Diagnos
     span = Span(file, before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)
     if not isinstance(error, yaml.reader.ReaderError):
         return Diagnostic(span, "yaml-syntax", f"not YAML: {problem}")
-    message = f"a control character is not allowed here: {_CONTROL.get(code, 'unnamed')} (U+{code:04X})"
-    return Diagnostic(span, "yaml-syntax", message, "remove it")
+    return Diagnostic(span, "yaml-syntax", f"the control character U+{code:04X} is not allowed here", "remove it")
 
 
 def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
@@ -302,11 +297,9 @@ def _syntax(file: str, text: str, error: Exception) -> Diagnostic:
         return _unreadable(file, text, error, problem)
     begin, context = getattr(error, "context_mark", None), getattr(error, "context", None) or ""
     began = (begin.line, begin.column) if begin else None
-    failure = Failure(text, problem, (mark.line, mark.column), context, began, _LOADER)
+    failure = Failure(file, text, problem, (mark.line, mark.column), context, began, _LOADER)
     if found := slip(failure):
-        rule = "yaml-tab" if found.is_tab else "yaml-syntax"
-        place = Span(file, found.line + 1, found.column + 1, found.length)
-        return Diagnostic(place, rule, found.message, found.hint, fix=found.fix)
+        return found
     if begin and mark.line >= len(failure.lines):  # what is never closed is shown where it is opened
         mark = begin
     if "simple key" in context and begin:

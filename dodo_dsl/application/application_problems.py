@@ -3,16 +3,16 @@
 A service has a name and a program; together they have cycles of dependencies, and buses.
 """
 
+import difflib
 import os
 import re
-import shlex
 from collections.abc import Collection, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags, stack
-from dodo_dsl.application.construction import construction_of
+from dodo_dsl.application.construction import Construction
 from dodo_dsl.application.interpolation import filled, literal
 from dodo_dsl.application.model import (
     COMMANDS,
@@ -27,7 +27,7 @@ from dodo_dsl.application.model import (
     words_of,
 )
 from dodo_dsl.application.variables import variables_of
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix, shown_path
 from dodo_dsl.source import Node, Scalar
 
 _GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
@@ -38,7 +38,9 @@ _HIGHEST = 254
 _INTERPRETERS = ("python", "python3", "sh", "bash", "node", "perl", "ruby")
 
 
-def application_problems(application: ApplicationSource, first: Span) -> Iterator[Diagnostic]:
+def application_problems(
+    application: ApplicationSource, construction: Construction, first: Span
+) -> Iterator[Diagnostic]:
     """Everything wrong with the services and their references; ``first`` is the place of the first service written."""
     if not application.services:
         message = "no service starts, because each one has a profile or is scaled to 0"
@@ -46,13 +48,10 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
         return
     found: list[Diagnostic] = []
     of_stack = stack.parts(application)
-    construction = construction_of(application)
     for name, service in application.services.items():
-        own = [*_name(service), *_missing_program(service, application.folder)]
-        begin = len(construction.problems)
-        construction.service(service)
-        own += construction.problems[begin:]
-        del construction.problems[begin:]
+        container = construction.containers[name]
+        container.made()
+        own = [*_name(service), *_missing_program(service, application.folder), *container.problems]
         part = of_stack.get(name)
         found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(construction.check())
@@ -66,8 +65,8 @@ def application_problems(application: ApplicationSource, first: Span) -> Iterato
 
 def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Services that depend on themselves, directly or through others."""
-    containers, services = dict(application.containers), application.services
-    needs = {n: {o for _, o in references(plain(s.node), containers) if o in services} for n, s in services.items()}
+    services = application.services
+    needs = {n: {other for _, other in references(plain(s.node)) if other in services} for n, s in services.items()}
     try:
         TopologicalSorter(needs).prepare()
     except CycleError as error:
@@ -156,12 +155,14 @@ def takes_cid(service: ComposeService) -> bool:
 
 
 def unknown_keys(service: Node) -> Iterator[Diagnostic]:
-    """Unknown keys that begin like DoDo's."""
+    """Unknown keys that are like DoDo's."""
     entries = source.entries(service)
     for word, entry in entries.items():
-        if word.startswith("x-dodo") and word not in KEYS:
+        is_near = word.startswith("x-") and difflib.get_close_matches(word.lower(), KEYS, cutoff=0.8)
+        if word not in KEYS and (word.startswith("x-dodo") or is_near):
             hint, fix = did_you_mean(word, KEYS), only_fix(word, KEYS, entries)
-            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, fix=fix)
+            severity: Severity = "error" if word.startswith("x-dodo") else "warning"
+            yield Diagnostic(entry.key, "unknown-key", f"unknown key '{word}'", hint, severity, fix=fix)
 
 
 def _name(service: ComposeService) -> Iterator[Diagnostic]:
@@ -208,33 +209,19 @@ def _warning(item: Scalar, message: str, hint: str) -> Diagnostic:
 
 
 def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnostic]:
-    """Warnings of the program and its script, which are seen from the compose file's ``folder``."""
+    """A warning of a program or a script that is not there, as seen from the compose file's ``folder``."""
     process = service.node.get("x-dodo-process")
-    items = process.items if isinstance(process, source.Sequence) else ()
-    words = [word for word in items if isinstance(word, Scalar)]
-    if not words or "$" in words[0].text:
+    words = [word for word in process.items if isinstance(word, Scalar)] if isinstance(process, source.Sequence) else []
+    is_script = bool(words) and words[0].text in _INTERPRETERS
+    word = words[is_script] if len(words) > is_script else None
+    if word is None or "$" in word.text or word.text.startswith("-"):
         return
-    program = words[0]
-    if program.text in _INTERPRETERS:
-        yield from _missing_script(program.text, words[1:], folder)
-    elif " " in program.text.strip() and not (folder / program.text).exists():
-        parts = ", ".join(program.text.split())
-        yield _cannot_start(program, f"there is no program '{program.text}', which is one word", f"write [{parts}]")
-    elif "/" in program.text:
-        own = folder / program.text
-        if own.is_file() and not os.access(own, os.X_OK):
-            hint = f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
-            yield _cannot_start(program, f"'{program.text}' is not executable", hint)
-        elif not own.exists() and "build" not in service.node.entries:  # which a pipeline's check never sees
-            yield _cannot_start(program, f"there is no program '{program.text}'", "build it first")
-
-
-def _missing_script(interpreter: str, words: list[Scalar], folder: Path) -> Iterator[Diagnostic]:
-    name = words[0].text if words else ""
-    if name and not name.startswith("-") and "$" not in name and not (folder / name).is_file():
+    own = folder / word.text
+    is_here = own.is_file() and (is_script or os.access(own, os.X_OK))
+    if is_script and not is_here:
+        message = f"there is no file '{word.text}' for {words[0].text} to run"
         hint = "without it the application starts in containers only"
-        yield _cannot_start(words[0], f"there is no file '{name}' for {interpreter} to run", hint)
-
-
-def _cannot_start(word: Scalar, message: str, hint: str) -> Diagnostic:
-    return Diagnostic(word.span, "application-file", message, hint, "warning")
+        yield Diagnostic(word.span, "application-file", message, hint, "warning")
+    elif {"/", " "} & {*word.text} and not is_here and "build" not in service.node.entries:
+        hint = f"a program is one word, without its arguments; build it first, or run: chmod +x {word.text}"
+        yield Diagnostic(word.span, "application-file", f"there is no program '{word.text}'", hint, "warning")

@@ -2,13 +2,13 @@
 
 import os
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from dodo_dsl import source
-from dodo_dsl.application import compose_paths
 from dodo_dsl.application.host_paths import HostPaths
-from dodo_dsl.application.interpolation import dotenv, filled, literal, slip_in
+from dodo_dsl.application.interpolation import dotenv, escaped, filled, literal, slip_in
+from dodo_dsl.application.merge import Place, changed, normal, rebased, relocated
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Reader, Scalar
@@ -118,17 +118,17 @@ class ComposeFiles:
             self._documents[key] = None if node is None else self._changed(node, folder)
         return self._documents[key]
 
-    def _changed(self, node: Node, folder: Path) -> source.Mapping | None:
-        document = compose_paths.changed(node, self._filled)
-        if folder != self.folder and isinstance(document, source.Mapping):
-            document = compose_paths.relocated(document, self.relative(folder))
-        return document if isinstance(document, source.Mapping) else None
+    def _changed(self, node: source.Mapping, folder: Path) -> source.Mapping | None:
+        filled = changed(node, self._filled)
+        document = normal(filled) if isinstance(filled, source.Mapping) else node
+        moved = document if folder == self.folder else relocated(document, self.relative(folder))
+        return moved if isinstance(moved, source.Mapping) else None
 
     def relative(self, folder: Path) -> str:
         """A folder as seen from the application's own, as compose reads it."""
-        return compose_paths.rebased(".", compose_paths.escaped(Path(os.path.relpath(folder, self.folder)).as_posix()))
+        return rebased(".", escaped(Path(os.path.relpath(folder, self.folder)).as_posix()))
 
-    def _filled(self, word: Scalar, place: compose_paths.Place, _: Node | None) -> str:
+    def _filled(self, word: Scalar, place: Place) -> str:
         """A text with variables filled in, but for keys of services that each test fills in, and for own keys."""
         text = str(word.value)
         if "$" not in text or not place or place[0] not in _FILLED:
@@ -170,9 +170,10 @@ class ComposeFiles:
 
     def gather(self, file: Path, taken: Collection[str] = ()) -> dict[str, str]:
         """The variables of an ``.env`` file, if there is one, without secrets, as those that are ``taken`` for one."""
-        self.problems.extend(dotenv_problems(file))
+        statements, problems = variables_in(file)
+        self.problems += problems
         own: dict[str, str] = {}
-        for name, value in statements_of(file):
+        for name, value in statements:
             if value is None or name in self.passed:
                 continue
             text = literal(self.filled(value, own))
@@ -183,24 +184,19 @@ class ComposeFiles:
         return own
 
 
-Statements = tuple[tuple[str, str | None], ...]
+Statements = Sequence[tuple[str, str | None]]
 """The names and values of a file of variables, in order; None takes the value from outside."""
 
 
-def statements_of(file: Path, *, raw: bool = False) -> Statements:
-    """What a regular file sets; symlinks are not followed."""
-    return tuple(dotenv(text_of(file), raw=raw)[0])
+def variables_in(file: Path, *, raw: bool = False) -> tuple[Statements, list[Diagnostic]]:
+    """What a regular file sets, and what compose refuses in it, which shows nothing of the line: it may be a secret.
 
-
-def dotenv_problems(file: Path, *, raw: bool = False) -> Iterator[Diagnostic]:
-    """What compose refuses in a file of variables; it shows nothing of the line, which may be a secret."""
-    if problem := dotenv(text_of(file), raw=raw)[1]:
-        yield Diagnostic(Span(str(file), problem.line, 1, 0), "application-file", problem.what, problem.hint)
-
-
-def text_of(file: Path) -> str:
-    """The start of a regular file; empty if there is none, and for symlinks."""
+    Symlinks are not followed.
+    """
     if file.is_symlink() or not file.is_file():
-        return ""
+        return [], []
     with file.open("rb") as stream:
-        return stream.read(_MAX_ENV).decode("utf-8", "replace")
+        found, problem = dotenv(stream.read(_MAX_ENV).decode("utf-8", "replace"), raw=raw)
+    if problem is None:
+        return found, []
+    return found, [Diagnostic(Span(str(file), problem.line, 1, 0), "application-file", problem.what, problem.hint)]

@@ -5,22 +5,33 @@ meanwhile, each at its place in the file: to check an application is to construc
 """
 
 import os
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application import compose_paths, secret_variables
+from dodo_dsl.application import secret_variables
 from dodo_dsl.application.container import TOP_LEFT_OUT, Container
-from dodo_dsl.application.interpolation import interpolate
-from dodo_dsl.application.model import ApplicationSource, ComposeService, is_true
-from dodo_dsl.application.mounts import COPY, mounts, nested, own_name, volume
+from dodo_dsl.application.interpolation import escaped, interpolate, mapped_texts
+from dodo_dsl.application.model import ApplicationSource, is_true
+from dodo_dsl.application.mounts import COPY, Mount, nested, own_name
 from dodo_dsl.application.part import Part
 from dodo_dsl.diagnostics import Diagnostic, Span
-from dodo_dsl.source import Mapping, Node, Scalar, entries
+from dodo_dsl.source import Mapping, Node, Scalar, entries, part
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _NAMED = ("volumes", "secrets", "configs")
+_OWN = "remove it, so that each test has its own"
+_VOLUME = {
+    "driver": ("reaches beyond the test", _OWN, "local"),
+    "driver_opts": ("reaches beyond the test", "mount a folder of the repository, or use a tmpfs (type: tmpfs)"),
+}
+"""Keys of a volume without which it would be another one."""
+_FILE = dict.fromkeys(
+    ("driver", "driver_opts", "external", "template_driver"), ("is not the application's", "remove it")
+)
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _OF_SERVICES = {"image", "build", "command", "x-dodo", "x-dodo-process"}
 
 
@@ -53,26 +64,22 @@ class Setting:
 
 
 class Construction:
-    """One test's application while it is made; ``copies`` are volumes, each with the folder that it has at the start.
+    """One test's application while it is made, with whole paths if it ``is_whole``.
 
+    ``copies`` are volumes, each with the folder that it has at the start.
     ``shown`` are the paths of the host that it asks for, each with its place and the service that writes to it, if any.
     """
 
-    def __init__(self, application: ApplicationSource, setting: Setting) -> None:
-        self.application, self.setting = application, setting
+    def __init__(self, application: ApplicationSource, setting: Setting, *, is_whole: bool = False) -> None:
+        self.application, self.setting, self._is_whole = application, setting, is_whole
         self.paths, self.ports = application.paths, application.access.ports
-        self.base = Path(os.path.relpath(application.folder, setting.folder)).as_posix()
+        self.base = os.path.relpath(application.folder, setting.folder)
         self.problems: list[Diagnostic] = []
         self.shown: list[tuple[str, Span, str]] = []
         self.copies: dict[str, str] = {}
         self._copied: dict[str, str] = {}
-        self.volumes = {name: volume(self, name, node, span) for name, node, span in self._named("volumes")}
-        found = len(self.problems)
-        for service in application.services.values():  # those that only read a folder see the copy of others, too
-            if node := service.node.get("volumes"):
-                mounts(Container(self, service), node)
-        self.shown.clear()
-        del self.problems[found:]
+        self.volumes = {name: self._volume(name, node, span) for name, node, span in self._named("volumes")}
+        self.containers = {name: Container(self, service) for name, service in application.services.items()}
 
     def _named(self, key: str) -> Iterator[tuple[str, Node, Span]]:
         top = self.application.top.get(key)
@@ -81,60 +88,67 @@ class Construction:
 
     def rebased(self, path: str) -> str:
         """A path of the application as seen from the compiled test's folder."""
+        if self._is_whole:
+            return self.paths.whole(path)
         if path.startswith(("/", "~")):
             return path
         joined = os.path.normpath(f"{self.base}/{path}")
         return joined if joined.startswith(".") else f"./{joined}"
 
     def show(self, source: str, span: Span, writer: str = "") -> None:
-        if source:
-            self.shown.append((source, span, writer))
+        self.shown.append((source, span, writer))
 
-    def copied(self, source: str) -> str:
-        """The volume with the copy of a folder to which a service writes; empty for all others."""
-        return self._copied.get(self.paths.names(source)[-1], "")
-
-    def copy_of(self, source: str, name: str = "") -> str:
-        """The volume with the test's copy of a folder of the repository; empty for files and other paths.
+    def copy(self, source: str) -> None:
+        """Makes a volume of a folder of the repository to which a service writes.
 
         All services that mount the folder share its copy, so that none can lead the mount of another one elsewhere.
         """
-        paths = self.paths
-        if not paths.is_own(source) or paths.is_writable(source):
-            return ""
-        place = paths.names(source)[-1]
-        if Path(place).is_file():
-            return ""
-        if name or place not in self._copied:
-            own = name or f"{COPY}{sum(each.startswith(COPY) for each in self.copies)}"
-            self._copied.setdefault(place, own)
-            self.copies[own] = compose_paths.escaped(self.rebased(source))
-            return own
-        return self._copied[place]
+        place = self.paths.names(source)[-1]
+        is_kept = self.paths.is_writable(source) or not self.paths.is_own(source) or Path(place).is_file()
+        if not is_kept and place not in self._copied:
+            self._copied[place] = f"{COPY}{len(self.copies)}"
+            self.copies[self._copied[place]] = escaped(self.rebased(source))
 
-    def service(self, service: ComposeService) -> dict[str, Any]:
-        """A service of the compose file as a container of the test."""
-        return Container(self, service).made()
+    def settled(self, mount: Mount) -> Mount:
+        """A mount of the test: of a copy, or of the host's file or folder."""
+        if not mount.is_own:
+            return mount
+        if name := self._copied.get(self.paths.names(mount.source)[-1]):
+            return replace(mount, kind="volume", source=name, nocopy=True, is_required=False)
+        read_only = mount.read_only or not self.paths.is_writable(mount.source)
+        return replace(mount, source=self.rebased(mount.source), read_only=read_only)
+
+    def services(self) -> dict[str, dict[str, Any]]:
+        """The services of the compose file as containers of the test."""
+        return {name: container.made() for name, container in self.containers.items()}
 
     def rest(self) -> dict[str, Any]:
-        """The top-level keys beside ``services``, for services that are made already."""
-        made = {key: self._files(key) for key in ("secrets", "configs")}
-        volumes = {own_name(name): about.made for name, about in self.volumes.items()}
-        volumes |= {name: {} for name in self.copies if name not in volumes}
+        """The top-level keys beside ``services``."""
+        made = {
+            key: {name: self._file(key, name, node, span) for name, node, span in self._named(key)}
+            for key in ("secrets", "configs")
+        }
+        volumes = {own_name(name): made for name, made in self.volumes.items()} | {name: {} for name in self.copies}
         return {key: value for key, value in {"volumes": volumes, **made}.items() if value}
 
-    def _files(self, key: str) -> dict[str, Any]:
-        return {name: self._file(key, name, node, span) for name, node, span in self._named(key)}
+    def _volume(self, name: str, node: Node, span: Span) -> dict[str, Any]:
+        """A volume as the test has it: its own, or one of the engine to be read."""
+        of = Part(self, name, span, self.problems)
+        fields = of.fields(node, f"the volume '{name}'", "external name", "labels", _VOLUME)
+        external = fields.get("external")
+        if external is None or (isinstance(external, Scalar) and not is_true(external.value)):
+            return {}
+        word = part(external, "name") or fields.get("name")
+        called = (of.literal(word) if word else name) or name
+        if called.startswith("dodo-") or not _NAME.fullmatch(called):
+            of.refuse((word or node).span, f"'{called}' is not a name that a volume of the application may have", _OWN)
+        return {"external": True, "name": called}
 
     def _file(self, key: str, name: str, node: Node, span: Span) -> dict[str, Any]:
         """A secret or config: of a file of the repository, of a variable that is passed, or a text."""
-        what = f"the {key[:-1]} '{name}'"
-        of = Part(self, what, span)
-        fields = of.fields(
-            node, what, "file environment content", "labels name",
-            refused=dict.fromkeys(("driver", "driver_opts", "template_driver"), "a program would provide it")
-            | {"external": f"the engine's {key} are not the application's"},
-        )  # fmt: skip
+        what, known = f"the {key[:-1]} '{name}'", self.application.known
+        of = Part(self, what, span, self.problems)
+        fields = of.fields(node, what, "file environment content", "labels name", _FILE)
         if "file" in fields:
             file = of.path(of.literal(fields["file"]), fields["file"].span)
             return {"file": file} if file else {}
@@ -143,16 +157,14 @@ class Construction:
         variable = of.literal(fields["environment"]) if "environment" in fields else None
         if variable and self.application.is_late(variable):
             return {"environment": variable}
-        if variable and variable in self.application.known and key == "configs":
-            return {"content": compose_paths.escaped(self.application.known[variable])}
-        if variable and secret_variables.is_of_pipeline(variable):
-            message = f"{what} is '{variable}', which belongs to the pipeline and not to the application"
-            hint = f"to allow it, write environment: [{variable}] in dodo.yml"
-            of.refuse(fields["environment"].span, message, hint)
-        elif variable:
-            message = f"{what} is empty in a test, as the variable '{variable}' has no value"
+        if variable and variable in known and key == "configs":
+            return {"content": escaped(known[variable])}
+        if variable:
             hint = f"pass it with environment: [{variable}] in dodo.yml, or set it in .env"
-            of.add(Diagnostic(fields["environment"].span, "application-secret", message, hint, "warning"))
+            is_refused = secret_variables.is_of_pipeline(variable)
+            rule = "application-isolation" if is_refused else "application-secret"
+            message = f"{what} is empty in a test, as it has no variable '{variable}'"
+            of.add(Diagnostic(fields["environment"].span, rule, message, hint, "error" if is_refused else "warning"))
         if not (isinstance(node, Mapping) and node.entries):
             of.bad(span, f"{what} has neither 'file' nor 'environment'", f"for example {name}: {{file: ./{name}.txt}}")
         return {"file": "/dev/null"}
@@ -167,7 +179,7 @@ class Construction:
 
     def _top(self) -> None:
         known = ("services", "include", *_NAMED, *TOP_LEFT_OUT)
-        of = Part(self, "the compose file", Span(str(self.application.path)))
+        of = Part(self, "the compose file", Span(str(self.application.path)), self.problems)
         top = Mapping(Span(str(self.application.path)), dict(self.application.top))
         for key, entry in top.entries.items():
             if key not in known:
@@ -180,34 +192,14 @@ class Construction:
                 of.add(Diagnostic(span, "application-key", message, severity="warning"))
 
 
-def construction_of(application: ApplicationSource) -> Construction:
-    """An application of any test, to be checked."""
-    return Construction(application, Setting(1, "network", application.folder, limits=application.limits))
-
-
 def checked_builds(application: ApplicationSource) -> dict[str, Any]:
     """A compose file with the builds alone: whole paths, and no variables; raises RequiredVariable.
 
     Variables whose values are not known are empty: each builder has others in the environment.
     """
-    made = construction_of(application)
-    services = {name: made.service(service) for name, service in application.services.items()}
-    builds = {name: _whole(made, each["build"]) for name, each in services.items() if "build" in each}
-    secrets = {name: _whole(made, about) for name, about in made.rest().get("secrets", {}).items()}
-    text = {"services": {name: {"build": build} for name, build in builds.items()}}
-    found: dict[str, Any] = compose_paths.mapped_texts(
-        text | ({"secrets": secrets} if secrets else {}), lambda t: compose_paths.escaped(interpolate(t, {}))
-    )
-    return found
-
-
-def _whole(made: Construction, about: dict[str, Any]) -> dict[str, Any]:
-    def path(text: str) -> str:
-        return (
-            compose_paths.escaped(made.paths.whole(text.replace("$$", "$"))) if compose_paths.is_local(text) else text
-        )
-
-    found = {key: path(value) if key in ("context", "file") else value for key, value in about.items()}
-    if others := about.get("additional_contexts"):
-        found["additional_contexts"] = {name: path(value) for name, value in others.items()}
+    made = Construction(application, Setting(1, "network", application.folder), is_whole=True)
+    builds = {name: {"build": each["build"]} for name, each in made.services().items() if "build" in each}
+    secrets = made.rest().get("secrets")
+    document = {"services": builds} | ({"secrets": secrets} if secrets else {})
+    found: dict[str, Any] = mapped_texts(document, lambda text: escaped(interpolate(text, {})))
     return found

@@ -4,29 +4,26 @@ Each key has one function, which gives what the container has for it. All other 
 them; those without which something else would run are refused.
 """
 
+import re
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application import hardware, image, limits, opendlv_flags
-from dodo_dsl.application.compose_files import dotenv_problems
-from dodo_dsl.application.compose_merge import as_pairs, as_waits
-from dodo_dsl.application.compose_paths import escaped, filled_node
+from dodo_dsl.application import limits, opendlv_flags
+from dodo_dsl.application.interpolation import escaped
+from dodo_dsl.application.merge import NAMESPACES, filled_node, is_local
 from dodo_dsl.application.model import (
     FILES,
-    NAMESPACES,
     OFFSCREEN,
     SANDBOX,
     ComposeService,
-    borrowed,
-    env_files,
     environment,
+    image_variable,
     plain,
-    reference,
     text,
 )
 from dodo_dsl.application.mounts import mounts
-from dodo_dsl.application.part import Part, spot
+from dodo_dsl.application.part import OFF, Part, is_set
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed, only_fix
 from dodo_dsl.source import Node, Scalar
@@ -47,24 +44,25 @@ class Container(Part):
     """The service while it is made."""
 
     def __init__(self, project: "Construction", service: ComposeService) -> None:
-        super().__init__(project, service.name, service.span)
+        super().__init__(project, service.name, service.span, [])
         self.service = service
         self.own: dict[str, Any] = {}
         variables = dict(project.setting.given)
         cids = dict.fromkeys(opendlv_flags.CID_VARIABLES, str(project.setting.cid))
         self.known = {**project.application.known, **variables, **cids}
+        node = service.node.get("volumes")
+        self.mounts = mounts(self, node) if node else []
 
     def made(self) -> dict[str, Any]:
         """What the container has."""
         for key, entry in self.service.node.entries.items():
             if key in _CARRIED:
-                value = _CARRIED[key](self, entry.value) if not _is_null(entry.value) else None
+                value = _CARRIED[key](self, entry.value) if is_set(entry.value) else None
                 self.own.update({} if value is None else {key: value})
             elif key in _REFUSED:
-                if not _is_off(entry.value):
-                    self.refuse(spot(entry), f"'{key}' of '{self.name}' {_REFUSED[key]}", _WITHOUT)
+                self.is_refused(key, entry, f"'{self.name}'", (_REFUSED[key], _WITHOUT))
             elif key in _LEFT_OUT:
-                self.left += [(key, entry.key)] if not _is_off(entry.value) else []
+                self.left += [(key, entry.key)] if plain(entry.value) not in OFF else []
             elif key != "profiles":
                 self.unknown_key(key, self.service.node, f"'{self.name}'", (*_CARRIED, *_REFUSED, *_LEFT_OUT))
         for step in (_own_environment, limits.own_limits, _own_namespaces, _own_dependencies):
@@ -83,34 +81,26 @@ class Container(Part):
         return None if node is None else plain(filled_node(node, self.known, self.project.application.is_late))
 
     def other(self, key: str, name: str, span: Span, taken: Collection[str] = ()) -> str:
-        """A service that a key names, if it starts; a problem if there is none."""
+        """A service that a key names, if it starts; a problem if there is none, as of a container of others."""
         others = self.project.application.services
-        if name not in others and name not in self.project.application.dropped:
+        if name.startswith("container:"):
+            message = f"'{key}' joins the {name.replace(':', ' ', 1)}, which is not part of the application"
+            self.refuse(span, message, "make it a service of the application")
+        elif name not in others and name not in self.project.application.dropped:
             message = f"'{key}' of '{self.name}' names the unknown service '{name}'"
             fix = only_fix(name, others, (self.name, *(taken or [name])))
             self.bad(span, message, did_you_mean(name, others), fix)
         return name if name in others else ""
 
-    def joined(self, key: str, kind: str, name: str, span: Span) -> str:
-        """The same for the name of a service or of a container, which has to be one of the application."""
-        containers = self.project.application.containers
-        if kind == "container" and name not in containers:
-            message = f"'{key}' joins the container '{name}', which is not part of the application"
-            self.refuse(span, message, "make it a service of the application")
-            return ""
-        return self.other(key, containers[name] if kind == "container" else name, span)
 
-
+_REMOTE = ("http://", "https://", "git://", "ssh://", "git@", "github.com/", "docker-image://", "service:", "target:")
+_AROUND_NAME = re.compile(r"^(index\.)?docker\.io/|:[^/:@]*(@.*)?\Z|@.*\Z", re.DOTALL)
+"""The registry that the engine takes by default, tag and digest."""
+_BASES = ("python", "library/python", "debian", "library/debian")
+"""What DoDo's images, and those of many others, are built on."""
+_RUNTIMES = ("nvidia", "runc", "runsc")
 _CONDITIONS = ("service_started", "service_healthy", "service_completed_successfully")
 _WITHOUT = "leave the service out: application: {without: [...]} in dodo.yml; or give it a profile"
-
-
-def _is_null(node: Node) -> bool:
-    return isinstance(node, Scalar) and node.value is None
-
-
-def _is_off(node: Node) -> bool:
-    return plain(node) in (None, False, "", "false", [], {})
 
 
 def _command(c: Container, key: str, node: Node) -> Any:
@@ -141,17 +131,16 @@ def _healthcheck(c: Container, node: Node) -> Any:
 
 def _env_file(c: Container, node: Node) -> Any:
     made: list[Any] = []
-    for file in env_files(c.service.node):
+    for item in c.items(node):
+        c.fields(item, f"'env_file' of '{c.name}'", "path required format")
+    for file in c.service.env_files:
         if path := c.path(file.path, file.span):
-            place = c.project.application.folder / file.path
-            for problem in dotenv_problems(place, raw=file.raw):
-                c.add(problem)
-            if file.required and not place.is_file():
+            c.problems.extend(file.problems)
+            if file.required and not (c.project.application.folder / file.path).is_file():
                 hint = "create it, or write {path: ..., required: false}; paths are relative to this file"
                 c.bad(file.span, f"there is no file '{file.path}'", hint)
-            about = {"path": path, **({} if file.required else {"required": False})}
-            about |= {"format": "raw"} if file.raw else {}
-            made.append(about if len(about) > 1 else path)
+            about = {**({} if file.required else {"required": False}), **({"format": "raw"} if file.raw else {})}
+            made.append({"path": path, **about} if about else path)
     return made
 
 
@@ -167,23 +156,24 @@ def _own_environment(c: Container) -> None:
 
 
 def _namespace(c: Container, key: str, node: Node) -> Any:
-    """Another service's namespace; that of a container of the application is its service's."""
+    """Another service's namespace."""
     word = c.literal(node) or ""
-    kind, name = reference(word)
-    if kind:
-        found = c.joined(key, kind, name, node.span)
+    if word.startswith(("service:", "container:")):
+        found = c.other(key, word.removeprefix("service:"), node.span)
         return f"service:{found}" if found else None
     if key == "pid" and word == "host":
         c.refuse(node.span, "'pid: host' gives access to the processes of all tests", "remove it")
-    elif key == "network_mode" and word == "none":
-        return word
-    return None
+    return word if (key, word) == ("network_mode", "none") else None
 
 
 def _volumes_from(c: Container, node: Node) -> Any:
-    named = [(item, *borrowed(word)) for item in c.items(node) if (word := c.literal(item))]
-    made = [(c.joined("volumes_from", kind, name, item.span), options) for item, kind, name, options in named]
-    return [escaped(name + options) for name, options in made if name] or None
+    made = []
+    for item in c.items(node):
+        text = (c.literal(item) or "").removeprefix("service:")
+        name, sign, options = (text, "", "") if text.startswith("container:") else text.partition(":")
+        if name and (found := c.other("volumes_from", name, item.span)):
+            made.append(escaped(found + sign + options))
+    return made or None
 
 
 def _networks(c: Container, node: Node) -> Any:
@@ -199,7 +189,7 @@ def _links(c: Container, node: Node) -> Any:
 
 
 def _depends_on(c: Container, node: Node) -> Any:
-    made, services = {}, source.entries(as_waits(node))
+    made, services = {}, source.entries(node)
     for name, entry in services.items():
         about = source.entries(entry.value)  # nothing of a test is restarted
         found = {key: plain(about[key].value) for key in ("condition", "required") if key in about}
@@ -216,12 +206,6 @@ def _depends_on(c: Container, node: Node) -> Any:
     return made
 
 
-def _sysctls(c: Container, node: Node) -> Any:
-    found = source.entries(as_pairs(node))
-    is_own = c.project.setting.own_network
-    return {key: plain(each.value) for key, each in found.items() if is_own or not key.startswith("net.")} or None
-
-
 def _secrets(c: Container, node: Node, key: str) -> Any:
     known = source.entries(c.project.application.rest.get(key))
     for item in c.items(node):
@@ -231,6 +215,95 @@ def _secrets(c: Container, node: Node, key: str) -> Any:
             message = f"'{c.name}' takes the {key[:-1]} '{word.text}', which the top-level '{key}' do not declare"
             c.bad(word.span, message, did_you_mean(word.text, known))
     return plain(node)
+
+
+def _runtime(c: Container, node: Node) -> Any:
+    word = c.literal(node)
+    if word not in (*_RUNTIMES, "", None):
+        message = f"the runtime '{word}' may not isolate the container"
+        c.refuse(node.span, message, f"remove it, or use one of {', '.join(_RUNTIMES)}")
+    return word if word in _RUNTIMES else None
+
+
+def _security(c: Container, node: Node) -> Any:
+    """Options of the engine's confinement: all on a rig that allows them, else those of ``no-new-privileges``."""
+    words = [word for item in c.items(node) if (word := c.literal(item))]
+    is_kept = c.project.setting.keeps_privileges
+    made = [escaped(word) for word in words if is_kept or word.startswith("no-new-privileges")]
+    if len(made) < len(words):
+        c.left.append(("security_opt", c.service.node.entries["security_opt"].key))
+    return made or None
+
+
+def _volumes(c: Container) -> Any:
+    settled = map(c.project.settled, c.mounts)
+    return list({(mount.source, mount.target): mount.written() for mount in settled}.values()) or None
+
+
+def _image(c: Container, node: Node) -> Any:
+    """The image of the file, unless a pipeline sets another one."""
+    return f"${{{image_variable(c.name)}:-{text(plain(node))}}}"
+
+
+def _build(c: Container, node: Node) -> Any:
+    image, paths = c.service.node.get("image"), c.project.paths
+    name = _AROUND_NAME.sub("", text(plain(image))) if image is not None else ""
+    if name.startswith("dodo/") or name in _BASES:
+        which = "one of DoDo's own" if name.startswith("dodo/") else "one on which others are built"
+        c.refuse(node.span, f"the image '{name}' of '{c.name}' would replace {which}", "give the image another name")
+    if image is None:
+        c.own["image"] = f"${{{image_variable(c.name)}:-}}"
+    fields = c.fields(
+        node, f"the build of '{c.name}'",
+        "context dockerfile dockerfile_inline args target additional_contexts secrets",
+        "cache_from cache_to entitlements extra_hosts isolation labels no_cache no_cache_filter platforms privileged"
+        " provenance pull sbom shm_size ssh tags ulimits",
+        {"network": ("reaches services of the host", "remove it", "default", "none")},
+    )  # fmt: skip
+    made: dict[str, Any] = {
+        key: plain(fields[key]) for key in ("dockerfile_inline", "target", "secrets", "network") if key in fields
+    }
+    if (context := c.literal(fields["context"]) if "context" in fields else ".") is not None:
+        span = fields["context"].span if "context" in fields else node.span
+        made = {"context": _context(c, span, context), **made}
+        if is_local(context) and paths.is_own(context) and not (paths.folder / context).is_dir():
+            hint = "create it, or remove 'build'; paths are relative to this file"
+            message = f"there is no folder '{context}'"  # a warning, as an image or a variable for it may stand in
+            c.add(Diagnostic(span, "application-file", message, hint, "warning"))
+        if "dockerfile" in fields and (file := c.literal(fields["dockerfile"])):
+            if not context.startswith(_REMOTE):
+                c.path(file, fields["dockerfile"].span, base=context)
+            made["dockerfile"] = escaped(file)
+    if "args" in fields:
+        made["args"] = _arguments(c, plain(fields["args"]))
+    others = source.entries(fields.get("additional_contexts"))
+    if found := {name: _context(c, e.value.span, word) for name, e in others.items() if (word := c.literal(e.value))}:
+        made["additional_contexts"] = found
+    return made
+
+
+def _context(c: Container, span: Span, context: str) -> str:
+    """What is built: a folder of the repository, an image or a URL."""
+    paths = c.project.paths
+    is_here = any((place / context).exists() for place in (paths.folder, *paths.roots)) if "\0" not in context else True
+    if context.startswith(_REMOTE) and ".." not in context.split("/") and not is_here:
+        return escaped(context)
+    if "://" in context:
+        c.refuse(span, f"'{context}' is of a kind that may be a file of the host", "keep it in the repository")
+        return ""
+    return c.path(context, span) or ""
+
+
+def _arguments(c: Container, written: Any) -> dict[str, str | None]:
+    """Arguments of a build; those without a value have that of the variable of their name, or are left out."""
+    application = c.project.application
+    made: dict[str, str | None] = {}
+    for name, value in environment(written).items():
+        if value is not None or application.is_late(name):
+            made[name] = value
+        elif name in application.known:
+            made[name] = application.known[name].replace("$", "$$")
+    return made
 
 
 def _own_namespaces(c: Container) -> None:
@@ -273,31 +346,29 @@ _AS_WRITTEN = (
 _CARRIED: dict[str, Key] = {
     **dict.fromkeys(_AS_WRITTEN, lambda _, n: plain(n)),
     **limits.LIMITS,
-    "build": image.build,
-    "cap_add": hardware.capabilities,
+    "build": _build,
+    "cap_add": limits.capabilities,
     "command": lambda c, n: _command(c, "command", n),
     "configs": lambda c, n: _secrets(c, n, "configs"),
     "depends_on": _depends_on,
     "deploy": limits.deploy,
-    "device_cgroup_rules": hardware.device_rules,
-    "devices": hardware.devices,
+    "devices": limits.devices,
     "entrypoint": lambda c, n: _command(c, "entrypoint", n),
     "env_file": _env_file,
     "environment": lambda c, _: None,
-    "gpus": hardware.gpus,
+    "gpus": limits.gpus,
     "healthcheck": _healthcheck,
-    "image": image.image,
+    "image": _image,
     "links": _links,
     "networks": _networks,
-    "privileged": hardware.privileged,
-    "runtime": hardware.runtime,
+    "privileged": limits.privileged,
+    "runtime": _runtime,
     "secrets": lambda c, n: _secrets(c, n, "secrets"),
-    "security_opt": hardware.security,
-    "sysctls": _sysctls,
+    "security_opt": _security,
     "tmpfs": limits.tmpfs,
     "ulimits": limits.ulimits,
     "volumes_from": _volumes_from,
-    "volumes": lambda c, n: mounts(c, n) or None,
+    "volumes": lambda c, _: _volumes(c),
     **{key: lambda c, n, key=key: _namespace(c, key, n) for key in NAMESPACES},  # type: ignore[misc]
 }
 """What the container has for a key, by the key; None for nothing."""
@@ -310,9 +381,9 @@ _REFUSED = {
 }
 _LEFT_OUT = (
     "annotations", "attach", "blkio_config", "cgroup", "cgroup_parent", "container_name", "cpu_count", "cpu_percent",
-    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "isolation", "label_file",
-    "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness", "memswap_limit", "oom_kill_disable",
-    "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop", "pull_policy", "pull_refresh_after", "restart",
-    "scale", "storage_opt", "userns_mode", "uts",
+    "cpu_period", "cpu_quota", "cpu_rt_period", "cpu_rt_runtime", "cpu_shares", "develop", "device_cgroup_rules",
+    "isolation", "label_file", "labels", "logging", "mac_address", "mem_reservation", "mem_swappiness",
+    "memswap_limit", "oom_kill_disable", "oom_score_adj", "ports", "post_start", "pre_start", "pre_stop",
+    "pull_policy", "pull_refresh_after", "restart", "scale", "storage_opt", "sysctls", "userns_mode", "uts",
 )  # fmt: skip
 """Keys of the compose specification that a test has no use for."""

@@ -4,10 +4,11 @@ Only paths that are allowed here are carried into a test, so that there is no li
 """
 
 import contextlib
+import functools
 import os
 import pwd
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -90,7 +91,8 @@ class HostPaths:
 
     def is_of_repository(self, text: str) -> bool:
         """Whether a path that is the application's own is a file of the repository, and so nobody's to write to."""
-        roots = [name for root in self.roots for name in (str(root), real(root))]
+        count = len(self.roots)
+        roots = (*self._places[:count], *self._real_places[:count])
         return any(_below(name, roots) for name in self.names(text))
 
     def is_writable(self, text: str) -> bool:
@@ -101,8 +103,7 @@ class HostPaths:
         """Where symbolic links lead to that leave the repository and the allowed paths; empty without such a link."""
         if not _below(self.whole(text), self._places):
             return ""
-        places = [real(place) for place in self._places]
-        return next((name for name in self.names(text)[1:] if not _below(name, places)), "")
+        return next((name for name in self.names(text)[1:] if not _below(name, self._real_places)), "")
 
     def file_problem(self, text: str, written: str = "") -> str:
         """Why a file or folder may not be read, which is called as it was ``written``; empty when it may."""
@@ -110,19 +111,21 @@ class HostPaths:
             return NUL
         return "" if self.is_own(text) else f"'{written or text}' {self._where(text)}"
 
-    def mount_problem(self, text: str) -> tuple[str, str]:
-        """Why a path may not be mounted, and what to do; empty when it may, if only to be read."""
-        if "\0" in text:
-            return NUL, "remove it"
+    def mount_problem(self, text: str) -> tuple[str, str] | None:
+        """Why a path may not be mounted, if only to be read, and what to do."""
         if any(name in _WHOLE or _below(name, _OF_KERNEL) or _SOCKET.search(name) for name in self.names(text)):
             return f"'{text}' belongs to the host, so tests would share it", _WITHOUT
-        if self.is_own(text) or self.is_writable(text) or self._is_to_read(text):
-            return "", ""
+        if self.is_own(text) or self.whole(text) in _PLAIN_DEVICES or self._is_to_read(text):
+            return None
         return f"'{text}' {self._where(text)}, so tests would share it", ASK
 
-    @property
-    def _places(self) -> tuple[Path, ...]:
-        return (*self.roots, *self.allowed)
+    @functools.cached_property
+    def _places(self) -> tuple[str, ...]:
+        return tuple(map(str, (*self.roots, *self.allowed)))
+
+    @functools.cached_property
+    def _real_places(self) -> tuple[str, ...]:
+        return tuple(map(real, self._places))
 
     def _is_to_read(self, text: str) -> bool:
         places = (*TO_READ, *map(real, TO_READ))
@@ -137,10 +140,6 @@ class HostPaths:
         """Whether an absolute path is a robot's device, its settings in the kernel, or a user's sound and screen."""
         return text.startswith(("/", "~")) and all(_is_hardware(name, read_only) for name in self.names(text))
 
-    def is_of_machine(self, text: str) -> bool:
-        """Whether a device is one of the host's disks, its memory or its kernel, under whatever name."""
-        return any(_OF_MACHINE.fullmatch(name) for name in self.names(text))
-
 
 def is_token(source: str, target: str) -> bool:
     """A mount of a file of ``/tmp`` at its own place, by which programs find shared memory; the test's own has it."""
@@ -150,12 +149,12 @@ def is_token(source: str, target: str) -> bool:
 def _is_hardware(name: str, read_only: bool) -> bool:
     if _below(name, [MEMORY]) or name in _PLAIN_DEVICES or name == "/sys" or _below(name, _OF_KERNEL):
         return False
-    is_device = _below(name, ["/dev"]) or bool(_OF_DESKTOP.fullmatch(name))
+    is_device = (_below(name, ["/dev"]) and not _OF_MACHINE.fullmatch(name)) or bool(_OF_DESKTOP.fullmatch(name))
     return is_device or (_below(name, ["/sys"]) and not read_only)
 
 
-def _below(path: str, places: "Sequence[Path | str]") -> bool:
-    return any(path == str(place) or path.startswith(f"{str(place).rstrip('/')}/") for place in places)
+def _below(path: str, places: Sequence[str]) -> bool:
+    return any(path == place or path.startswith(f"{place.rstrip('/')}/") for place in places)
 
 
 def _expanded(text: str) -> str:
@@ -176,45 +175,14 @@ def real(path: str | Path) -> str:
 
 _WAYS = ("/dev/serial", "/dev/bus/usb")
 """Folders where a port has its other names, and where its USB device can be spoken to directly."""
-_TERMINALS = frozenset((*range(4, 6), 166, 188, 189, 204, 205))
-"""The kernel's numbers of serial ports and of USB devices (Documentation/admin-guide/devices.txt)."""
-_RULE = re.compile(r"[ac] ([0-9]+|\*):([0-9]+|\*) [rwm]+")
 
 
-def is_port(device: str, ports: Iterable[str]) -> bool:
-    """Whether a path is a rig's port, one of its names, or a way to it; a rig is moved by its own service alone."""
-    files, names = list(_files(ports)), (os.path.normpath(device), real(device))
-    return bool(files) and any(name in files or _below(name, _WAYS) for name in names)
+def is_port(path: str, ports: Iterable[str], *, within: bool = False) -> bool:
+    """Whether a path is a rig's port, one of its names, or a way to it; a rig is moved by its own service alone.
 
-
-def holds_port(folder: str, ports: Iterable[str]) -> bool:
-    """The same, and of a folder whether it holds a port: an engine gives a container all devices in it."""
-    files, names = list(_files(ports)), (os.path.normpath(folder), real(folder))
-    return is_port(folder, files) or any(_below(file, names) for file in files)
-
-
-def is_rule_for_port(written: object, ports: Iterable[str]) -> bool:
-    """Whether a rule of ``device_cgroup_rules`` lets a container open a port."""
-    found = _RULE.fullmatch(str(written))
-    files = list(_files(ports))
-    if found is None or not files:
-        return False
-    major, minor = found.groups()
-    return major == "*" or int(major) in _TERMINALS or (int(major), minor) in set(_numbers(files))
-
-
-def _files(ports: Iterable[str]) -> Iterator[str]:
-    """All names of those ports that are device files."""
-    for port in ports:
-        if port.startswith("/"):
-            yield from dict.fromkeys((os.path.normpath(port), real(port)))
-
-
-def _numbers(files: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """The kernel's numbers of ports that are there: of each one its own, and all others."""
-    for file in files:
-        try:
-            number = Path(file).stat().st_rdev
-        except OSError:
-            continue
-        yield from ((os.major(number), minor) for minor in (str(os.minor(number)), "*"))
+    Or whether a port lies ``within`` a folder, as an engine gives a container all devices in it.
+    """
+    files = [name for port in ports if port.startswith("/") for name in (os.path.normpath(port), real(port))]
+    names = (os.path.normpath(path), real(path))
+    is_way = any(name in files or _below(name, _WAYS) for name in names)
+    return bool(files) and (is_way or (within and any(_below(file, names) for file in files)))

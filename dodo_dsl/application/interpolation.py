@@ -1,11 +1,14 @@
 """Variables in compose files, ``${NAME:-default}``: found, and filled in as compose does; and ``.env`` files."""
 
+import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _VARIABLE_NAME = re.compile(rf"\$\$|\$\{{?({_NAME.pattern})")
+_BARE_NAME = re.compile(rf"\$\$|\$\{{({_NAME.pattern})\}}|\$({_NAME.pattern})")
 _SHOWN = 60
 _BLANKS = r"[ \t\v\f\r\x85\xa0]*"
 _SKIPPED = re.compile(r"(?:\s|#[^\n]*)*")
@@ -37,13 +40,19 @@ def end_of_variable(text: str, start: int) -> int:
 
 def split_outside(text: str, sign: str) -> list[str]:
     """A string split at a sign, but not within variables: ``${A:-b:c}:d`` has two parts at the colons."""
-    hidden = _replaced(text, lambda match: match[0].replace(sign, "\0"))
-    return [part.replace("\0", sign) for part in hidden.split(sign)]
+    hidden = _replaced(text, lambda match: " " * len(match[0]))
+    places = [-1, *(place for place, character in enumerate(hidden) if character == sign), len(text)]
+    return [text[start + 1 : end] for start, end in itertools.pairwise(places)]
 
 
 def names(text: str) -> set[str]:
     """The variables in a string, those in defaults included."""
     return {match[1] for match in _VARIABLE_NAME.finditer(text) if match[1]}
+
+
+def without_default(text: str) -> set[str]:
+    """The variables in a string that have no default there."""
+    return {match[1] or match[2] for match in _BARE_NAME.finditer(text) if match[0] != "$$"}
 
 
 class EnvironmentProblem(ValueError):
@@ -217,3 +226,17 @@ def _unescaped(match: re.Match[str]) -> str:
     if octal is None:
         return _ESCAPES.get(match[0][1], match[0][1])
     return chr(int(octal, 8)) if re.fullmatch("[0-3][0-7]{2}", octal) else f"\\{octal}"
+
+
+def escaped(text: str) -> str:
+    """A path as a compose file has it, in which a dollar sign alone begins a variable."""
+    return text.replace("$", "$$")
+
+
+def mapped_texts(value: Any, change: Callable[[str], str]) -> Any:
+    """Values of JSON with ``change`` applied to each text."""
+    if isinstance(value, dict):
+        return {key: mapped_texts(each, change) for key, each in value.items()}
+    if isinstance(value, list):
+        return [mapped_texts(each, change) for each in value]
+    return change(value) if isinstance(value, str) else value

@@ -1,4 +1,4 @@
-"""Limits of a service: what it sets itself, cut to those of ``sandbox`` in ``dodo.yml``."""
+"""What a container may have of its machine: limits, cut to those of ``sandbox`` in ``dodo.yml``; a rig's hardware."""
 
 import copy
 import math
@@ -7,24 +7,31 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.hardware import gpus
+from dodo_dsl.application.host_paths import is_port
+from dodo_dsl.application.interpolation import escaped
+from dodo_dsl.application.model import is_true, plain
+from dodo_dsl.diagnostics import Span
 from dodo_dsl.source import Node
-from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 if TYPE_CHECKING:
     from dodo_dsl.application.container import Container
 
 _DROPPED = ("AUDIT_WRITE", "MKNOD", "NET_RAW", "SETFCAP", "SYS_CHROOT")
 """Capabilities that engines give by default and no OpenDLV program needs: to send as another container, for example."""
+_CAPABILITIES = frozenset(
+    ("AUDIT_WRITE", "CHOWN", "DAC_OVERRIDE", "FOWNER", "FSETID", "IPC_LOCK", "KILL", "NET_BIND_SERVICE", "SETFCAP",
+     "SETGID", "SETPCAP", "SETUID", "SYS_CHROOT", "SYS_NICE", "SYS_PTRACE")
+)  # fmt: skip
+"""Capabilities that stay within a container; with others it reaches the host, or speaks for other containers."""
 _SIZE = re.compile(r"\s*(\d{1,20}(?:\.\d{0,20})?)\s*([kmgtp]?)(?:i?b)?\s*", re.IGNORECASE | re.ASCII)
 _OF_SANDBOX = {"fsize": "file-size", "nofile": "files", "memlock": "memory"}
 _MESSAGE_QUEUES = 819_200
 """The kernel's default, in bytes (RLIMIT_MSGQUEUE)."""
-_SIZES_OF_TMPFS = ("size=", "nr_blocks=")
-_TMPFS_OPTIONS = re.compile(r"(size|mode|uid|gid|nr_inodes|nr_blocks)=[\w%]+|nosuid|nodev|noexec|exec|rw|ro|noatime")
+_TMPFS_OPTIONS = re.compile(r"(mode|uid|gid)=\w+|nosuid|nodev|noexec|exec|rw|ro|noatime")
 LOGS = {"driver": "json-file", "options": {"max-size": "50m", "max-file": "2"}}
 """What is kept of a service's log: two files of 50 MB."""
+_NO_PORT = "is left out of all tests: only the service that moves the rig opens its port"
+_WITHOUT_HARDWARE = "is left out of sil and dil tests, which have no hardware"
 
 
 def size(value: object) -> float:
@@ -48,25 +55,18 @@ def whole(value: object) -> float:
     return math.floor(found) if math.isfinite(found) else found
 
 
-def limit(
-    c: "Container", node: Node, most: float, what: str, key: str, measure: Callable[[object], float] = number
+def capped(
+    c: "Container", node: Node, what: str, most: float, key: str, measure: Callable[[object], float], least: float = 1
 ) -> float:
-    """A limit of at most ``most``, which also takes the place of 0 and below."""
-    found = measure(c.literal(node))
-    if math.isfinite(found) and found > most:
+    """A limit of at most ``most``, which also takes the place of none; ``key`` of ``sandbox`` sets it, if one does."""
+    written = c.literal(node)
+    found = measure(written)
+    if math.isinf(found) and written and not written.startswith("-"):
+        c.bad(node.span, f"'{written}' is not a limit, expected a number")
+    elif found > most and written is not None:
         c.cut(node.span, what, most, key)
-    value = found if 0 < found <= most and math.isfinite(found) else most
+    value = found if least <= found <= most else most
     return int(value) if float(value).is_integer() else value
-
-
-def tmpfs_options(options: str, limits: SandboxLimits) -> tuple[str, bool, str]:
-    """Options of a file system in memory, as mount(8) reads them, with a size; whether that was cut; an unknown one."""
-    words = [word.strip() for word in options.split(",") if word.strip()]
-    unknown = next((word for word in words if not _TMPFS_OPTIONS.fullmatch(word)), "")
-    sizes = [word for word in words if word.startswith(_SIZES_OF_TMPFS)]
-    if sizes and all(0 < size(word.removeprefix("size=")) <= limits.memory for word in sizes):
-        return ",".join(words), False, unknown
-    return ",".join([*(word for word in words if word not in sizes), f"size={limits.memory}"]), bool(sizes), unknown
 
 
 def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
@@ -76,78 +76,63 @@ def ulimits(c: "Container", node: Node | None = None) -> dict[str, Any]:
     """
     own = {"core": 0, "fsize": c.limits.file_size, "nofile": c.limits.files}
     made: dict[str, Any] = dict(own)
+    most = {**own, "memlock": c.limits.memory, "msgqueue": _MESSAGE_QUEUES}
+
+    def cut(name: str, part: str, value: Node) -> float:
+        key = _OF_SANDBOX.get(name, "")
+        found = capped(c, value, f"ulimits.{name}{part}", most.get(name, math.inf), key, whole, 0)
+        return found if math.isfinite(found) else -1
+
     for name, entry in source.entries(node).items():
-        most = {**own, "memlock": c.limits.memory, "msgqueue": _MESSAGE_QUEUES}.get(name, math.inf)
-        if name == "nproc":
-            continue
         if isinstance(entry.value, source.Mapping):
             parts = {part: each.value for part, each in entry.value.entries.items() if part in ("soft", "hard")}
-            made[name] = {part: _ulimit(c, f"{name}.{part}", each, most) for part, each in parts.items()}
+            made[name] = {part: cut(name, f".{part}", value) for part, value in parts.items()}
         else:
-            made[name] = _ulimit(c, name, entry.value, most)
+            made[name] = cut(name, "", entry.value)
+    made.pop("nproc", None)
     return made
-
-
-def _ulimit(c: "Container", name: str, node: Node, most: float) -> float | str | None:
-    written = c.literal(node)
-    if not math.isfinite(whole(written)) and written not in ("-1", None):
-        c.bad(node.span, f"'{written}' is not a limit, expected a whole number or -1")
-    if whole(written) <= most:
-        return int(whole(written)) if math.isfinite(whole(written)) else -1
-    c.cut(node.span, f"ulimits.{name}", most, _OF_SANDBOX.get(name.partition(".")[0], ""))
-    return int(most)
 
 
 def deploy(c: "Container", node: Node) -> Any:
     """Limits as those of the service, and reservations of graphics processors."""
     what = f"'deploy' of '{c.name}'"
     left = "endpoint_mode labels mode replicas rollback_config update_config placement restart_policy"
-    resources = c.fields(node, what, "resources", left).get("resources")
-    parts = c.fields(resources, f"'resources' of '{c.name}'", "limits reservations")
-    own = c.fields(parts.get("limits"), f"'limits' of '{c.name}'", "cpus memory pids")
+    resources = c.fields(c.fields(node, what, "resources", left).get("resources"), what, "limits reservations")
+    own = c.fields(resources.get("limits"), what, "cpus memory pids")
     for key, name in (("cpus", "cpus"), ("memory", "mem_limit"), ("pids", "pids_limit")):
         if key in own:
             c.own[name] = LIMITS[name](c, own[key])
-    reserved = c.fields(
-        parts.get("reservations"), f"'reservations' of '{c.name}'", "devices", "cpus memory generic_resources"
-    )
+    reserved = c.fields(resources.get("reservations"), what, "devices", "cpus memory generic_resources")
     found = gpus(c, reserved["devices"]) if "devices" in reserved else None
     return {"resources": {"reservations": {"devices": found}}} if found else None
 
 
-def cpus(c: "Container", node: Node) -> Any:
-    return limit(c, node, float("inf") if c.limits.cpus is None else c.limits.cpus, "cpus", "cpus")
-
-
 def tmpfs(c: "Container", node: Node) -> Any:
-    made = []
+    """File systems in memory, each with a size; other options than those that are known stay out."""
+    made, most = [], c.limits.memory
     for item in c.items(node):
-        if not (word := c.literal(item)):
-            continue
-        target, _, options = word.partition(":")
-        allowed, is_cut, unknown = tmpfs_options(options, c.limits)
-        if unknown:
-            message = f"a tmpfs of '{c.name}' has the unknown option '{unknown}'"
-            c.refuse(item.span, message, "name a size, mode, uid or gid")
-            continue
-        if is_cut:
-            c.cut(item.span, "tmpfs", c.limits.memory, "memory")
-        made.append(escaped(f"{target}:{allowed}"))
+        target, _, options = (c.literal(item) or "").partition(":")
+        words = [word.strip() for word in options.split(",") if word.strip()]
+        sizes = [word for word in words if word.startswith(("size=", "nr_blocks="))]
+        wanted = [size(word.removeprefix("size=")) for word in sizes] or [most]
+        if not all(0 < one <= most for one in wanted):
+            c.cut(item.span, "tmpfs", most, "memory")
+            wanted = [most]
+        kept = [word for word in words if _TMPFS_OPTIONS.fullmatch(word)]
+        made += [escaped(f"{target}:{','.join([*kept, f'size={int(wanted[-1])}'])}")] if target else []
     return made or None
 
 
 def own_limits(c: "Container") -> None:
     own, most = c.own, c.limits
     for key, value in (("pids_limit", most.processes), ("mem_limit", most.memory), ("cpus", most.cpus)):
-        if own.get(key) in (None, float("inf")):
+        if own.get(key) in (None, math.inf):
             own.pop(key, None)
             own.update({} if value is None else {key: value})
     if "ulimits" not in own:
         own["ulimits"] = ulimits(c)
     if not c.project.setting.keeps_privileges:
-        words = own.get("security_opt") or []
-        if not any(str(word).startswith("no-new-privileges") for word in words):
-            own["security_opt"] = [*words, "no-new-privileges:true"]
+        own.setdefault("security_opt", ["no-new-privileges:true"])
         dropped = [str(word) for word in own.get("cap_drop") or ()]
         taken = {word.upper().removeprefix("CAP_") for word in dropped}
         own["cap_drop"] = [*dropped, *(name for name in _DROPPED if not taken & {name, "ALL"})]
@@ -155,8 +140,75 @@ def own_limits(c: "Container") -> None:
 
 
 LIMITS: dict[str, Callable[["Container", Node], Any]] = {
-    "cpus": cpus,
-    "mem_limit": lambda c, n: limit(c, n, c.limits.memory, "mem_limit", "memory", size),
-    "pids_limit": lambda c, n: limit(c, n, c.limits.processes, "pids_limit", "processes", whole),
-    "shm_size": lambda c, n: limit(c, n, c.limits.memory, "shm_size", "memory", size),
+    "cpus": lambda c, n: capped(c, n, "cpus", c.limits.cpus or math.inf, "cpus", number, 1e-9),
+    "mem_limit": lambda c, n: capped(c, n, "mem_limit", c.limits.memory, "memory", size),
+    "pids_limit": lambda c, n: capped(c, n, "pids_limit", c.limits.processes, "processes", whole),
+    "shm_size": lambda c, n: capped(c, n, "shm_size", c.limits.memory, "memory", size),
 }
+
+
+def is_kept(c: "Container", span: Span, called: str, is_of_rig: bool) -> bool:
+    """Whether a test has a device of the host: a rig's, but for its port; with a problem where it has not."""
+    if is_of_rig:
+        c.hardware(span, f"{called} of '{c.name}' {_NO_PORT}", "give the application another device")
+    elif c.project.setting.hil:
+        return True
+    else:
+        c.hardware(span, f"{called} of '{c.name}' {_WITHOUT_HARDWARE}")
+    return False
+
+
+def devices(c: "Container", node: Node) -> Any:
+    made, paths = [], c.project.paths
+    for item in c.items(node):
+        about = item.get("source") if isinstance(item, source.Mapping) else item
+        if about is None or not (word := c.literal(about)):
+            continue
+        path = word.partition(":")[0]
+        if not paths.is_hardware(path):
+            c.refuse(about.span, f"device '{word}' of '{c.name}' is none of a robot, but of the host", "remove it")
+        elif is_kept(c, about.span, f"device '{word}'", is_port(paths.whole(path), c.project.ports, within=True)):
+            made.append(plain(item))
+    return made or None
+
+
+def privileged(c: "Container", node: Node) -> Any:
+    found = _allowed(c, node, lambda word: not is_true(word), "'privileged'")
+    return True if found and is_true(found[0]) else None
+
+
+def capabilities(c: "Container", node: Node) -> Any:
+    return _allowed(c, node, lambda word: word.upper().removeprefix("CAP_") in _CAPABILITIES, "capability '{}'") or None
+
+
+def _allowed(c: "Container", node: Node, is_harmless: Callable[[str], bool], called: str) -> list[str]:
+    """The texts that a container may have: those that are harmless, and all on a rig that allows privileges."""
+    made = []
+    for item in c.items(node):
+        if not (word := c.literal(item)):
+            continue
+        if is_harmless(word) or c.project.setting.keeps_privileges:
+            made.append(word)
+        else:
+            c.hardware(item.span, f"{called.format(word)} of '{c.name}' {_WITHOUT_HARDWARE}")
+    return made
+
+
+def gpus(c: "Container", node: Node) -> Any:
+    """Requests of NVIDIA's graphics processors: ``all``, or the devices of a reservation."""
+    made = []
+    for item in c.items(node):
+        if not isinstance(item, source.Mapping):
+            return plain(item)
+        fields = c.fields(
+            item, f"a graphics processor of '{c.name}'", "driver count device_ids capabilities", "options"
+        )
+        drivers, ids = ([*c.items(fields[key])] if key in fields else [] for key in ("driver", "device_ids"))
+        wrong = [word for word in drivers if c.literal(word) not in ("", "nvidia")]
+        wrong += [word for word in ids if "=" in (c.literal(word) or "")]
+        if wrong:
+            hint = "use numbers or UUIDs of GPUs, and nvidia or no driver"
+            c.refuse(wrong[0].span, f"'{plain(wrong[0])}' of '{c.name}' may be any device of the host", hint)
+        else:
+            made.append({key: plain(value) for key, value in fields.items()})
+    return made or None

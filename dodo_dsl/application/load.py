@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from dodo_dsl import source
-from dodo_dsl.application import compose_merge
+from dodo_dsl.application import merge
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.model import scalars, with_entry
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed
@@ -42,7 +42,7 @@ def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[
     whole: list[Node] = [document for document in documents if document is not None]
     if len(whole) < len(documents):
         return None
-    settled = compose_merge.settled(functools.reduce(compose_merge.merged, whole))
+    settled = merge.settled(functools.reduce(merge.merged, whole))
     assert isinstance(settled, source.Mapping)
     here = files.relative(folder)
     return _changed(settled, lambda _, service: _with_context(service, here))
@@ -109,7 +109,7 @@ def _joined(files: ComposeFiles, document: source.Mapping, part: source.Mapping)
             included = Path(theirs[name].key.file).name
             files.problem(entry.key, f"the included '{included}' also has a service '{name}'", "rename one of them")
     kept = {key: entry for key, entry in part.entries.items() if key in _NAMED}
-    merged = compose_merge.merged(source.Mapping(document.span, kept), document)
+    merged = merge.merged(source.Mapping(document.span, kept), document)
     return merged if isinstance(merged, source.Mapping) else document
 
 
@@ -127,7 +127,7 @@ def _extended(files: ComposeFiles, chain: tuple[Service, ...], node: Node) -> No
         return node
     own = source.Mapping(node.span, {k: e for k, e in node.entries.items() if k != "extends"}, node.tag)
     base = _base(files, node.entries["extends"], chain)
-    result = own if base is None else compose_merge.merged_service(base, own)
+    result = own if base is None else merge.merged_service(base, own)
     files.grow(result, node.entries["extends"].key)
     return result
 
@@ -146,7 +146,7 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
     document = files.document(file, base.folder)
     entries = source.entries(document, "services")
     if base.name in entries and base not in chain and len(chain) < MAX_DEPTH:
-        return compose_merge.settled(_extended(files, (*chain, base), entries[base.name].value))
+        return merge.settled(_extended(files, (*chain, base), entries[base.name].value))
     if base in chain or base.name in entries:
         names = " extends ".join(f"'{service.name}'" for service in (*chain, base))
         long = f"the chain of services that '{chain[0].name}' extends is longer than {MAX_DEPTH}"
@@ -168,32 +168,26 @@ def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnost
     Its hint names files as ``dodo.yml`` does, which is in ``root`` or else next to them.
     """
     folder = paths[0].parent
-    named = [_whole_file(path) for path in paths]
     there = (
-        [_whole_file(folder / name) for name in names if (folder / name).is_file()] for names in (_NAMES, _OVERRIDES)
+        next((folder / name for name in names if (folder / name).is_file()), None) for names in (_NAMES, _OVERRIDES)
     )
-    found = [files[0] for files in there if files]
-    others = [path for path in found if path not in named]
-    if not others or len(others) == len(found):
-        return
-    names = listed([f"'{os.path.relpath(path, folder)}'" for path in others])
-    items = [as_item(path, root or folder) for path in [*found, *(path for path in named if path not in found)]]
-    own = as_item(next(path for path in named if path in found), folder)
-    yield Diagnostic(
-        Span(str(paths[0])),
-        "application-override",
-        f"'docker compose' also reads {names}, which it finds next to this file; DoDo does not",
-        f"write application: [{', '.join(items)}] in dodo.yml; to test without it, name another file there that has "
-        f"include: [{own}]",
-        "warning",
-    )
-
-
-def _whole_file(path: Path) -> Path:
-    return Path(os.path.normpath(path.absolute()))
+    found = [path for path in there if path]
+    others = [path for path in found if path not in paths]
+    if others and len(others) < len(found):
+        names = listed([f"'{path.name}'" for path in others])
+        items = [as_item(path, root or folder) for path in dict.fromkeys([*found, *paths])]
+        own = next(path.name for path in found if path in paths)
+        yield Diagnostic(
+            Span(str(paths[0])),
+            "application-override",
+            f"'docker compose' also reads {names}, which it finds next to this file; DoDo does not",
+            f"write application: [{', '.join(items)}] in dodo.yml; to test without it, name another file there that "
+            f"has include: [{own}]",
+            "warning",
+        )
 
 
 def as_item(path: Path, folder: Path) -> str:
     """A path as an item of a list in YAML."""
-    text = os.path.relpath(path, _whole_file(folder))
+    text = os.path.relpath(path, folder)
     return text if _PLAIN.fullmatch(text) else f'"{text}"'

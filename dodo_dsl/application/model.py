@@ -5,17 +5,18 @@ Variables are the one for a service's image, those that files set, and those tha
 
 import functools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_files import Statements, is_late, statements_of
+from dodo_dsl.application.compose_files import Statements, is_late, variables_in
 from dodo_dsl.application.host_paths import HostPaths, repository
 from dodo_dsl.application.interpolation import literal
+from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.opendlv_flags import split
-from dodo_dsl.diagnostics import Span
+from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -26,7 +27,6 @@ KEYS = ("x-dodo", "x-dodo-process")
 OFFSCREEN = {"QT_QPA_PLATFORM": "offscreen"}
 """The variable by which programs that draw with Qt need no display."""
 COMMANDS = ("x-dodo-process", "entrypoint", "command")
-NAMESPACES = ("network_mode", "ipc", "pid")
 _FALSE = ("false", "f", "0", "no", "n", "off", "")
 
 _ABOUT_NO_MESSAGES = {"tune", "cid", "display", "timed"}
@@ -88,21 +88,24 @@ class Declared:
 class EnvFile:
     """A path of ``env_file`` with its place; ``required`` is False if compose starts without the file.
 
-    ``raw`` is the format whose values are as they are written.
+    ``raw`` is the format whose values are as they are written. ``statements`` are what the file sets, ``problems`` what
+    compose refuses in it.
     """
 
     path: str
     span: Span
     required: bool
-    raw: bool = False
+    raw: bool
+    statements: Statements
+    problems: Sequence[Diagnostic]
 
 
 @dataclass(frozen=True)
 class ComposeService:
     """A service of the application that starts, with its place; paths in ``node`` are relative to the compose file.
 
-    ``declared`` is None without x-dodo, or if that says nothing of messages. ``statements`` are those of its
-    ``env_files``. Variables are filled in but for those in ``raw``, the values of TEST_FILLED as they are written.
+    ``declared`` is None without x-dodo, or if that says nothing of messages. Variables are filled in but for those in
+    ``raw``, the values of TEST_FILLED as they are written.
     """
 
     name: str
@@ -110,7 +113,6 @@ class ComposeService:
     span: Span
     declared: Declared | None
     env_files: tuple[EnvFile, ...] = ()
-    statements: tuple[Statements, ...] = ()
     raw: Mapping[str, Node] = field(default_factory=dict)
 
     @functools.cached_property
@@ -121,7 +123,7 @@ class ComposeService:
     @functools.cached_property
     def file_variables(self) -> Mapping[str, str | None]:
         """The variables that its files set; None takes the value from outside."""
-        return {name: value for statements in self.statements for name, value in statements}
+        return {name: value for file in self.env_files for name, value in file.statements}
 
     @property
     def has_display(self) -> bool:
@@ -145,7 +147,7 @@ class ApplicationSource:
     """The merged compose files, which are all that rules and the planner see of the application.
 
     ``services`` are those that start, by name. Paths are relative to ``folder``. ``dropped`` has the reasons why
-    services do not start, by name, ``containers`` the services by their ``container_name``, and ``secrets`` the
+    services do not start, by name, ``shown`` the paths of the host that it asks for, and ``secrets`` the
     files that set variables which no compiled test holds. ``known`` are all variables whose values are known,
     ``access`` is what the deployment allows, ``limits`` are the highest that the services may set. ``named`` are the
     files as ``dodo.yml`` names them, ``without`` the services that it leaves out. ``cids`` are declared to be built
@@ -155,7 +157,7 @@ class ApplicationSource:
     path: Path
     services: Mapping[str, ComposeService]
     dropped: Mapping[str, str] = field(default_factory=dict)
-    containers: Mapping[str, str] = field(default_factory=dict)
+    shown: tuple[tuple[str, Span, str], ...] = ()
     secrets: Mapping[str, Path] = field(default_factory=dict)
     known: Mapping[str, str] = field(default_factory=dict)
     access: Access = field(default_factory=Access)
@@ -224,36 +226,18 @@ def is_true(value: object) -> bool:
     return value is True or (isinstance(value, str) and value.strip().lower() not in _FALSE)
 
 
-def reference(value: object) -> tuple[str, str]:
-    """``service:x`` and ``container:x`` as kind and name; two empty strings for other values."""
-    kind, sign, name = str(value or "").partition(":")
-    return (kind, name) if sign and kind in ("service", "container") else ("", "")
-
-
-def borrowed(entry: object) -> tuple[str, str, str]:
-    """An entry of ``volumes_from`` as kind, name and options."""
-    kind, name = reference(entry)
-    name, sign, options = (name if kind else str(entry)).partition(":")
-    return kind or "service", name, sign + options
-
-
-def references(service: dict[str, Any], containers: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """The services that a service needs, each with its key; containers of the application count as its services."""
+def references(service: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """The services that a service needs, each with its key."""
     for key in NAMESPACES:
-        kind, name = reference(service.get(key))
-        if kind == "service" or name in containers:
-            yield key, containers.get(name, name) if kind == "container" else name
-    for entry in service.get("volumes_from") or ():
-        kind, name, _ = borrowed(entry)
-        if kind == "service" or name in containers:
-            yield "volumes_from", containers.get(name, name) if kind == "container" else name
-    for link in service.get("links") or ():
-        yield "links", str(link).partition(":")[0]
-    waits = service.get("depends_on") or {}
-    for name in waits:
-        options = waits[name] if isinstance(waits, dict) else {}
+        kind, _, name = str(service.get(key)).partition(":")
+        if kind == "service":
+            yield key, name
+    for key, prefix in (("volumes_from", "service:"), ("links", "")):
+        names = (str(entry).removeprefix(prefix).partition(":")[0] for entry in service.get(key) or ())
+        yield from ((key, name) for name in names if name != "container")
+    for name, options in (service.get("depends_on") or {}).items():
         if not isinstance(options, dict) or options.get("required") is not False:
-            yield "depends_on", str(name)
+            yield "depends_on", name
 
 
 def plain(node: Node) -> Any:
@@ -280,11 +264,8 @@ def text(value: object) -> str:
 
 
 def environment(raw: Any) -> dict[str, str | None]:
-    """``environment`` as a map; None takes the value from DoDo's own environment."""
-    if isinstance(raw, list):
-        pairs = (str(item).partition("=") for item in raw)
-        return {name: value if sign else None for name, sign, value in pairs}
-    return {str(k): None if v is None else text(v) for k, v in (raw or {}).items()}
+    """``environment`` with texts; None takes the value from DoDo's own environment."""
+    return {name: None if value is None else text(value) for name, value in (raw or {}).items()}
 
 
 def words_of(node: Node | None) -> Iterator[tuple[str, Scalar]]:
@@ -341,26 +322,16 @@ def image_variable(service: str) -> str:
     return "DODO_IMAGE_" + re.sub(r"[^A-Z0-9_]", "_", service.upper())
 
 
-def env_files(service: source.Mapping) -> Iterator[EnvFile]:
-    """The files of ``env_file``."""
+def env_files(service: source.Mapping, folder: Path) -> Iterator[EnvFile]:
+    """The files of ``env_file``, which are relative to ``folder``."""
     node = service.get("env_file")
-    for item in node.items if isinstance(node, source.Sequence) else (node,):
-        about = item.get if isinstance(item, source.Mapping) else {"path": item}.get
-        path, required, form = about("path"), about("required"), about("format")
+    for item in node.items if isinstance(node, source.Sequence) else ():
+        path, required, kind = (source.part(item, key) for key in ("path", "required", "format"))
         if isinstance(path, Scalar) and isinstance(path.value, str):
-            optional = isinstance(required, Scalar) and not is_true(required.value)
-            yield EnvFile(
-                literal(path.text) or path.text,
-                path.span,
-                not optional,
-                isinstance(form, Scalar) and form.value == "raw",
-            )
-
-
-def file_statements(files: Iterable[EnvFile], folder: Path) -> tuple[Statements, ...]:
-    """What files next to the compose file set, in order."""
-    own = (file for file in files if not file.path.startswith(("/", "~")))
-    return tuple(statements_of(folder / file.path, raw=file.raw) for file in own)
+            is_required = not isinstance(required, Scalar) or is_true(required.value)
+            text = literal(path.text) or path.text
+            raw = isinstance(kind, Scalar)
+            yield EnvFile(text, path.span, is_required, raw, *variables_in(folder / text, raw=raw))
 
 
 def with_entry(node: source.Mapping, key: str, value: Node) -> source.Mapping:

@@ -5,8 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from dodo_dsl import source
-from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.interpolation import literal
+from dodo_dsl.application.interpolation import escaped, literal
 from dodo_dsl.application.model import plain, text
 from dodo_dsl.diagnostics import Diagnostic, Fix, Span, did_you_mean, only_fix
 from dodo_dsl.source import Node, Scalar
@@ -15,16 +14,20 @@ from dodo_dsl.spec.sandbox_limits import SandboxLimits
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
 
-NO_PORT = "is left out of all tests: only the service that moves the rig opens its port"
-WITHOUT_HARDWARE = "is left out of sil and dil tests, which have no hardware"
 ASK_KEY = "your own keys begin with x-, such as x-{}; docs/reference/compose-keys.md has compose's"
+
+OFF: tuple[object, ...] = (None, False, "", "false", [], {})
+"""Values of keys that say nothing."""
+Refused = tuple[str, ...]
+"""Why a key is refused, what to write instead, and the values that are not."""
+NOTHING: Mapping[str, Refused] = {}
 
 
 class Part:
     """A service, a volume, a secret or a config, by its ``name``; ``span`` is the place of its key."""
 
-    def __init__(self, project: "Construction", name: str, span: Span) -> None:
-        self.project, self.name, self.span = project, name, span
+    def __init__(self, project: "Construction", name: str, span: Span, problems: list[Diagnostic]) -> None:
+        self.project, self.name, self.span, self.problems = project, name, span, problems
         self.left: list[tuple[str, Span]] = []
         """The keys that a test does not carry, each with its place."""
 
@@ -33,7 +36,7 @@ class Part:
         return self.project.setting.limits
 
     def add(self, problem: Diagnostic) -> None:
-        self.project.problems.append(problem)
+        self.problems.append(problem)
 
     def bad(self, span: Span, message: str, hint: str = "", fix: Fix | None = None) -> None:
         self.add(Diagnostic(span, "application-file", message, hint, fix=fix))
@@ -86,25 +89,33 @@ class Part:
 
     def items(self, node: Node) -> Iterator[Node]:
         """The items of a list, or the single value."""
-        yield from (i for i in (node.items if isinstance(node, source.Sequence) else (node,)) if _is_set(i))
+        yield from (i for i in (node.items if isinstance(node, source.Sequence) else (node,)) if is_set(i))
 
     def fields(
-        self, node: Node | None, what: str, known: str, left_out: str = "", *, refused: Mapping[str, str] | None = None
+        self, node: Node | None, what: str, known: str, left_out: str = "", refused: Mapping[str, Refused] = NOTHING
     ) -> dict[str, Node]:
         """The fields of a mapping that a test carries; problems of those that it cannot have, and of unknown ones."""
         found: dict[str, Node] = {}
         words, gone = known.split(), left_out.split()
         for key, entry in source.entries(node).items():
             if key in words:
-                found.update({key: entry.value} if _is_set(entry.value) else {})
-            elif refused and key in refused:
-                if not (isinstance(entry.value, Scalar) and entry.value.value in (None, False, "")):
-                    self.refuse(spot(entry), f"'{key}' of {what} cannot be isolated: {refused[key]}", "remove it")
+                found.update({key: entry.value} if is_set(entry.value) else {})
+            elif key in refused:
+                found.update({} if self.is_refused(key, entry, what, refused[key]) else {key: entry.value})
             elif key in gone:
                 self.left.append((key, entry.key))
             elif isinstance(node, source.Mapping):
-                self.unknown_key(key, node, what, (*words, *gone, *(refused or ())))
+                self.unknown_key(key, node, what, (*words, *gone, *refused))
         return found
+
+    def is_refused(self, key: str, entry: source.Entry, what: str, refused: Refused) -> bool:
+        """Whether a key says anything but a value that a test has; a problem where something else would run."""
+        why, fix, *allowed = refused
+        if plain(entry.value) in allowed:
+            return False
+        if plain(entry.value) not in OFF:
+            self.refuse(spot(entry), f"'{key}' of {what} {why}", fix)
+        return True
 
 
 def spot(entry: source.Entry) -> Span:
@@ -115,5 +126,5 @@ def spot(entry: source.Entry) -> Span:
     return node.span if isinstance(node, Scalar) and node.text else entry.key
 
 
-def _is_set(node: Node) -> bool:
+def is_set(node: Node) -> bool:
     return not (isinstance(node, Scalar) and node.value is None)

@@ -4,7 +4,6 @@
 that it starts; one with ``x-dodo`` is the application's own, as the team says what it sends and takes.
 """
 
-import itertools
 import re
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -83,52 +82,32 @@ STACK = (
 _PLATFORM = re.compile(r"(\.git|-(multi|amd64|x86_64|armhf|arm64|arm|aarch64|alpine|dev|v?[0-9][0-9.]*))+$")
 _IMAGE = re.compile(r"(?:.*/)?(?P<name>[A-Za-z0-9._-]+)(?:[:@#].*)?", re.DOTALL)
 _SHELLS = ("sh", "ash", "bash", "dash", "zsh")
-_SEPARATOR = re.compile(r"[;&|\n]+|\b(?:do|then|else)\b")
-_BEFORE = re.compile(
-    r"-.*|\d+[smh]?|\w+=.*|exec|nohup|env|nice|stdbuf|timeout|time|sudo|while|until|if|[!{(]", re.DOTALL
-)
-"""Words of a shell's command before the program itself."""
-_BESIDE = re.compile(
-    r"cd|mkdir|rm|mv|chmod|cat|tee|gzip|xz|echo|date|sleep|wait|trap|test|set|export|true|done|fi|exit|[]:[)}]"
-)
-"""Programs beside which a shell's command is still one of the stack."""
 
 
 def part(service: ComposeService) -> tuple[str, Part] | None:
     """Which part of the stack a service is, by the name under which it is known; None for the application's own."""
-    if service.declared is not None:
-        return None
-    for names in _names(service):
-        rows = [next((row for row in STACK if re.fullmatch(row.names, name)), None) for name in names]
-        if rows and rows[0] and all(rows):
-            return names[0], rows[0]
-    return None
+    rows = ((name, row) for name in _names(service) for row in STACK if re.fullmatch(row.names, name))
+    return next(rows, None) if service.declared is None else None
 
 
-def _names(service: ComposeService) -> Iterator[list[str]]:
-    """What the service may be known by: its image, the repository it is built from, and the programs it starts."""
-    image, build = service.node.get("image"), service.node.get("build")
-    context = build.get("context") if isinstance(build, source.Mapping) else build
+def _names(service: ComposeService) -> Iterator[str]:
+    """What the service may be known by: its image, the repository it is built from, and the program it starts."""
+    image, context = service.node.get("image"), source.part(service.node, "build", "context")
     if isinstance(image, Scalar) and (match := _IMAGE.fullmatch(image.text)):
-        yield [_PLATFORM.sub("", match["name"])]
+        yield _PLATFORM.sub("", match["name"])
     if isinstance(context, Scalar):
         parts = [part for part in re.split(r"[/#?]", context.text) if part]
-        yield from ([_PLATFORM.sub("", part)] for part in (parts if "://" in context.text else parts[-1:]))
+        yield from (_PLATFORM.sub("", part) for part in (parts if "://" in context.text else parts[-1:]))
     process, entrypoint, command = ([word for word, _ in words_of(service.node.get(key))] for key in COMMANDS)
-    for words in ([*entrypoint, *command], command, process):
-        yield list(dict.fromkeys(_programs(words)))
+    yield from map(_program, ([*entrypoint, *command], command, process))
 
 
-def _programs(words: Sequence[str]) -> Iterator[str]:
-    """The programs that a command starts, also by a shell, but for what shells have to prepare them."""
-    rest = [] if words and words[0].startswith("-") else list(itertools.dropwhile(_BEFORE.fullmatch, words))
-    name = rest[0].rpartition("/")[2] if rest else ""
-    if name in _SHELLS:
-        script = next((word for word in rest[1:] if not word.startswith("-")), "")
-        for command in _SEPARATOR.split(script):
-            yield from _programs(command.split())
-    elif name and not _BESIDE.fullmatch(name):
-        yield name
+def _program(words: Sequence[str]) -> str:
+    """The program that a command starts, also as the only one of a shell."""
+    name = words[0].rpartition("/")[2] if words else ""
+    if name in _SHELLS and len(words) == 3 and not {*";&|\n"} & {*words[2]}:
+        return _program(words[2].split())
+    return name
 
 
 def parts(application: ApplicationSource) -> dict[str, tuple[str, Part]]:

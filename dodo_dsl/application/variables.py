@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from dodo_dsl import source
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.interpolation import filled, literal, names
+from dodo_dsl.application.merge import filled_node
 from dodo_dsl.application.model import ApplicationSource, ComposeService, environment, plain
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
@@ -103,9 +103,9 @@ def _of_files(service: ComposeService, values: Mapping[str, str], is_late: Calla
     """
     made: dict[str, str] = {}
     before: dict[str, str] = {}
-    for statements in service.statements:
+    for file in service.env_files:
         found: dict[str, str] = {}
-        for name, value in statements:
+        for name, value in file.statements:
             if value is None:
                 made.update({} if is_late(name) else {name: values.get(name, "").replace("$", "$$")})
                 continue

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import file_rules, resolve, service_rules, spec_rules, wiring_rules
-from dodo_dsl.check.context import Rule, RuleContext
-from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.resolve import ResolvedTest, Rule, RuleContext
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.manifest import Manifest
@@ -20,9 +19,8 @@ RULES: tuple[Rule, ...] = (
     spec_rules.check_pools,
     spec_rules.check_rigs,
     spec_rules.check_built_in_cid,
-    service_rules.check_camera_sources,
+    service_rules.check_cameras,
     service_rules.check_services,
-    service_rules.check_layers,
     service_rules.check_parameters,
     service_rules.check_messages,
     service_rules.check_own_messages,
@@ -36,7 +34,6 @@ RULES: tuple[Rule, ...] = (
     wiring_rules.check_hidden_messages,
     wiring_rules.check_variables,
     wiring_rules.check_memories,
-    wiring_rules.check_pictures,
 )
 
 
@@ -74,14 +71,6 @@ def check(
 
 def forget_files() -> None:
     """What is kept of the files that tests name, which may have changed."""
-    read = (
-        file_rules.entries,
-        file_rules.problems,
-        file_rules.course_of,
-        file_rules.fault_of_start,
-        file_rules.files,
-        file_rules.table_span,
-        file_rules.pictures,
-    )
-    for cache in (*read, resolve.known_ids, resolve.known_messages, resolve.holds):
-        cache.cache_clear()
+    for kept in (*vars(file_rules).values(), *vars(resolve).values()):
+        if hasattr(kept, "cache_clear"):
+            kept.cache_clear()

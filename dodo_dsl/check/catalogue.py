@@ -1,9 +1,10 @@
-"""The rule catalogue: for each rule a summary, its reason, an example that violates it and one that does not.
+"""The rule catalogue: for each rule a summary, its reason, an example that violates it, and what to write instead.
 
 docs/reference/rules.md (``scripts/make-rules``) and ``dodo explain RULE`` are generated from ``catalogue.yml``.
 """
 
 import functools
+import itertools
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ The rules that `dodo compile` checks, by the name that it prints in square brack
 in a terminal.
 
 Each example has only the keys that differ from a valid test `example.dodo.yml`. A line such as `# dodo.yml` begins
-another file. The example of a rule violates it; with what is written instead it does not. DoDo's own tests check both.
+another file. The example of a rule violates it; with what is written instead it does not.
 
 `scripts/make-rules` generates this page from `dodo_dsl/check/catalogue.yml`.
 """
@@ -31,7 +32,7 @@ another file. The example of a rule violates it; with what is written instead it
 class Page:
     """One rule; ``encoding`` is that of the bad example's files.
 
-    ``instead`` is a line in place of the bad example's with the same key, empty if the good one differs by more.
+    ``instead`` are lines in place of the bad example's with the same keys, empty if the reason says what to do.
     """
 
     name: str
@@ -39,9 +40,22 @@ class Page:
     summary: str
     why: str
     bad: str
-    good: str
     instead: str = ""
     encoding: str = "utf-8"
+
+    @property
+    def good(self) -> str:
+        """The example with the lines of ``instead``."""
+        lines, other = self.bad.splitlines(), self.instead.splitlines()
+        if len(lines) == 1:
+            return self.instead
+        new = {line.partition(":")[0].strip(): line for line in other}
+        return "\n".join(_in_place(new.get(line.partition(":")[0].strip(), line), line) for line in lines)
+
+
+def _in_place(new: str, old: str) -> str:
+    """A line with the indentation of the one whose place it takes, if it has none."""
+    return new if new[:1] == " " else f"{old[: len(old) - len(old.lstrip())]}{new.lstrip()}"
 
 
 @functools.cache
@@ -51,61 +65,39 @@ def pages() -> dict[str, Page]:
     if node is None or problems:
         raise ValueError(f"{FILE.name}: {problems}")
     return {
-        name: Page(name, group, **_examples({key: text.strip("\n") for key, text in page.items()}))
+        name: _page(name, group, **{key: text.strip("\n") for key, text in page.items()})
         for group, members in plain(node).items()
         for name, page in members.items()
     }
 
 
-def _examples(page: dict[str, str]) -> dict[str, str]:
-    """A page with its good example, which is the bad one with a line instead of the one with its key."""
-    instead = page.get("instead")
-    if instead is None:
-        return page
-    key = instead.partition(":")[0]
-    lines = page["bad"].splitlines()
-    number = next(n for n, line in enumerate(lines) if line.strip().partition(":")[0] == key)
-    indent = lines[number][: len(lines[number]) - len(lines[number].lstrip())]
-    return {**page, "good": "\n".join([*lines[:number], indent + instead, *lines[number + 1 :]])}
+def _page(name: str, group: str, summary: str, why: str, bad: str = "", driver: str = "", **more: str) -> Page:
+    """``driver`` are keys of the application's service."""
+    compose = f"# docker-compose.yml\nservices:\n  driver: {{image: driver, {driver}}}" if driver else ""
+    return Page(name, group, summary, why, "\n".join(filter(None, (bad, compose))), **more)
 
 
 def text(page: Page) -> str:
     """A rule's page for a terminal."""
-    parts = (
-        f"{page.name}: {page.summary}",
-        textwrap.fill(page.why, 100),
-        "This violates the rule:",
-        textwrap.indent(page.bad, "    "),
-        "Instead:",
-        textwrap.indent(page.instead or page.good, "    "),
-    )
+    parts = [f"{page.name}: {page.summary}", textwrap.fill(page.why, 100)]
+    parts += ["This violates the rule:", textwrap.indent(page.bad, "    ")]
+    parts += ["Instead:", textwrap.indent(page.instead, "    ")] if page.instead else []
     return "\n\n".join(parts) + "\n"
 
 
 def markdown() -> str:
     """The text of docs/reference/rules.md."""
-    return "\n".join((_INTRODUCTION, *_contents(), *_sections()))
-
-
-def _groups() -> dict[str, list[Page]]:
-    groups: dict[str, list[Page]] = {}
-    for page in pages().values():
-        groups.setdefault(page.group, []).append(page)
-    return groups
-
-
-def _contents() -> Iterator[str]:
-    yield "| | rules |\n|---|---|"
-    for group, members in _groups().items():
-        yield f"| {group} | {', '.join(f'[{page.name}](#{page.name})' for page in members)} |"
+    return "\n".join((_INTRODUCTION, *_sections()))
 
 
 def _sections() -> Iterator[str]:
-    for group, members in _groups().items():
+    for group, members in itertools.groupby(pages().values(), lambda page: page.group):
         yield f"\n## {group}"
         for page in members:
             yield f"\n### {page.name}\n\n{page.summary}\n{page.why}\n"
-            yield f"```yaml\n{page.bad}\n```\n\nInstead:\n\n```yaml\n{page.instead or page.good}\n```"
+            yield f"```yaml\n{page.bad}\n```"
+            if page.instead:
+                yield f"\nInstead:\n\n```yaml\n{page.instead}\n```"
     yield ""
 
 

@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.check import lockstep
-from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import IMAGE, known_ids, without_pictures
+from dodo_dsl.check import wiring
+from dodo_dsl.check.resolve import IMAGE, RuleContext, known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.opendlv.assets import formats, map_file, recording_contents
@@ -239,17 +238,15 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
     spec, services = context.spec, context.services
     unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
     player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
-    known = lockstep.rates(services)
-    has_rate = not player and known.keys() & lockstep.cameras_of(context.wiring)
-    period = 1 / lockstep.step_hz(context.wiring, known) if has_rate else 0.0
+    known = wiring.rates(services)
+    has_rate = not player and known.keys() & wiring.cameras_of(context.wiring)
+    period = 1 / wiring.step_hz(context.wiring, known) if has_rate else 0.0
     for service in services if context.test.is_complete else ():
         found: list[Unmet] = []
         for name, argument in service.arguments.items():
             is_default = argument.parameter.within_timeout and not argument.entry and argument.text
             if is_default and spec.kind != "closed-loop" and float(argument.text or 0) < (spec.timeout_s or 0.0):
-                why = (
-                    f"judges {argument.text} s of the {spec.timeout_s:g} s that it may take, as nothing ends the input"
-                )
+                why = f"judges {argument.text} s of the test's {spec.timeout_s:g} s, as nothing ends the input"
                 found.append((name, why, f"write '{name}: ...', how long it is to judge", "warning"))
         if service.use.layer == "evaluation":
             found += [*_times(service, player, unsure), *_frames(service, player, period, unsure)]
@@ -269,9 +266,7 @@ def _times(service: ResolvedService, player: ResolvedService | None, unsure: Sev
     if judged := _judged(service):
         first, begin, end = judged
         if begin >= end:
-            why = (
-                f"has nothing to judge: its target begins at {first:,.10g} s, judged is {begin:,.10g} s to {end:.10g} s"
-            )
+            why = f"has nothing to judge: the target begins at {first:,.10g} s, judged is {begin:,.10g} to {end:.10g} s"
             hint = "write 'align: sample-time' for times since 1970" if first > _SINCE_1970 else "see from and until"
             yield "target", why, hint, "error"
         elif is_copied and first < _SINCE_1970:
@@ -343,8 +338,6 @@ def check_limits(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         for names in service.manifest.one_of:
             if not any(name in service.use.parameters or service.texts.get(name) for name in names):
-                message, hint = (
-                    f"'{service.use.name}' has nothing to judge by",
-                    f"write one or more of {', '.join(names)}",
-                )
-                yield Diagnostic(service.use.span, "no-limit", message, f"{hint} under 'with'")
+                message = f"'{service.use.name}' has nothing to judge by"
+                hint = f"write one or more of {', '.join(names)} under 'with'"
+                yield Diagnostic(service.use.span, "no-limit", message, hint)

@@ -7,13 +7,13 @@ is judged by, is left out of what is played: it would be taken for the applicati
 
 import functools
 import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl.application.model import ApplicationSource, Declared
-from dodo_dsl.check.lockstep import driving
-from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, message, wire
+from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, driving, message, wire
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
 from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
@@ -35,19 +35,16 @@ _REQUEST = "Request"
 """How messages are called that ask an actuator for something, as applications do."""
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """The wiring with what recordings can send alone, and the messages that each service leaves out for that."""
+def replayed(
+    wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]
+) -> tuple[Wiring, Mapping[str, tuple[str, ...]]]:
+    """The wiring with what recordings can send alone, and the messages that each service leaves out for that.
 
-    wiring: Wiring
-    left_out: Mapping[str, tuple[str, ...]]
-
-
-def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Path, ...]) -> Replayed:
-    """What services of one test that play recordings send; ``own`` are the files with the deployment's messages."""
+    ``own`` are the files with the deployment's messages.
+    """
     players = [each for each in services if ANYTHING in each.messages.outputs and _recording(each)]
     if not players:
-        return Replayed(wiring, {})
+        return wiring, {}
     ids = frozenset(known_ids(own).items())
     applications = {str(port): port for port in _of_application(wiring)}
     unsent, left_out = set(), {}
@@ -58,7 +55,7 @@ def replayed(wiring: Wiring, services: Sequence[ResolvedService], own: tuple[Pat
         if WITHOUT in player.arguments:
             held = (name for name, port in applications.items() if may_send(player, port, ids))
             left_out[player.use.name] = tuple(sorted(held))
-    return Replayed(replace(wiring, unsent=frozenset(unsent)), left_out)
+    return replace(wiring, unsent=frozenset(unsent)), left_out
 
 
 def _of_application(wiring: Wiring) -> Iterator[Port]:
@@ -101,24 +98,6 @@ def without_pictures(service: ResolvedService) -> Path | None:
     path = _recording(service)
     image = known_ids(())[IMAGE]
     return None if path is None or holds(path, image, _NO_STAMP) else path
-
-
-def picture_size(service: ResolvedService) -> tuple[int, int]:
-    """Width and height of the frames that a service makes: as written, or of its recording; 0 if unknown."""
-    path = _recording(service)
-    if path is not None:
-        sender = service.texts.get("video-sender", "")
-        return _recorded_size(path, int(sender)) if sender.isdecimal() else (0, 0)
-    width, height = (service.texts.get(key, "") for key in ("width", "height"))
-    return (int(width), int(height)) if width.isdecimal() and height.isdecimal() else (0, 0)
-
-
-@functools.lru_cache(maxsize=256)
-def _recorded_size(path: Path, sender: int) -> tuple[int, int]:
-    try:
-        return recording_contents.picture_size(path, known_ids(())[IMAGE], sender)
-    except OSError:
-        return 0, 0  # reported with the file
 
 
 def _recording(service: ResolvedService) -> Path | None:
@@ -217,8 +196,7 @@ def resolve(
         if spec.timeout_s and any(service.ends_input for service in services):
             ending = operator.attrgetter("parameter.within_timeout")
             services = tuple(_with_default(each, f"{spec.timeout_s:g}", ending) for each in services)
-        played = replayed(wiring, services, deployment.messages)
-        found.append(ResolvedTest(spec, rig, services, played.wiring, played.left_out))
+        found.append(ResolvedTest(spec, rig, services, *replayed(wiring, services, deployment.messages)))
     return found
 
 
@@ -259,3 +237,40 @@ def takes_old_frames(wiring: Wiring, own: tuple[Path, ...]) -> bool:
 def _arguments(test: ResolvedTest | None, layer: str, name: str) -> Mapping[str, Argument] | None:
     services = test.services if test else ()
     return next((s.arguments for s in services if (s.use.layer, s.use.name) == (layer, name)), None)
+
+
+@dataclass(frozen=True)
+class RuleContext:
+    """One instance with its deployment and application; ``by_name`` has one instance of each file by its name."""
+
+    test: ResolvedTest
+    manifests: Mapping[str, Manifest]
+    by_name: Mapping[str, list[Spec]]
+    deployment: Deployment
+    application: ApplicationSource | None = None
+
+    @property
+    def spec(self) -> Spec:
+        return self.test.spec
+
+    @property
+    def rig(self) -> Rig | None:
+        """The rig of a hil test, when the deployment has it."""
+        return self.test.rig
+
+    @property
+    def services(self) -> tuple[ResolvedService, ...]:
+        """Those that are known in their layers; ``unknown-service`` and ``wrong-layer`` report the others."""
+        return self.test.services
+
+    @property
+    def wiring(self) -> Wiring:
+        return self.test.wiring
+
+    @property
+    def messages(self) -> Collection[str]:
+        """The full names of all messages: OpenDLV's, DoDo's and the deployment's, as far as these can be read."""
+        return known_ids(self.deployment.messages)
+
+
+Rule = Callable[[RuleContext], Iterator[Diagnostic]]

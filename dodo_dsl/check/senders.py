@@ -45,16 +45,12 @@ def _guarded(consumed: Port, wiring: Wiring) -> Iterable[Port]:
         return ()
     if wiring.is_truth(consumed):
         return (Port("message", consumed.name, consumed.stamp),)
-    if _is_declared(consumed, wiring.application_produces):
+    if any(consumed.consumes(end.port) for end in wiring.application_produces):
         return ()
     if not consumed.can_be_required:
         return (Port("message", consumed.name, consumed.stamp),)
     produced = (end.port for end in wiring.producers(consumed) if end.port.name != ANYTHING)
     return (Port("message", port.name, port.stamp) for port in produced)
-
-
-def _is_declared(consumed: Port, produced: Iterable[End]) -> bool:
-    return any(consumed.consumes(end.port) for end in produced)
 
 
 def is_shipped(process: tuple[str, ...]) -> bool:

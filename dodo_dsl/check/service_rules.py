@@ -2,26 +2,29 @@
 
 import re
 from collections.abc import Collection, Iterator
-from pathlib import Path, PurePath
+from pathlib import Path
 
 from dodo_dsl.application.model import PrintedLine
 from dodo_dsl.check import resolve
-from dodo_dsl.check.context import RuleContext
+from dodo_dsl.check.resolve import RuleContext
 from dodo_dsl.check.senders import is_shipped, told
-from dodo_dsl.diagnostics import Diagnostic, Span, closest, did_you_mean, only_fix
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, only_fix
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Reader, Scalar, Sequence, walk
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService
-from dodo_dsl.spec.deployment import MANIFEST
-from dodo_dsl.spec.manifest import holds
-from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, RPICAM, Rig
+from dodo_dsl.spec.manifest import MANIFEST, holds
+from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, Rig
 from dodo_dsl.spec.slips import meant, unknown_key
 
 
 def check_services(context: RuleContext) -> Iterator[Diagnostic]:
     first_layer: dict[str, str] = {}
     for use in context.spec.uses:
-        if use.uses.text not in context.manifests and not _is_broken(context, use.uses.text):
+        if manifest := context.manifests.get(use.uses.text):
+            if use.layer not in manifest.layers:
+                message = f"service '{manifest.name}' does not fit layer {use.layer}"
+                yield Diagnostic(use.uses.span, "wrong-layer", message, f"move it to {' or '.join(manifest.layers)}")
+        elif not _is_broken(context, use.uses.text):
             hint = did_you_mean(use.uses.text, context.manifests) or "'dodo list --services' shows those that there are"
             message, fix = f"unknown service '{use.uses.text}'", only_fix(use.uses.text, context.manifests)
             yield Diagnostic(use.uses.span, "unknown-service", message, hint, fix=fix)
@@ -46,19 +49,12 @@ def _is_broken(context: RuleContext, name: str) -> bool:
     return name.replace("_", "-") in {folder.name.replace("_", "-") for folder in found if folder not in read}
 
 
-def check_layers(context: RuleContext) -> Iterator[Diagnostic]:
-    for use in context.spec.uses:
-        manifest = context.manifests.get(use.uses.text)
-        if manifest and use.layer not in manifest.layers:
-            message = f"service '{manifest.name}' does not fit layer {use.layer}"
-            hint = f"move it to {' or '.join(manifest.layers)}"
-            yield Diagnostic(use.uses.span, "wrong-layer", message, hint)
-
-
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
     for service in context.services:
         yield from _written(service)
-        yield from _from_elsewhere(service)
+        for name, argument in service.arguments.items():
+            if argument.problem and name not in service.use.parameters:  # of the rig or of another service
+                yield argument.problem
         yield from _missing(context, service)
         yield from _counts(service)
 
@@ -112,19 +108,13 @@ def _misspelt(service: ResolvedService) -> set[str]:
     return {meant(name, known, is_empty=_is_empty(entry)) for name, entry in unknown}
 
 
-def _from_elsewhere(service: ResolvedService) -> Iterator[Diagnostic]:
-    """Values of the rig or of another service that do not fit here."""
-    for name, argument in service.arguments.items():
-        if argument.problem and name not in service.use.parameters:
-            yield argument.problem
-
-
 def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnostic]:
     use, manifest, misspelt = service.use, service.manifest, _misspelt(service)
     for parameter in manifest.parameters.values():
         if not parameter.required or parameter.name in use.parameters or parameter.name in misspelt:
             continue
-        if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else _wants_rig(context)):
+        is_on_rig = bool(context.spec.rig) or context.spec.level == "hil"
+        if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else is_on_rig):
             continue  # a rig that is unknown or missing may give it, too
         if parameter.shared and not context.spec.is_whole:
             continue  # a service that could not be read may give it
@@ -155,10 +145,6 @@ def _lacks_first(context: RuleContext, service: ResolvedService, name: str) -> b
     return next(needing, service) is not service
 
 
-def _wants_rig(context: RuleContext) -> bool:
-    return bool(context.spec.rig) or context.spec.level == "hil"
-
-
 def _givers(context: RuleContext, name: str) -> dict[str, str]:
     """The values that services of the test give to a parameter, each with the first service's name."""
     givers: dict[str, str] = {}
@@ -173,15 +159,15 @@ def check_messages(context: RuleContext) -> Iterator[Diagnostic]:
         for name, entry in service.use.parameters.items():
             argument = service.arguments.get(name)
             if argument and argument.parameter.type == "message" and argument.value:
-                yield from _known(context, argument.value.text, entry.value.span)
+                yield from unknown_message(argument.value.text, context.messages, entry.value.span)
             if isinstance(entry.value, Sequence) and any(f"{{{name}}}" in p for p in service.messages.inputs):
                 for item in entry.value.items[:MAX_PROBLEMS]:
                     if isinstance(item, Scalar):
-                        yield from _known(context, item.text.partition("/")[0], item.span)
+                        yield from unknown_message(item.text.partition("/")[0], context.messages, item.span)
     declared = context.application.declared.values() if context.application else ()
     for own in declared:
         for name, span in (*own.inputs, *own.outputs, *own.answers) if own else ():
-            yield from _known(context, name.partition("/")[0], span)
+            yield from unknown_message(name.partition("/")[0], context.messages, span)
         yield from _lines(context, own.lines if own else ())
 
 
@@ -230,10 +216,6 @@ def _lines(context: RuleContext, lines: Collection[PrintedLine]) -> Iterator[Dia
             yield from line_problems(line, resolve.known_messages(context.deployment.messages))
 
 
-def _known(context: RuleContext, name: str, span: Span) -> Iterator[Diagnostic]:
-    yield from unknown_message(name, context.messages, span)
-
-
 def unknown_message(name: str, known: Collection[str], span: Span) -> Iterator[Diagnostic]:
     """The problem of a name that is none of the ``known`` messages."""
     if name and name not in known:
@@ -260,38 +242,19 @@ def unknown_messages(folders: tuple[Path, ...], reader: Reader, known: Collectio
                     yield from unknown_message(name, known, scalar.span)
 
 
-_FILE = "file"
-_NAMES = (RPICAM, _FILE, EMULATED)
-_ALIGNED = 64
-"""Rows of other widths are padded in the pipe of ``rpicam-vid``."""
-
 _OPTICS = "camera.intrinsics"
 
 
-def check_camera_sources(context: RuleContext) -> Iterator[Diagnostic]:
+def check_cameras(context: RuleContext) -> Iterator[Diagnostic]:
+    rig = context.rig
     for service in context.services:
-        yield from _size(context.rig, service)
+        yield from _size(rig, service)
         for argument in service.arguments.values():
-            if argument.parameter.rig == CAMERA_SOURCE and argument.text:
-                yield from _problems(context, service, argument)
-
-
-def _problems(context: RuleContext, service: ResolvedService, argument: Argument) -> Iterator[Diagnostic]:
-    source, span = argument.text or "", _span(service, argument)
-    if source not in _NAMES and not source.startswith("/dev/") and not PurePath(source).suffix:
-        known = "write a device such as /dev/video0, rpicam or file"
-        hint = did_you_mean(source, _NAMES) if closest(source, _NAMES) else known
-        yield Diagnostic(span, "camera-source", f"'{source}' is not a source of frames", hint)
-    elif source == EMULATED and context.rig is not None and not context.rig.is_emulated:
-        message = f"rig '{context.rig.name}' is hardware, and an emulated camera sees nothing of it"
-        yield Diagnostic(span, "camera-source", message, "write a device such as /dev/video0, or rpicam")
-    elif source == _FILE and _FILE not in service.use.parameters:
-        message = f"'{service.use.name}' has the source 'file', but no 'file' to take frames from"
-        yield Diagnostic(span, "camera-source", message, "write 'file: ...' under 'with' in the test, or a device")
-    elif source == RPICAM and (width := service.texts.get("width", "")).isdigit() and int(width) % _ALIGNED:
-        message = f"rpicam-vid gives frames whose width is a multiple of {_ALIGNED}, not {width}"
-        hint = f"write a width of {max(int(width) // _ALIGNED, 1) * _ALIGNED}"
-        yield Diagnostic(span, "camera-source", message, hint)
+            is_drawn = argument.parameter.rig == CAMERA_SOURCE and argument.text == EMULATED
+            if is_drawn and rig is not None and not rig.is_emulated:
+                message = f"rig '{rig.name}' is hardware, and an emulated camera sees nothing of it"
+                span = argument.entry.value.span if argument.entry else service.use.span
+                yield Diagnostic(span, "camera-source", message, "write a device such as /dev/video0, or rpicam")
 
 
 def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
@@ -307,7 +270,3 @@ def _size(rig: Rig | None, service: ResolvedService) -> Iterator[Diagnostic]:
         message += f"and '{service.use.name}' has them of {' x '.join(given)}"
         hint = f"measure it again with 'dodo rig measure {rig.name} --camera', or take frames of the measured size"
         yield Diagnostic(where.value.span if where else service.use.span, "camera-size", message, hint)
-
-
-def _span(service: ResolvedService, argument: Argument) -> Span:
-    return argument.entry.value.span if argument.entry else service.use.span

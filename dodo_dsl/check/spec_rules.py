@@ -1,21 +1,20 @@
 """Rules on a test itself: its names, its level and clock, its rig, and its goals."""
 
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 
-from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.lockstep import rates, rates_fit, step_hz
-from dodo_dsl.check.resolve import ResolvedTest, isolation
-from dodo_dsl.diagnostics import Diagnostic, did_you_mean, shown_path
+from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.check.resolve import ResolvedTest, RuleContext, isolation
+from dodo_dsl.check.wiring import rates, rates_fit, step_hz
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, shown_path
 from dodo_dsl.source import Entry, Mapping, Scalar, plain
 from dodo_dsl.spec.arguments import Argument
-from dodo_dsl.spec.deployment import RESERVED_CIDS
+from dodo_dsl.spec.deployment import RESERVED_CIDS, Deployment
 from dodo_dsl.spec.load import members
 from dodo_dsl.spec.model import VIRTUAL, Goal, Use
 from dodo_dsl.spec.quantity import SHARE, QuantityError, convert
-from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, as_file, is_free, is_name
+from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, is_free, is_name
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, EMULATED_RIGS, KIND_TAGS, MEMORY, PORT, Rig, is_simulated
 
 
@@ -25,7 +24,7 @@ def check_names(context: RuleContext) -> Iterator[Diagnostic]:
         return
     if spec.name in KEYWORDS:
         message = f"'{spec.name}' is a keyword of GitLab's pipelines and cannot name a job"
-        yield Diagnostic(spec.span("name"), "name-reserved", message, as_file(spec.location.stem, SUFFIX))
+        yield Diagnostic(spec.span("name"), "name-reserved", message, "choose another name, also for the file")
     elif spec.name != spec.location.stem and is_name(spec.name):  # the schema shows what is wrong with any other
         message, stem = f"the name '{spec.name}' differs from the file's name", spec.location.stem
         written = f"write 'name: {stem}', or " if is_free(stem) else ""
@@ -56,11 +55,6 @@ def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
     yield from _rates(context)
     if context.spec.clock == VIRTUAL:
         yield from _own_time(context)
-    timed = context.application.timed if context.application and context.spec.clock != VIRTUAL else ()
-    for name, span in timed:
-        message = f"this application acts by its own clock: '{name}' has timers, which in lockstep do not wait"
-        hint = "run it with 'clock: realtime', or 'clock: virtual'"
-        yield Diagnostic(span, "clock-timed", message, hint, severity="warning")
 
 
 def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
@@ -71,11 +65,10 @@ def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
         message = "with clock virtual computing takes no test time, so that no answer is slow"
         hint = "limit answers with clock lockstep, or processor time with 'resources'"
         yield Diagnostic(spec.span("response"), "clock-virtual", message, hint)
-    for printed in context.wiring.printed:
-        message = f"'{printed.service}' prints its messages, and lines have no time of the test"
+    if printed := context.wiring.printed:
+        message = f"'{printed[0].service}' prints its messages, and lines have no time of the test"
         hint = "send them on the bus, or use clock lockstep"
         yield Diagnostic(spec.span("clock"), "clock-virtual", message, hint)
-        return
 
 
 def _rates(context: RuleContext) -> Iterator[Diagnostic]:
@@ -195,7 +188,7 @@ def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[D
 
 
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
-    yield from resolved_goals(context.test).problems
+    yield from resolved_goals(context.test)[1]
 
 
 _OF_THE_TEST = {
@@ -209,19 +202,11 @@ _OF_THE_TEST = {
 """Checks of no evaluator."""
 
 
-@dataclass(frozen=True)
-class ResolvedGoals:
-    """The goals that can be understood, and the problems of the others."""
-
-    goals: tuple[Goal, ...]
-    problems: tuple[Diagnostic, ...]
-
-
-def resolved_goals(test: ResolvedTest) -> ResolvedGoals:
-    """The goals of a test, in the order in which they are written."""
+def resolved_goals(test: ResolvedTest) -> tuple[tuple[Goal, ...], tuple[Diagnostic, ...]]:
+    """The goals of a test that can be understood, as they are ordered there, and what is wrong with the others."""
     found = [_goal(test, name, entry) for name, entry in test.spec.goals.items()]
     goals = tuple(goal for goal in found if isinstance(goal, Goal))
-    return ResolvedGoals(goals, tuple(problem for problem in found if isinstance(problem, Diagnostic)))
+    return goals, tuple(problem for problem in found if isinstance(problem, Diagnostic))
 
 
 def _goal(test: ResolvedTest, name: str, entry: Entry) -> Goal | Diagnostic | None:
@@ -259,3 +244,48 @@ def _units(test: ResolvedTest) -> dict[str, str]:
 def _unit(test: ResolvedTest, name: str) -> str | None:
     """The unit of a check, None if no manifest has it."""
     return next((unit for pattern, unit in _units(test).items() if fnmatchcase(name, pattern)), None)
+
+
+def check_suite(
+    tests: Sequence[ResolvedTest], deployment: Deployment, application: ApplicationSource | None
+) -> Iterator[Diagnostic]:
+    """Rules on all tests together, whatever else is wrong with some of them.
+
+    ``out-of-cids``: no two on the host's network share a CID. ``out-of-range``: the deployment's network has room.
+    """
+    file = Span(str(deployment.file)) if deployment.file else None
+    free = [isolation(test.spec, test.rig) for test in tests if reserved_cid(test, application) is None]
+    if len(free) > len(deployment.cids) <= free.count("host"):
+        message = f"{free.count('host')} tests on the host network, but only {len(deployment.cids)} CIDs"
+        last = max(tests, key=lambda test: test.spec.slug)
+        yield Diagnostic(file or last.spec.span("name"), "out-of-cids", message, "widen 'cids' in dodo.yml")
+    isolated = [test for test in tests if isolation(test.spec, test.rig) == "network"]
+    needed = {containers(test, application): test for test in isolated}
+    if needed and (length := prefix(most := max(needed))) < deployment.subnets.prefixlen:
+        message = f"a test has {most} containers and so needs a /{length}, but 'subnets' is {deployment.subnets}"
+        hint = "give 'subnets' in dodo.yml more, such as 10.213.0.0/16"
+        yield Diagnostic(file or needed[most].spec.span("name"), "out-of-range", message, hint)
+
+
+def reserved_cid(test: ResolvedTest, application: ApplicationSource | None) -> int | None:
+    """The CID of a test's rig, or that which is built into the application."""
+    if test.rig and test.rig.cid is not None:
+        return test.rig.cid
+    return application.cid if application else None
+
+
+def containers(test: ResolvedTest, application: ApplicationSource | None) -> int:
+    """Those of a test: each service, the recorder, in lockstep the clock, and the one that holds the network."""
+    own = len(application.services) if application else 0
+    return len(test.spec.uses) + own + (3 if test.spec.is_stepped else 2)
+
+
+SMALLEST = 28
+"""The prefix of the smallest subnet of a test, with room for 13 containers."""
+_TAKEN = 3
+"""Addresses of a subnet that no container gets: the network's, the engine's own, and that of broadcasts."""
+
+
+def prefix(containers: int) -> int:
+    """The length of the prefix of the smallest subnet in which each container has an address."""
+    return min(SMALLEST, 32 - (containers + _TAKEN - 1).bit_length())

@@ -1,22 +1,19 @@
 """Rules on what services and application give one another: messages, shared memories, and the test's variables."""
 
-from collections.abc import Collection, Iterator, Mapping
-from pathlib import Path
+from collections.abc import Collection, Iterator
+from dataclasses import replace
 
-from dodo_dsl.application import opendlv_flags, secret_problems
+from dodo_dsl.application import opendlv_flags, secret_variables
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
-from dodo_dsl.application.pictures import FORMATS, AskedPictures, pictures_of
 from dodo_dsl.application.variables import owner, split_by, with_variables
-from dodo_dsl.check.context import RuleContext
-from dodo_dsl.check.resolve import IMAGE, picture_size, without_pictures
+from dodo_dsl.check.resolve import IMAGE, RuleContext, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
-from dodo_dsl.check.wiring import ANYTHING, End, Wiring, message
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.arguments import ResolvedService, default_value
 from dodo_dsl.spec.manifest import Manifest
 
 SENSORS = "opendlv.proxy."
@@ -63,30 +60,13 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
-        hint = _otherwise(context, end) or (
-            "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
-        )
+        hint = "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
         hint = _who_could(context, wiring, end)
     if rule == "no-sample":
         message += ", so it could never judge"
     return Diagnostic(end.span, rule, message, hint)
-
-
-def _otherwise(context: RuleContext, end: End) -> str:
-    """A hint: with which parameters the service takes what the application sends."""
-    sent = [each.port for each in context.wiring.application_produces]
-    service = next(each for each in context.services if each.use.name == end.service)
-    manifest, defaults = service.manifest, (default_value(each) for each in service.manifest.parameters.values())
-    texts = {n: v.text for n, v in zip(manifest.parameters, defaults, strict=True) if v} | dict(service.texts)
-    for when in (case.when for case in manifest.cases if case.ports.inputs):
-        other = {n: next(filter(None, values), "") for n, values in when.items() if texts.get(n, "") not in values}
-        taken = [message(text, None) for text in manifest.messages_with(texts | other).inputs if text[-1] not in "?!"]
-        if other and all(any(port.consumes(each) for each in sent) for port in taken):
-            written = " and ".join(f"'{name}: {value}'" for name, value in other.items())
-            return f"write {written} for an application that sends {' and '.join(map(str, taken))}"
-    return ""
 
 
 def _who_could(context: RuleContext, wiring: Wiring, end: End) -> str:
@@ -156,88 +136,25 @@ def check_memories(context: RuleContext) -> Iterator[Diagnostic]:
     asked = {service.name: _asked(service) for service in services}
     players = {each.use.name: path for each in context.services if (path := without_pictures(each))}
     shown = {end.port.name for end in ends if end.service not in players}
-    yield from _blank(asked, {end.port.name: players[end.service] for end in ends if end.port.name not in shown})
+    blank = {end.port.name: players[end.service] for end in ends if end.port.name not in shown}
     for asking, names in asked.items():
         others = {name for other, own in asked.items() if other != asking for name in own}
-        if made.isdisjoint(names) and others.isdisjoint(names):
-            for name, span in names.items():
-                yield _missing(asking, name, span, made, _offer(context, name))
-
-
-def _blank(asked: Mapping[str, Asked], recordings: Mapping[str, Path]) -> Iterator[Diagnostic]:
-    """Memories in which no frame will ever be: their services play recordings without."""
-    for service, names in asked.items():
-        for name in sorted(names.keys() & recordings.keys()):
-            file = recordings[name].name
-            message = f"the application's '{service}' reads frames from '{name}', and '{file}' has none"
-            hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
-            yield Diagnostic(names[name], "application-memory", message, hint, "warning")
-
-
-def check_pictures(context: RuleContext) -> Iterator[Diagnostic]:
-    """Frames whose bytes the application would take for others, or refuse."""
-    if context.application is None or not context.test.is_complete:
-        return
-    for asked in pictures_of(with_variables(context.application, context.test.variables)):
-        for service in context.services:
-            keys = {service.texts.get(key, "").removeprefix("/"): key for key in service.arguments if key in _NAMES}
-            if names := [name for name in asked.formats if name and name in keys]:
-                yield from _sizes(context, service, asked)
-            for name in names:
-                yield from _formats(service, asked, name, keys[name])
-
-
-_NAMES = {f"name.{format_}": format_ for format_ in FORMATS}
-_PICTURES = "application-pictures"
-
-
-def _sizes(context: RuleContext, service: ResolvedService, asked: AskedPictures) -> Iterator[Diagnostic]:
-    made, use = picture_size(service), service.use
-    wanted = asked.width or made[0], asked.height or made[1]
-    if not all(made) or wanted == made:
-        return
-    size, other = (f"{width} x {height}" for width, height in (wanted, made))
-    written = [use.parameters[key].value.span for key in ("width", "height", "rec") if key in use.parameters]
-    who = f"the application's '{asked.service}'"
-    message = f"{who} asks for frames of {size} pixels, and '{use.name}' makes them of {other}"
-    hint = f"write --width={made[0]} --height={made[1]} in the command of '{asked.service}'"
-    if "width" in service.arguments:
-        hint += f", or 'width: {wanted[0]}' and 'height: {wanted[1]}' under 'with' of '{use.name}'"
-    yield Diagnostic(written[0] if written else use.span, _PICTURES, message, hint, "warning")
-
-
-def _formats(service: ResolvedService, asked: AskedPictures, name: str, key: str) -> Iterator[Diagnostic]:
-    wanted, made, use = asked.formats[name], _NAMES[key], service.use
-    if wanted in ("", made):
-        return
-    span = use.parameters[key].value.span if key in use.parameters else use.span
-    who = f"the application's '{asked.service}'"
-    sizes = f"{wanted} with {FORMATS[wanted]:g} bytes a pixel, and '{use.name}' makes it {made} with {FORMATS[made]:g}"
-    hint = f"write 'name.{wanted}: {name}' under 'with' of '{use.name}', and another name for '{key}'"
-    yield Diagnostic(span, _PICTURES, f"{who} asks for '{name}' as {sizes}", hint, "warning")
+        is_strange = made.isdisjoint(names) and others.isdisjoint(names)
+        for name, span in names.items():
+            near = closest(name, made)
+            message = f"the application's '{asking}' asks for the memory '{name}', which no service of the test makes"
+            hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
+            if name in blank:
+                message = f"the application's '{asking}' reads frames from '{name}', and '{blank[name].name}' has none"
+                hint = f"take a recording with {IMAGE}; 'dodo rec info' shows what it holds"
+            if is_strange or name in blank:
+                yield Diagnostic(span, "application-memory", message, hint, "warning")
 
 
 def readers(application: ApplicationSource, names: Collection[str]) -> list[str]:
     """The services of an application that ask for one of these memories."""
     services = application.services.values()
     return [each.name for each in services if not set(names).isdisjoint(_asked(each))]
-
-
-def _offer(context: RuleContext, name: str) -> str:
-    """The line of the test with which one of its services makes a memory of this name; empty if none can."""
-    key = f"name.{name.rpartition('.')[2]}"
-    able = [each.use.name for each in context.services if f"{{{key}}}" in each.manifest.memory.outputs]
-    return f"write '{key}: {name}' under 'with' of '{able[0]}'" if able else ""
-
-
-def _missing(service: str, name: str, span: Span, made: set[str], offer: str) -> Diagnostic:
-    message = f"the application's '{service}' asks for the memory '{name}', which no service of the test makes"
-    near = closest(name, made)
-    hint = f"did you mean '{near[0]}'?" if near else f"the test makes {', '.join(sorted(made))}"
-    stem, _, format_ = name.rpartition(".")
-    alike = {each.rpartition(".")[0] for each in made if each.endswith(f".{format_}")}
-    hint = hint if closest(stem, alike) else offer or hint
-    return Diagnostic(span, "application-memory", message, hint, "warning")
 
 
 def _asked(service: ComposeService) -> Asked:
@@ -255,7 +172,7 @@ _GIVEN = ("command", "entrypoint", "environment")
 """Keys whose variables a test may set."""
 
 
-_HARDWARE = ("cap_add", "device_cgroup_rules", "devices", "privileged", "security_opt")
+_HARDWARE = ("cap_add", "devices", "privileged", "security_opt")
 """Keys that only rigs carry."""
 
 
@@ -268,7 +185,11 @@ def check_variables(context: RuleContext) -> Iterator[Diagnostic]:
             yield Diagnostic(entry.key, _RULE, message, "set a variable that the application itself reads")
         elif isinstance(entry.value, Scalar):
             yield from _value(context, name, entry.value)
-            yield from secret_problems.written([entry.value])
+            if kind := secret_variables.secret_kind(entry.value.text):
+                message = f"this looks like {kind}, which everybody with access to the repository can read"
+                hint = "keep it out of the repository, and pass a variable with 'environment' of dodo.yml"
+                span = replace(entry.value.span, length=0)
+                yield Diagnostic(span, "application-secret", message, hint, "warning")
 
 
 def _value(context: RuleContext, name: str, value: Scalar) -> Iterator[Diagnostic]:

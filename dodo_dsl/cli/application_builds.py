@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from dodo_dsl import compiler
-from dodo_dsl.application import unseen
+from dodo_dsl.application import hidden_paths
 from dodo_dsl.application.construction import checked_builds
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.application.model import ApplicationSource
@@ -67,7 +67,7 @@ def _hidden(source: ApplicationSource, deployment: Deployment, files: Sequence[P
     """What builds do not get; raises UsageError where tests among the application's own files cannot be compiled."""
     own = source.folder.resolve()
     roots = [own, *(root.resolve() for root in source.paths.roots)]
-    found = [*unseen.unseen_folders(source, deployment), *of_repository(roots)]
+    found = [*hidden_paths.unseen(source, deployment), *of_repository(roots)]
     if any(own.is_relative_to(folder.resolve()) for folder in deployment.registry):
         checked = compiler.without_unsatisfied(compiler.load((), files))
         if not checked.ok or has_errors((made := compiler.plan(checked, own / "generated")).problems):

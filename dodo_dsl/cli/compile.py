@@ -28,7 +28,6 @@ from dodo_dsl.diagnostics import (
     ordered,
     shown_path,
 )
-from dodo_dsl.emit.output_folder import add_images, differences, stale_folders, write
 from dodo_dsl.terminal import printable
 
 Fixes = dict[Span, Fix]
@@ -176,6 +175,8 @@ def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         made = plan(sound, options.output, pipeline_options.job_options(options))
         diagnostics = ordered([*diagnostics, *made.problems])
         if options.output.is_dir() and not has_errors(diagnostics):
+            from dodo_dsl.emit.output_folder import differences
+
             stale = differences(made.compiled, made.pipeline, options.output)
     _show(diagnostics, options.format, stdout, stderr)
     if has_errors(diagnostics):
@@ -214,6 +215,8 @@ def _names(names: Sequence[str]) -> str:
 
 
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
+    from dodo_dsl.emit.output_folder import add_images, stale_folders, write
+
     jobs = pipeline_options.job_options(options)
     if not checked.ok:
         _show(checked.diagnostics, options.format, stdout, stderr)

@@ -91,7 +91,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.rec.truth import TruthError
     from dodo_dsl.report.child_jobs import NoChildJobs
     from dodo_dsl.report.results import ResultsError
-    from dodo_dsl.spec.registry import RegistryTooLarge
+    from dodo_dsl.spec.registry import RegistryError
 
     recordings = (
         RecordingError,
@@ -105,7 +105,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
         NotAFile,
         NotReplaceable,
     )
-    return (*recordings, FilesError, ResultsError, NoChildJobs, RegistryTooLarge)
+    return (*recordings, FilesError, ResultsError, NoChildJobs, RegistryError)
 
 
 def _machine_errors() -> tuple[type[Exception], ...]:

@@ -16,9 +16,9 @@ from pathlib import Path
 from dodo_dsl import source
 from dodo_dsl.application import stack
 from dodo_dsl.application.application_problems import on_other_buses, takes_cid, written_cids
-from dodo_dsl.application.compose_paths import is_local
+from dodo_dsl.application.merge import is_local
 from dodo_dsl.application.model import ApplicationSource, ComposeService
-from dodo_dsl.application.pictures import pictures_of
+from dodo_dsl.application.opendlv_flags import pictures_of
 from dodo_dsl.application.read import as_written
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.spec.manifest import load_manifests
@@ -116,8 +116,7 @@ def declarable(file: Path) -> Declarable | None:
 
 def _found(service: ComposeService, application: ApplicationSource) -> tuple[set[int], str]:
     """A service's CIDs, and the keys of x-dodo that its sources show and its compose file lacks."""
-    build, cids = service.node.get("build"), written_cids(service, application)
-    context = build.get("context") if isinstance(build, source.Mapping) else build
+    context, cids = source.part(service.node, "build", "context"), written_cids(service, application)
     if service.declared or not isinstance(context, source.Scalar) or not is_local(context.text):
         return cids, ""
     if not application.paths.is_own(context.text):

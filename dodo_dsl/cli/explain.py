@@ -1,18 +1,24 @@
 """dodo explain: explain a rule, or how a test is wired and what its application must provide."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
-from typing import TextIO
+from itertools import groupby
+from operator import itemgetter
+from typing import Any, TextIO
 
 from dodo_dsl.check import catalogue
-from dodo_dsl.check.explanation import ArgumentExplained, Asked, Explanation, Line, explain
-from dodo_dsl.check.senders import told_in_words
+from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.senders import told, told_in_words
+from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError
-from dodo_dsl.diagnostics import did_you_mean
-from dodo_dsl.spec.model import LEVEL_WORDS
+from dodo_dsl.diagnostics import Span, did_you_mean, shown_path
+from dodo_dsl.spec.arguments import Argument, default_value
+from dodo_dsl.spec.model import LEVEL_WORDS, Use
+from dodo_dsl.spec.quantity import SHARE
+from dodo_dsl.spec.rig import EMULATED_FILE
 from dodo_dsl.terminal import json_text, printable
 
 EXAMPLES = """examples:
@@ -24,6 +30,9 @@ EXAMPLES = """examples:
 
 _MOST_ROWS = 100
 
+Explanation = dict[str, Any]
+"""What ``dodo explain --json`` has of a test, with its keys; ``told`` is what it gets of what only a simulation has."""
+
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("word", nargs="?", metavar="TEST|RULE", help="a rule, or the name or path of a test")
@@ -34,10 +43,12 @@ def add(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     rules = catalogue.pages()
     if options.word is None:
-        return _rules(options.json, stdout)
+        table = _table([[page.name, page.summary] for page in rules.values()], "")
+        stdout.write(json_text(list(map(_page, rules.values()))) if options.json else table)
+        return Exit.OK
     if options.word in rules:
         page = rules[options.word]
-        stdout.write(json_text(asdict(page)) if options.json else catalogue.text(page))
+        stdout.write(json_text(_page(page)) if options.json else catalogue.text(page))
         return Exit.OK
     try:
         checked = selection.select([options.word], (), options.application)
@@ -46,96 +57,200 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         said = str(error).replace("unknown test", "unknown test or rule", 1)
         raise UsageError(f"{said}; " + (f"or the rule: {near}" if near else "'dodo explain' lists the rules")) from None
     found = [explain(test) for test in checked.tests]
-    stdout.write(json_text([asdict(e) for e in found]) if options.json else _text(found))
+    files = groupby(found, itemgetter("file"))
+    stdout.write(json_text(found) if options.json else "\n".join(_file(list(instances)) for _, instances in files))
     stderr.write(selection.left_out(checked))
     write_diagnostics(stderr, checked.diagnostics)
     return Exit.OK if checked.ok else Exit.USAGE
 
 
-def _rules(as_json: bool, stdout: TextIO) -> int:
-    pages = catalogue.pages().values()
-    if as_json:
-        stdout.write(json_text([asdict(page) for page in pages]))
-    else:
-        stdout.write(_table([[page.name, page.summary] for page in pages], ""))
-    return Exit.OK
+def _page(page: catalogue.Page) -> dict[str, str]:
+    return {**asdict(page), "good": page.good}
 
 
-def _text(found: Sequence[Explanation]) -> str:
-    """The instances of a file together: the first one whole, and what differs in the others."""
-    files: dict[str, list[Explanation]] = {}
-    for one in found:
-        files.setdefault(one.file, []).append(one)
-    return "\n".join(_file(instances) for instances in files.values())
+def explain(test: ResolvedTest) -> Explanation:
+    """One instance, as far as it can be read."""
+    spec, wiring = test.spec, test.wiring
+    services = [
+        {"layer": use.layer, "name": use.name, "uses": use.uses.text, "arguments": list(_arguments(test, use))}
+        for use in spec.uses
+    ]
+    variables = [
+        {"name": name, "value": test.variables.get(name, "?"), "unit": "", "origin": _place(entry.key)}
+        for name, entry in spec.variables.items()
+    ]
+    vary = [
+        {"name": one.name, "nominal": one.nominal.text, "values": one.text, "origin": _place(one.nominal.span)}
+        for one in spec.ranges
+    ]
+    return {
+        "name": spec.title,
+        "slug": spec.slug,
+        "file": shown_path(str(spec.path)),
+        "level": spec.level or "?",
+        "kind": spec.kind or "?",
+        "rig": spec.rig or "",
+        "pool": spec.pool,
+        "services": services,
+        "variables": variables,
+        "vary": vary,
+        "wiring": list(_lines(wiring)),
+        "asked": list(_asked(wiring)),
+        "told": list(dict.fromkeys(str(end.port) for end in told(wiring))),
+        "has_application": wiring.has_application,
+        "undeclared": list(wiring.undeclared),
+    }
+
+
+def _arguments(test: ResolvedTest, use: Use) -> Iterator[dict[str, str]]:
+    for argument in next((s.arguments.values() for s in test.services if s.use is use), ()):
+        unit = "" if argument.parameter.unit == SHARE or argument.value is None else argument.parameter.unit
+        if argument.value or argument.problem:
+            value = argument.value.text if argument.value else "?"
+            origin = _origin(test, use, argument)
+            yield {"name": argument.parameter.name, "value": value, "unit": unit, "origin": origin}
+
+
+def _place(span: Span) -> str:
+    return f"{shown_path(span.file)}:{span.line}"
+
+
+def _origin(test: ResolvedTest, use: Use, argument: Argument) -> str:
+    """Where a value is from: a place, the service or the rig that gives it, or the manifest."""
+    entry, name = argument.entry, argument.parameter.name
+    if argument.value is None:
+        return "does not fit"
+    if entry is None:
+        is_default = argument.value == default_value(argument.parameter)
+        return "default" if is_default else "what vehicle or application take"
+    if name in use.parameters:
+        return _place(entry.key)
+    if entry.key.file == EMULATED_FILE:
+        return EMULATED_FILE
+    giver = next((u.name for u in test.spec.uses if argument.parameter.shared and name in u.parameters), "")
+    return f"as {giver}, {_place(entry.key)}" if giver else f"rig {test.spec.rig}, {_place(entry.key)}"
+
+
+def _lines(wiring: Wiring) -> Iterator[dict[str, Any]]:
+    """Each message and memory with its producers and its consumers."""
+    consumers = (*wiring.consumed, *wiring.application_consumes)
+    produced: dict[Port, list[End]] = {}
+    for end in (*wiring.produced, *wiring.application_produces):
+        produced.setdefault(end.port, []).append(end)
+    for port, ends in produced.items():
+        anything = port.name == ANYTHING
+        by = [c for c in consumers if c.port.consumes(port) and (not anything or _is_alone(wiring, c.port))]
+        name = "any message of it" if anything else str(port)
+        yield {"kind": port.kind, "port": name, "says": [_sender(e, wiring) for e in ends], "hears": _shown(by)}
+    unsatisfied: dict[tuple[str, str], list[End]] = {}
+    for end in consumers:
+        if not any(end.port.consumes(port) for port in produced):
+            unsatisfied.setdefault((end.port.kind, str(end.port)), []).append(end)
+    for (kind, name), ends in unsatisfied.items():
+        yield {"kind": kind, "port": name, "says": [], "hears": _shown(ends)}
+
+
+def _is_alone(wiring: Wiring, port: Port) -> bool:
+    """Whether no service of the test produces by name what a port consumes."""
+    return all(producer.port.name == ANYTHING for producer in wiring.producers(port))
+
+
+def _sender(end: End, wiring: Wiring) -> str:
+    """A producer, and whether it only prints the message."""
+    is_printed = any((each.service, each.port) == (end.service, end.port) for each in wiring.printed)
+    return f"{end.service} (application, prints it)" if is_printed else _shown([end])[0]
+
+
+def _shown(ends: Iterable[End]) -> list[str]:
+    names = (f"{end.service} (application)" if end.layer == "application" else end.service for end in ends)
+    return list(dict.fromkeys(names))
+
+
+def _asked(wiring: Wiring) -> Iterator[dict[str, Any]]:
+    """What the application must produce, or may produce if it is not required."""
+    by_port: dict[tuple[str, str], list[End]] = {}
+    for end in wiring.required():
+        if end.port.can_be_required:
+            by_port.setdefault((end.port.kind, str(end.port)), []).append(end)
+    for (kind, name), ends in by_port.items():
+        declared = (end.service for end in wiring.application_produces if ends[0].port.consumes(end.port))
+        required = any(not end.port.optional for end in ends)
+        yield {
+            "kind": kind,
+            "port": name,
+            "needed_by": [end.service for end in ends],
+            "required": required,
+            "declared_by": list(dict.fromkeys(declared)),
+        }
 
 
 def _file(instances: Sequence[Explanation]) -> str:
-    first = instances[0]
-    parts = [_head(first), _services(first), _wiring(first), _differences(instances)]
-    others = {(e.wiring, e.asked): e for e in reversed(instances) if (e.wiring, e.asked) != (first.wiring, first.asked)}
-    parts += [f"{printable(other.name)}\n\n{_wiring(other)}" for other in reversed(others.values())]
-    return "\n".join(part for part in parts if part)
+    """The instances of a file together: the first one whole, and what differs in the others."""
+    wired: dict[str, str] = {}
+    for one in instances:
+        wired.setdefault(_wiring(one), one["name"])
+    first, (own, *others) = instances[0], wired
+    parts = [_head(first), _services(first), own, _differences(instances)]
+    return "\n".join(part for part in [*parts, *(f"{printable(wired[other])}\n\n{other}" for other in others)] if part)
 
 
 def _head(one: Explanation) -> str:
-    rig = f", rig {one.rig}" if one.rig else ""
-    rig += f" of any {one.pool}" if one.pool else ""
-    level = f"{LEVEL_WORDS[one.level]}\n" if one.level in LEVEL_WORDS else ""
-    return f"{printable(f'{one.name} ({one.level}, {one.kind}{rig})')}\n{printable(one.file)}\n{level}"
+    rig = (f", rig {one['rig']}" if one["rig"] else "") + (f" of any {one['pool']}" if one["pool"] else "")
+    level = f"{LEVEL_WORDS[one['level']]}\n" if one["level"] in LEVEL_WORDS else ""
+    title = f"{one['name']} ({one['level']}, {one['kind']}{rig})"
+    return f"{printable(title)}\n{printable(one['file'])}\n{level}"
 
 
 def _services(one: Explanation) -> str:
     lines = []
-    for service in one.services:
-        lines.append(printable(f"{service.layer}: {service.name} ({service.uses})") + "\n")
-        lines.append(_arguments(service.arguments, one))
-    if one.variables:
-        lines += ["application: its variables\n", _arguments(one.variables, one)]
-    if one.vary:
-        rows = [[r.name, r.nominal, r.values, r.origin.replace(f"{one.file}:", "line ")] for r in one.vary]
+    for service in one["services"]:
+        lines += [f"{printable('{layer}: {name} ({uses})'.format(**service))}\n", _values(one, service["arguments"])]
+    if one["variables"]:
+        lines += ["application: its variables\n", _values(one, one["variables"])]
+    if one["vary"]:
+        rows = [[r["name"], r["nominal"], r["values"], _short(one, r["origin"])] for r in one["vary"]]
         lines += ["ranges: their nominal values, and what dodo search tries\n", _table(rows, "  ")]
     return "".join(lines)
 
 
-def _arguments(arguments: Sequence[ArgumentExplained], one: Explanation) -> str:
-    rows = [[a.name, f"{a.value} {a.unit}".strip(), a.origin.replace(f"{one.file}:", "line ")] for a in arguments]
-    return _table(rows, "  ")
+def _values(one: Explanation, arguments: Sequence[dict[str, str]]) -> str:
+    return _table([[a["name"], _value(a), _short(one, a["origin"])] for a in arguments], "  ")
+
+
+def _value(argument: dict[str, str]) -> str:
+    return f"{argument['value']} {argument['unit']}".strip()
+
+
+def _short(one: Explanation, origin: str) -> str:
+    return origin.replace(f"{one['file']}:", "line ")
 
 
 def _wiring(one: Explanation) -> str:
-    rows = [[_port(line), _producers(line, one), "->", _consumers(line)] for line in one.wiring]
+    asked = {each["port"] for each in one["asked"]}
+    rows = []
+    for line in one["wiring"]:
+        nobody = "the application" if line["port"] in asked else "no producer"
+        unheard = "any reader" if line["kind"] == "memory" else "no consumer"
+        rows.append([_port(line), ", ".join(line["says"]) or nobody, "->", ", ".join(line["hears"]) or unheard])
     parts = ["producers and consumers\n" + _table(rows, "  ")]
     for title, required in (("the application must provide", True), ("the application may provide", False)):
-        asked = [a for a in one.asked if a.required is required]
-        if asked:
-            parts.append(
-                f"{title}\n"
-                + _table([[_port(a), f"to {', '.join(a.needed_by)}", _declared(a, one)] for a in asked], "  ")
-            )
-    if words := told_in_words(one.told):
-        parts.append(f"{words}\n")
-    return "\n".join(parts)
+        wanted = [each for each in one["asked"] if each["required"] is required]
+        rows = [[_port(each), f"to {', '.join(each['needed_by'])}", _declared(each, one)] for each in wanted]
+        parts += [f"{title}\n" + _table(rows, "  ")] if rows else []
+    words = told_in_words(one["told"])
+    return "\n".join([*parts, f"{words}\n"] if words else parts)
 
 
-def _port(line: Line | Asked) -> str:
-    return f"memory {line.port}" if line.kind == "memory" else line.port
+def _port(line: dict[str, Any]) -> str:
+    return f"memory {line['port']}" if line["kind"] == "memory" else str(line["port"])
 
 
-def _consumers(line: Line) -> str:
-    return ", ".join(line.hears) or ("any reader" if line.kind == "memory" else "no consumer")
-
-
-def _producers(line: Line, one: Explanation) -> str:
-    is_asked = any(line.port == a.port for a in one.asked)
-    return ", ".join(line.says) or ("the application" if is_asked else "no producer")
-
-
-def _declared(asked: Asked, one: Explanation) -> str:
-    if not one.has_application:
+def _declared(asked: dict[str, Any], one: Explanation) -> str:
+    if not one["has_application"]:
         return ""
-    if asked.declared_by:
-        return f"declared by {', '.join(asked.declared_by)}"
-    undeclared = ", ".join(one.undeclared)
+    if asked["declared_by"]:
+        return f"declared by {', '.join(asked['declared_by'])}"
+    undeclared = ", ".join(one["undeclared"])
     return f"not declared; {undeclared} has no x-dodo and may provide it" if undeclared else "not declared"
 
 
@@ -143,18 +258,17 @@ def _differences(instances: Sequence[Explanation]) -> str:
     """The values that differ between the instances, one row per instance."""
     if len(instances) == 1:
         return ""
-    values = [_values(one) for one in instances]
+    values = [_flat(one) for one in instances]
     keys = [key for key in values[0] if len({v.get(key, "") for v in values}) > 1]
-    rows = [[one.name, *(f"{k}: {v.get(k, '')}" for k in keys)] for one, v in zip(instances, values, strict=True)]
+    rows = [[one["name"], *(f"{k}: {v.get(k, '')}" for k in keys)] for one, v in zip(instances, values, strict=True)]
     rest = f"  ... {len(rows) - _MOST_ROWS} more\n" if len(rows) > _MOST_ROWS else ""
     return f"the {len(rows)} instances and their differences\n" + _table(rows[:_MOST_ROWS], "  ") + rest
 
 
-def _values(one: Explanation) -> dict[str, str]:
-    top = {"level": one.level, "kind": one.kind, "rig": one.rig}
-    variables = {a.name: a.value for a in one.variables}
-    services = {f"{s.name}.{a.name}": f"{a.value} {a.unit}".strip() for s in one.services for a in s.arguments}
-    return top | services | variables
+def _flat(one: Explanation) -> dict[str, str]:
+    services = {f"{s['name']}.{a['name']}": _value(a) for s in one["services"] for a in s["arguments"]}
+    variables = {v["name"]: v["value"] for v in one["variables"]}
+    return {key: one[key] for key in ("level", "kind", "rig")} | services | variables
 
 
 def _table(rows: Sequence[Sequence[str]], indent: str) -> str:

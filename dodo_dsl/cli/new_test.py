@@ -19,7 +19,7 @@ from dodo_dsl.cli.new_files import New, filled, schema_of_specs
 from dodo_dsl.diagnostics import did_you_mean
 from dodo_dsl.source import Mapping as Written
 from dodo_dsl.source import plain, read
-from dodo_dsl.spec import extends, vary
+from dodo_dsl.spec import load, vary
 from dodo_dsl.spec.arguments import ValueProblem, convert
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import LAYERS, LEVELS, Spec
@@ -182,9 +182,9 @@ def _text(name: str, base: Spec) -> bytes:
     """The spec's own text; one that extends others is resolved first, as the copy leaves them behind."""
     node, _ = read(base.path)
     text = base.path.read_text(encoding="utf-8")
-    if isinstance(node, Written) and extends.KEY not in node.entries and len(_COPIED_NAME.findall(text)) == 1:
+    if isinstance(node, Written) and load.EXTENDS not in node.entries and len(_COPIED_NAME.findall(text)) == 1:
         return _COPIED_NAME.sub(f"name: {name}", _EDITOR.sub("", text)).encode()
-    resolved = extends.resolve(node, base.path, base.location.root)[0] if node else None
+    resolved = load.resolve(node, base.path, base.location.root)[0] if node else None
     if not isinstance(resolved, Written):
         raise UsageError(f"'{base.name}' cannot be read, so it cannot be copied")
     written = plain(resolved)

@@ -3,7 +3,7 @@
 import argparse
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +82,7 @@ def make(options: argparse.Namespace, deployment: Deployment, rig: Rig, say: Cal
     return _sentence(files, marks, width, height)
 
 
-def _test(word: str | None, deployment: Deployment) -> tuple[dict[str, Manifest], Spec | None]:
+def _test(word: str | None, deployment: Deployment) -> tuple[Mapping[str, Manifest], Spec | None]:
     """The services, and the one test that a word names; its other problems do not matter here."""
     if word is None:
         return load_manifests(deployment.services)[0], None
@@ -90,13 +90,13 @@ def _test(word: str | None, deployment: Deployment) -> tuple[dict[str, Manifest]
     tests = {of_test(spec).title: spec for spec in checked.specs}
     if len(tests) != 1:
         raise TruthError(f"--test {word} matches {len(tests)} tests, expected one: {', '.join([*tests][:3])} ...")
-    return dict(checked.manifests), checked.specs[0]
+    return checked.manifests, checked.specs[0]
 
 
 def _looked(
     options: argparse.Namespace,
     rig: Rig,
-    manifests: dict[str, Manifest],
+    manifests: Mapping[str, Manifest],
     spec: Spec | None,
     root: Path,
     say: Callable[[str], None],

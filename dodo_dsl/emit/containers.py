@@ -127,18 +127,12 @@ def _written(plan: Plan, service: PlannedService, defaults: Defaults) -> list[Fl
     return [f for f in service.flags if own.get(f.name) != f.value or f"{place}.{f.name}" in plan.source_map]
 
 
-_COUNT = """\
-files=0 size=0
-fits() {
-  own=$(find "$1" -mindepth 1 | head -n %(most)s | wc -l); files=$((files + own))
-  [ $files -le %(files)s ] || fail "$2" "at least $own files" "%(files)s" copied-files
-  own=$(du -sk --apparent-size "$1" | cut -f1); size=$((size + own))
-  [ $size -le %(size)s ] || fail "$2" "$((own * 128 / 125000)) MB" "%(shown)s MB" copies
-}
-fail() {
-  echo "'$1' holds $2, and the copies of a test may hold $3: %(way_out)s"
-  exit 1
-}
+_COPY = """\
+files=$(find /from -mindepth 2 | head -n {most} | wc -l)
+size=$(du -sk --apparent-size /from | cut -f1)
+fail() {{ echo {names}" hold $1, and the copies of a test may hold $2: {way_out}"; exit 1; }}
+[ $files -le {files} ] || fail "at least $files files" {files} copied-files
+[ $size -le {size} ] || fail "$((size * 128 / 125000)) MB" "{shown} MB" copies
 """
 
 
@@ -148,16 +142,16 @@ def copy_command(application: Application) -> str:
     It counts before it copies. Variables are for the shell: compose fills in none.
     """
     copies, limits = application.copies, application.limits
-    count = _COUNT % {
-        "most": limits.copied_files + 1,
-        "files": limits.copied_files,
-        "size": limits.copies // 1024,
-        "shown": limits.copies // 10**6,
-        "way_out": WAY_OUT.format(key="$4"),
-    }
-    shown = {name: _as_written(source, application.folder) for name, source in copies.items()}
-    words = [f"fits {shlex.quote(f'/from/{name}')} {shlex.quote(source)}" for name, source in shown.items()]
-    words += [f"cp -a {shlex.quote(f'/from/{name}')}/. {shlex.quote(f'/to/{name}')}/" for name in copies]
+    names = ", ".join(f"'{_as_written(source, application.folder)}'" for source in copies.values())
+    count = _COPY.format(
+        most=limits.copied_files + 1,
+        files=limits.copied_files,
+        size=limits.copies // 1024,
+        shown=limits.copies // 10**6,
+        names=shlex.quote(names),
+        way_out=WAY_OUT.format(key="$3"),
+    )
+    words = [f"cp -a /from/{name}/. /to/{name}/" for name in copies]
     return f"{count}{' && '.join([*words, 'touch /run/copied', 'exec sleep infinity'])}".replace("$", "$$")
 
 

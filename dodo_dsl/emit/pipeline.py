@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 CHILD = "child.gitlab-ci.yml"
 RULE = "pipeline-limit"
 
-MAX_BYTES = 5 << 20
 MAX_JOBS_FREE = 500
 MAX_JOBS_PARSED = 1700
 _MOST_NAMED = 3
@@ -99,11 +98,10 @@ def _job(plans: Sequence[Plan], gate: bool, folder: str, options: JobOptions) ->
     )
 
 
-def pipeline_problems(suite: Suite, child: Pipeline, text: str) -> Iterator[Diagnostic]:
-    """What GitLab would refuse in the child pipeline of a suite, with its ``text``, at the test with the largest share.
+def pipeline_problems(suite: Suite, child: Pipeline) -> Iterator[Diagnostic]:
+    """What GitLab would refuse in the child pipeline of a suite, at the test with the largest share.
 
-    The archive of an artifact that holds the YAML of a child pipeline has at most 5 MB
-    (``max_artifacts_content_include_size``). The number of jobs of a pipeline is unlimited on a self-managed GitLab
+    The number of jobs of a pipeline is unlimited on a self-managed GitLab
     unless an administrator limits it, and 500, 1,500 or 2,000 on gitlab.com, by its tier. A YAML file may take 2 MB of
     memory when parsed (``max_yaml_size_bytes``); a job takes 0.7 to 1.2 kB of that in Ruby, as GitLab counts before it
     looks at what jobs extend. All limits can be raised, so numbers of jobs are warnings.
@@ -112,11 +110,7 @@ def pipeline_problems(suite: Suite, child: Pipeline, text: str) -> Iterator[Diag
     https://docs.gitlab.com/user/gitlab_com/#cicd
     """
     jobs = len(child.jobs) + child.gate
-    size = len(text.encode())
     hint = "pack them into fewer with --jobs, compile fewer tests into one pipeline, or a smaller 'matrix'"
-    if size > MAX_BYTES:
-        message = f"the child pipeline has {size / (1 << 20):.1f} MB, GitLab accepts 5 MB"
-        yield _largest(suite, message, hint, "error")
     if jobs > MAX_JOBS_PARSED:
         message = f"the child pipeline has {jobs} jobs, which take more than the 2 MB that GitLab reads by default"
         yield _largest(suite, message, f"{hint}; an administrator can raise max_yaml_size_bytes", "warning")

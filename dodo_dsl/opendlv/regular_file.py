@@ -48,6 +48,6 @@ def content(path: Path, most: int = MOST_BYTES) -> bytes:
     return data
 
 
-def text(path: Path, most: int = MOST_BYTES, encoding: str = "utf-8") -> str:
-    """The text of a regular file; raises OSError as ``content`` does, and UnicodeDecodeError."""
-    return content(path, most).decode(encoding)
+def text(path: Path, most: int = MOST_BYTES) -> str:
+    """The UTF-8 text of a regular file, without its BOM; raises OSError as ``content`` does, and UnicodeDecodeError."""
+    return content(path, most).decode("utf-8-sig")

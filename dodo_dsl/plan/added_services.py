@@ -9,9 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from dodo_dsl.application.model import Declared
-from dodo_dsl.check.lockstep import all_inputs, answers, cameras_of, other_inputs, rates, step_hz
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.check.wiring import ANYTHING, Wiring
+from dodo_dsl.check.wiring import ANYTHING, Wiring, all_inputs, answers, cameras_of, other_inputs, rates, step_hz
 from dodo_dsl.plan.model import Flag, Lockstep, PlannedService
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check.resolve import ResolvedTest, isolation
-from dodo_dsl.check.suite_rules import SMALLEST, prefix, reserved_cid
+from dodo_dsl.check.spec_rules import SMALLEST, prefix, reserved_cid
 from dodo_dsl.spec.deployment import Deployment
 
 

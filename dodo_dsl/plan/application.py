@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application import opendlv_flags
-from dodo_dsl.application.compose_paths import filled_node
 from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.merge import filled_node
 from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
@@ -21,7 +21,7 @@ _LONG = 200
 def plan_application(application: ApplicationSource, setting: Setting) -> Application:
     """The application as a test runs it."""
     construction = Construction(application, setting)
-    services = {name: _container(construction, service) for name, service in application.services.items()}
+    services = {name: _container(construction, name, made) for name, made in construction.services().items()}
     access = replace(
         application.access,
         roots=tuple(_relative(root, setting.folder) for root in application.other_roots),
@@ -46,13 +46,13 @@ def _relative(path: Path, folder: Path) -> str:
     return Path(os.path.relpath(path, folder)).as_posix()
 
 
-def _container(construction: Construction, service: ComposeService) -> dict[str, Any]:
-    made, setting = construction.service(service), construction.setting
+def _container(construction: Construction, name: str, made: dict[str, Any]) -> dict[str, Any]:
+    service, setting = construction.application.services[name], construction.setting
     if service.declared and service.declared.lines:
         made["tty"] = True  # programs print each line at once to a terminal
     if setting.time_seed is not None and setting.own_network:
-        given = {name: value or "" for name, value in made.get("environment", {}).items()}
-        number = list(construction.application.services).index(service.name)
+        given = {variable: value or "" for variable, value in made.get("environment", {}).items()}
+        number = list(construction.application.services).index(name)
         library = f"{TIME_MOUNT}/libdodo-time.so"
         made["environment"] = {
             **made.get("environment", {}),
@@ -92,7 +92,7 @@ def _process(
     process = raw.get("x-dodo-process")
     command = opendlv_flags.arguments(list(map(str, process or ())), command)
     words = (*(process or ()), *command)
-    needed = [name for _, name in references(raw, application.containers) if name in application.services]
+    needed = [name for _, name in references(raw) if name in application.services]
     waits = {n: how for n, how in container.get("depends_on", {}).items() if n in application.services}
     return ApplicationService(
         name=service.name,

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dodo_dsl import package_data
+from dodo_dsl.application import hidden_paths
 from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.file_rules import MAP, needed
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
-from dodo_dsl.check.spec_rules import resolved_goals
-from dodo_dsl.check.suite_rules import containers
+from dodo_dsl.check.spec_rules import containers, resolved_goals
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.plan import added_services, addresses, hidden_paths
+from dodo_dsl.plan import added_services, addresses
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.application import plan_application
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
@@ -59,8 +59,8 @@ def build(
     """
     ordered = sorted(tests, key=lambda test: test.spec.slug)
     cids = addresses.of_tests(ordered, deployment, application)
-    specs = [test.spec for test in ordered]
-    hidden = hidden_paths.folders(application, deployment, specs)
+    specs = {test.spec.path: test.spec.location.root for test in ordered}
+    hidden = hidden_paths.folders(application, deployment, specs.values())
     shared = _Shared(
         manifests,
         deployment,
@@ -76,7 +76,12 @@ def build(
     files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
     plans = [_sharing(plan, files[plan.slug]) for plan in plans]
     named = itertools.chain.from_iterable(builder.named for builder in builders)
-    if more := hidden_paths.files(application, deployment, specs, named):
+    if more := hidden_paths.files(application, deployment, specs.values(), {*specs, *named}):
+        if len(more) > hidden_paths.MOST:
+            what = (
+                f"{len(more):,} files of tests lie among the application's own, expected at most {hidden_paths.MOST:,}"
+            )
+            raise FilesError(f"{what}: keep tests in a folder of theirs ('registry' in dodo.yml)")
         plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
     return Compiled(Suite(tuple(plans), deployment.gates), files, _defaults(plans, manifests))
 
@@ -213,7 +218,7 @@ class _Builder:
             truth=truth(self.test),
             world=check_senders.services(self.test, tuple(service.name for service in automatic)),
             told=tuple(dict.fromkeys(str(end.port) for end in check_senders.told(self.test.wiring))),
-            goals=resolved_goals(self.test).goals,
+            goals=resolved_goals(self.test)[0],
             import_paths=self.shared.imports,
             source_map=self.places,
             timed=tuple(name for name, _ in self.application.timed),

@@ -98,10 +98,10 @@ class Processes:
         wanted = {self._isolation or plan.isolation for plan in plans}
         self._start_fork_server(plans if "network" in wanted else ())
         is_needed = self._isolation is None and "network" in wanted
-        if is_needed and (refusal := await asyncio.to_thread(host_isolation.isolation_refusal, self._fork_server)):
+        if is_needed and (refusal := await host_isolation.isolation_refusal(self._fork_server)):
             remedy = f"{refusal.remedy}; " if refusal.remedy else ""
             way_out = f"{remedy}an application that you trust runs with --isolation host"
-            self._problem = f"the application cannot be isolated on this machine: {refusal}; {way_out}"
+            self._problem = f"the application cannot be isolated on this machine: {refusal.why}; {way_out}"
             return
         if "host" in wanted or any(plan.is_real for plan in plans):
             why = await asyncio.to_thread(host_isolation.process_namespace_refusal)

@@ -3,12 +3,12 @@
 Programs are those that some tests need: a Docker engine, Compose, and the emulator of the rig's firmware.
 """
 
+import asyncio
 import contextlib
 import errno
 import os
 import shutil
 import socket
-import struct
 import subprocess
 import tempfile
 import time
@@ -43,37 +43,31 @@ class Capability:
 
 
 _RECEIVE_S = 1.0
+_CID = 254
 _BUSES = "225.0.0.0/24"
 """The groups of all sessions."""
 _NO_ROUTE = (errno.ENETUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL)
 _SYS = Path("/proc/sys")
 _FREE_BYTES = 2 << 30
-_SEGMENTS = 64
-_SEGMENT_BYTES = 64 << 20
 
 
 def namespaces() -> Iterator[Capability]:
     """Whether tests can have their own namespaces."""
-    if refusal := host_isolation.isolation_refusal():
+    if refusal := asyncio.run(host_isolation.isolation_refusal()):
         remedy = f"{refusal.remedy}; " if refusal.remedy else ""
         way = f"{remedy}for applications you trust, --isolation host"
-        yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal}", way)
+        yield Capability("namespaces", "problem", f"an application cannot be isolated: {refusal.why}", way)
     else:
         yield Capability("namespaces", "ok", "each test gets its own network, IPC and /tmp, its application a sandbox")
 
 
 def multicast() -> Iterator[Capability]:
     """Whether a datagram to a multicast group is received."""
-    bus, mark = group(254), os.urandom(16)
-    membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
+    mark = os.urandom(16)
     try:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-            receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            receiver.bind(bus)
-            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        with host_isolation.joined(_CID) as receiver, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             receiver.settimeout(_RECEIVE_S)
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-                sender.sendto(mark, bus)
+            sender.sendto(mark, group(_CID))
             deadline = time.monotonic() + _RECEIVE_S
             while receiver.recv(65_535) != mark:
                 if time.monotonic() > deadline:
@@ -100,30 +94,11 @@ def receive_buffer() -> Iterator[Capability]:
         yield Capability("receive buffer", "ok", f"sockets may hold {limit:,} bytes")
 
 
-def shared_memory() -> Iterator[Capability]:
-    """Whether the limits of System V shared memory suffice."""
-    segments, size = _number("/proc/sys/kernel/shmmni"), _number("/proc/sys/kernel/shmmax")
-    if segments < _SEGMENTS or size < _SEGMENT_BYTES:
-        way = _sysctl(f"kernel.shmmni={max(segments, 4096)}", f"kernel.shmmax={max(size, _SEGMENT_BYTES * 16)}")
-        yield Capability("shared memory", "problem", f"only {segments} segments of {size:,} bytes are allowed", way)
-    else:
-        yield Capability("shared memory", "ok", f"{segments:,} segments are allowed")
-
-
-def _sysctl(*settings: str) -> str:
-    """Sets limits of the kernel; in a container, whose /proc/sys is read-only, they are its host's."""
-    path = _SYS / settings[0].partition("=")[0].replace(".", "/")
+def _sysctl(setting: str) -> str:
+    """Sets a limit of the kernel; in a container, whose /proc/sys is read-only, it is its host's."""
+    path = _SYS / setting.partition("=")[0].replace(".", "/")
     is_host = path.exists() and (os.geteuid() != 0 or os.access(path, os.W_OK))
-    return (
-        advice.as_root(f"sysctl -w {' '.join(settings)}") if is_host else f"on the host: sysctl -w {' '.join(settings)}"
-    )
-
-
-def _number(path: str) -> int:
-    try:
-        return int(Path(path).read_text().split()[0])
-    except (OSError, ValueError, IndexError):
-        return 0
+    return advice.as_root(f"sysctl -w {setting}") if is_host else f"on the host: sysctl -w {setting}"
 
 
 def disk() -> Iterator[Capability]:
@@ -266,7 +241,6 @@ CHECKS: tuple[Callable[[], Iterator[Capability]], ...] = (
     namespaces,
     multicast,
     receive_buffer,
-    shared_memory,
     disk,
     docker_engine,
     compose_plugin,

@@ -10,7 +10,7 @@ from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run import listeners, start_order
 from dodo_dsl.run.machine_load import shortage
-from dodo_dsl.run.machine_load.meter import LoadMeter, UseMeter, add_up
+from dodo_dsl.run.machine_load.meter import Meter
 from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
     Backend,
@@ -52,8 +52,7 @@ class Engine:
     passed: Callable[[], None] = lambda: None
     state: RunState = field(init=False)
     _now: Callable[[], float] = field(init=False)
-    _meter: LoadMeter = field(init=False)
-    _use: UseMeter = field(init=False)
+    _meter: Meter = field(init=False)
     _begin_sent: float = 0.0
     _is_measured: bool = False
 
@@ -61,15 +60,12 @@ class Engine:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
         self._now = asyncio.get_running_loop().time
         self.state = RunState(self.plan, self._now, memory_kills=shortage.memory_kills)
-        self._meter = LoadMeter(self.backend.load)
-        self._use = UseMeter(self.backend.use, self._now)
+        self._meter = Meter(self.backend.use, self.state.test_s, self.state.is_application)
         kept: list[str] = []
         try:
             await self._set_up()
             self.begun()
-            if self.plan.clock == "realtime":
-                self._meter.begin()
-            self._use.begin()
+            self._meter.begin()
             await self._execute()
             await self._measure()
         except Ended:
@@ -93,7 +89,7 @@ class Engine:
         return self.state.outcome(self.backend), kept
 
     async def _explain(self) -> None:
-        """Reports to the state what of the machine, or of the limits that it was given, the test may have lacked."""
+        """Reports to the state what of the machine the test may have lacked."""
         application = None
         try:
             async with asyncio.timeout(EXPLAIN_PATIENCE_S):
@@ -104,11 +100,7 @@ class Engine:
             asyncio.current_task().uncancel()  # type: ignore[union-attr]
         if application and not self.backend.is_on_host:
             self.state.buses = frozenset(listeners.buses(application))
-        shared = shortage.Shared(self.backend.is_on_host, self.backend.has_engine)
-        self.state.shortage = shortage.used_up(shared, application)
-        below = shortage.below(self.plan.application.limits) if self.state.ended_early() else ""
-        if below and not self.backend.has_engine:
-            self.state.notes.append(below)
+        self.state.shortage = shortage.used_up(application)
 
     async def _close(self, keep: bool) -> list[str]:
         """Teardown to its end, however often the run is interrupted meanwhile; its errors do not change the verdict."""
@@ -124,27 +116,21 @@ class Engine:
         return []
 
     async def _measure(self) -> None:
-        """Takes the last figures of what the application used, while it is there, if they are not taken yet."""
+        """Takes the last figures of load and use, while the application is there, if they are not taken yet."""
         if self._is_measured:
             return
         try:
-            await self._use.end()
+            await self._meter.end()
         except Exception as error:  # noqa: BLE001  (whatever it is, it must not decide the test)
             why = f"{type(error).__name__}: {error}"
-            self.state.notes.append(f"what the application used was not measured to the end: {why}")
-        began, finished = self.state.began, self.state.finished or self._now()
-        in_steps = self.plan.lockstep is not None
-        whole = [] if began is None else [(began, 0.0), (finished, finished - began)]
-        self.state.resources = self._use.figures(self.state.progress if in_steps else whole, in_steps)
+            self.state.notes.append(f"load and use of the machine were not measured to the end: {why}")
+        names = [service.name for service in self.plan.application.services]
+        self.state.resources = self._meter.figures(names, in_steps=self.plan.lockstep is not None)
+        self.state.load = self._meter.load()
         self._is_measured = True
 
     async def _wind_up(self, keep: bool) -> list[str]:
-        try:
-            await self._measure()
-            await self._meter.end()
-            self.state.load = add_up(self._meter.snapshots, self.state.is_application)
-        except Exception as error:  # noqa: BLE001  (whatever it is, the test has to be taken down)
-            self.state.notes.append(f"the load of the machine was not measured: {type(error).__name__}: {error}")
+        await self._measure()
         return await self.backend.close(keep)
 
     async def _collect_losses(self) -> None:

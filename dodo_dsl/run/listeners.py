@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import PORT, group
-from dodo_dsl.run.machine_load.processes import owners
+from dodo_dsl.run.machine_load.processes import living, owners
 
 _PROC = Path("/proc")
 _LOCAL, _INODE = 1, 9
@@ -22,7 +22,7 @@ def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | Non
     the sockets of no process of a service.
     """
     found, seen, hidden = set(), set(), set()
-    for pid, name in owners(services, proc):
+    for pid, name in owners(services, living(proc)).items():
         try:
             if name not in found and not _sockets(proc / str(pid)).isdisjoint(_at_the_port(proc / str(pid))):
                 found.add(name)

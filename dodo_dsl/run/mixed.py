@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from dodo_dsl.application.compose_paths import escaped
+from dodo_dsl.application.interpolation import escaped
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import LAYERS, Plan
@@ -28,8 +28,7 @@ from dodo_dsl.run.docker.container_use import ELSEWHERE, first_process
 from dodo_dsl.run.docker.containers import Containers
 from dodo_dsl.run.docker.mounts import over
 from dodo_dsl.run.docker.shared_files import IMAGE
-from dodo_dsl.run.machine_load.service_use import Used
-from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.process import host_isolation, leftovers, namespaces
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.commands import needed_paths, own_modules
@@ -181,7 +180,6 @@ class MixedBackend:
     """One test: two backends, each with its part of the services; they report to one queue."""
 
     name = "mixed"
-    has_engine = True
 
     def __init__(self, containers: ApplicationContainers, processes: ProcessBackend) -> None:
         self.cid = processes.cid
@@ -211,15 +209,13 @@ class MixedBackend:
         await self._containers.require_own_host()
         await self._processes.begin()
 
-    async def load(self) -> Snapshot | None:
-        """What both have used; None if one of them does not know."""
-        own, application = await asyncio.gather(self._processes.load(), self._containers.load())
+    async def use(self) -> Snapshot | None:
+        """What both have used; the load of the machine is measured if both know it."""
+        own, application = await asyncio.gather(self._processes.use(), self._containers.use())
         if own is None or application is None:
-            return None
-        return replace(own, services={**own.services, **application.services})
-
-    async def use(self) -> Mapping[str, Used] | None:
-        return await self._containers.use()
+            return application and replace(application, busy_s=None)
+        busy_s = None if application.busy_s is None else own.busy_s
+        return replace(own, services={**own.services, **application.services}, busy_s=busy_s)
 
     async def application(self) -> Collection[int] | None:
         return await self._containers.application()

@@ -7,8 +7,7 @@ from typing import Annotated, Protocol
 from msgspec import Meta
 
 from dodo_dsl.outcome import Check, Response, Verdict
-from dodo_dsl.run.machine_load.service_use import Used
-from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.machine_load.service_use import Snapshot
 
 MOST_TEXT = 2000
 """Characters that a report can show."""
@@ -204,8 +203,6 @@ class Backend(Protocol):
 
     name: str
     cid: int
-    has_engine: bool
-    """Whether a Docker engine runs the application."""
 
     @property
     def is_on_host(self) -> bool:
@@ -228,12 +225,8 @@ class Backend(Protocol):
         """Announces on the test's bus that everything is ready; may be repeated."""
         ...
 
-    async def load(self) -> Snapshot | None:
-        """What the test's services have used so far; None if that cannot be measured."""
-        ...
-
-    async def use(self) -> Mapping[str, Used] | None:
-        """What each service of the application used so far; None if that cannot be measured."""
+    async def use(self) -> Snapshot | None:
+        """What the test's services used so far; None if that cannot be measured."""
         ...
 
     async def application(self) -> Collection[int] | None:

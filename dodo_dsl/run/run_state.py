@@ -98,8 +98,6 @@ class RunState:
     memory_kills: Callable[[], int] = lambda: 0
     """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
-    progress: list[tuple[float, float]] = field(default_factory=list)
-    """Times of ``clock`` in lockstep, with the test time that was reached then."""
     resources: tuple[ServiceUse, ...] = ()
     _ended_by: str = ""
     """The service whose end was that of the test."""
@@ -110,6 +108,12 @@ class RunState:
     def __post_init__(self) -> None:
         self._killed_before = self.memory_kills()
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
+
+    def test_s(self) -> float:
+        """How far the test is by its own time, as far as that is known."""
+        if self.plan.lockstep:
+            return self.time.seconds if self.time else 0.0
+        return 0.0 if self.began is None else (self.finished or self.clock()) - self.began
 
     def all_evaluators_ended(self) -> bool:
         return all(name in self.exits for name in self.facts.evaluators)
@@ -182,7 +186,6 @@ class RunState:
                 self.input_ended = True
             case Time():
                 self.time = event
-                self.progress.append((self.clock(), event.seconds))
             case Responded(answers):
                 self.response = answers
 
@@ -233,10 +236,6 @@ class RunState:
     def _is_of_conditions(self, finding: Finding) -> bool:
         """Whether a failure may come from what a program was given, unlike a message that it must not send."""
         return finding.result == "failed" and bool(finding.is_verdict or self._ended_by or self.is_unanswered)
-
-    def ended_early(self) -> bool:
-        """Whether the end of a service was that of the test."""
-        return bool(self._ended_by)
 
     def _without_display(self, finding: Finding) -> Finding:
         """The end of a program of the application that wanted to draw, with what to do."""
@@ -309,8 +308,8 @@ class RunState:
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
         findings = (*answers.findings, *use.findings)
-        considered = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
-        found = self._explained(self._elsewhere(self._timed(considered.finding)))
+        considered, load = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
+        found = self._explained(self._elsewhere(self._timed(considered)))
         finding = self._without_display(self._with_told(self._with_printed(found)))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
@@ -331,7 +330,7 @@ class RunState:
                 *answers.notes,
                 *use.notes,
             ),
-            machine=considered.load,
+            machine=load,
             response=None if plan.clock == VIRTUAL else self.response,
             resources=self.resources,
         )

@@ -1,21 +1,21 @@
 """The arguments of a test's services: the value of each parameter as its flag carries it, and where it comes from."""
 
 import functools
-import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from collections.abc import Mapping as Map
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Literal
 
-from dodo_dsl.diagnostics import Diagnostic, Fix, closest, did_you_mean, only_fix, shown_path
+from dodo_dsl.diagnostics import Diagnostic, Fix, did_you_mean, only_fix
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, path_of, resolve, walk
 from dodo_dsl.spec import quantity
 from dodo_dsl.spec.manifest import FRAMES, Manifest, Parameter, Ports, holds
 from dodo_dsl.spec.model import Spec, Use
+from dodo_dsl.spec.registry import near_path
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.slips import boolean_meant, repaired
 
@@ -177,25 +177,12 @@ def _path(parameter: Parameter, node: Node, root: Path) -> Value:
         hint = "the files of a test must be in its registry: copy them there"
         raise ValueProblem(parameter, node, "path-escape", f": '{text}' leaves the registry", hint)
     if not target.exists():
-        near = next(_near(text, target, folder, root.resolve()), "")
-        hint = f"DoDo looked in {shown_path(str(target.parent))}" + (f"; did you mean '{near}'?" if near else "")
-        fix = Fix(text, near) if near else None
+        hint, fix = near_path(text, folder, root)
         raise ValueProblem(parameter, node, "missing-file", f": there is no file or folder '{text}'", hint, fix)
     if not target.is_file() and not target.is_dir():
         what = f": '{text}' is a pipe or a device, expected a file or a folder"
         raise ValueProblem(parameter, node, "unreadable-file", what)
     return Value(text, "path", target)
-
-
-def _near(text: str, target: Path, folder: Path, root: Path) -> Iterator[str]:
-    """Paths like one that does not exist: of a like name beside it, or the same from a folder above."""
-    beside = [path.name for path in target.parent.iterdir()] if target.parent.is_dir() else []
-    for name in closest(target.name, beside):
-        yield Path(os.path.relpath(target.parent / name, folder)).as_posix()
-    for above in ("..", "../.."):
-        path = path_of(folder, f"{above}/{text}")
-        if path is not None and path.exists() and path.is_relative_to(root):
-            yield f"{above}/{text}"
 
 
 _CONVERTERS: dict[str, Callable[[Parameter, Node, Path], Value]] = {
@@ -292,15 +279,7 @@ def argument(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Arg
     try:
         return Argument(parameter, entry, convert(parameter, entry.value, spec.location.root))
     except ValueProblem as problem:
-        return Argument(parameter, entry, None, _where_written(problem.diagnostic, entry, parameter, rig))
-
-
-def _where_written(problem: Diagnostic, entry: Entry, parameter: Parameter, rig: Rig | None) -> Diagnostic:
-    """The problem of a value that the rig gives, under the key that it has there."""
-    if rig is None or not parameter.rig or entry is not rig.entry(parameter.rig):
-        return problem
-    own, given = f"parameter '{parameter.name}'", f"'{parameter.rig}' of rig '{rig.name}'"
-    return replace(problem, message=problem.message.replace(own, given, 1))
+        return Argument(parameter, entry, None, problem.diagnostic)
 
 
 def resolved(

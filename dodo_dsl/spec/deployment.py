@@ -14,14 +14,15 @@ from pathlib import Path
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span
-from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, path_of, plain, read
+from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, entries, part, path_of, plain, read
 from dodo_dsl.spec import rig
+from dodo_dsl.spec.manifest import MANIFEST
+from dodo_dsl.spec.registry import refuse_yaml
 from dodo_dsl.spec.rig import Rig
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from dodo_dsl.spec.slips import mended
 from dodo_dsl.spec.validation import schema_of_keys, valid_part, values
 
-MANIFEST = "service.yml"
 _TAKEN = ("services", "dodo_dsl")
 _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
@@ -51,12 +52,8 @@ class Declarations:
     def of(cls, entry: Entry | None, files: tuple[Path, ...]) -> "Declarations":
         """Those of a valid ``application``."""
         node = entry.value if entry else None
-        if not isinstance(node, Mapping):
-            return cls(files)
-        services = node.get("services")
-        declared = services.entries if isinstance(services, Mapping) else {}
-        own = {key: entry for key, entry in node.entries.items() if key not in ("files", "without", "services")}
-        return cls(files, tuple(_texts(node.get("without"))), dict(declared), own)
+        own = {key: e for key, e in entries(node).items() if key not in ("files", "without", "services")}
+        return cls(files, tuple(_texts(part(node, "without"))), dict(entries(node, "services")), own)
 
 
 @dataclass(frozen=True)
@@ -100,11 +97,15 @@ def build_command(prefix: str, tag: str, *names: str) -> str:
 
 
 def find_deployment(start: Path, paths: Iterable[Path] = ()) -> Path | None:
-    """The nearest ``dodo.yml`` at or above a folder; if there is none, the one that is above all ``paths``."""
+    """The nearest ``dodo.yml`` at or above a folder; if there is none, the one that is above all ``paths``.
+
+    Raises RegistryError for a ``dodo.yaml``.
+    """
     folder = start.resolve()
     for candidate in (folder, *folder.parents):
         if (candidate / FILE_NAME).is_file():
             return candidate / FILE_NAME
+        refuse_yaml((candidate / FILE_NAME).with_suffix(".yaml"))
     above = {find_deployment(path if path.is_dir() else path.parent) for path in paths}
     return above.pop() if len(above) == 1 else None
 
@@ -142,9 +143,8 @@ class _Reading:
     def deployment(self, path: Path) -> Deployment:
         raw, rigs = self.raw, self._rigs()
         images, reserved = raw.get("images", {}), {rig.cid for rig in rigs.values()}
-        about = self.node.entries.get("application")
-        value = self.node.get("application")
-        named = value.get("files") if isinstance(value, Mapping) else value
+        about, named = self.node.entries.get("application"), self.node.get("application")
+        named = named.get("files") if isinstance(named, Mapping) else named
         application, services = self._files(named), self._folders("services")
         registry = tuple(self._folders("registry", _NOT_YET))
         shipped = package_data.registry()
@@ -224,14 +224,11 @@ class _Reading:
             self._tell(span, "wrong-messages", text)
 
     def _check_services(self, folders: dict[Path, Scalar]) -> None:
-        """Folders that are a service themselves, that hold none, and that DoDo's packages hide."""
+        """Folders that are a service themselves, and that DoDo's packages hide."""
         for folder, item in folders.items():
             if (folder / MANIFEST).is_file():
                 hint = "name the folder above it, which holds a folder for each service"
                 self._tell(item.span, "service-folder", f"'{item.text}' is the folder of one service", hint)
-            elif not any(folder.glob(f"*/{MANIFEST}")):
-                hint = f"a service is a folder in it with a {MANIFEST}: {item.text.rstrip('/')}/NAME/{MANIFEST}"
-                self._tell(item.span, "service-folder", f"'{item.text}' holds no service", hint, "warning")
             elif folder.name in _TAKEN:
                 message = f"Python finds DoDo's own package '{folder.name}' before this folder"
                 hint = f"give it another name, such as my_{folder.name}, also in 'process' of its services"
@@ -240,8 +237,7 @@ class _Reading:
     def _rigs(self) -> dict[str, Rig]:
         rigs: dict[str, Rig] = {}
         taken: dict[int | None, str] = {}
-        node = self.node.get("rigs")
-        for name, written in node.entries.items() if isinstance(node, Mapping) else ():
+        for name, written in entries(self.node, "rigs").items():
             assert isinstance(written.value, Mapping)
             raw = plain(written.value)
             cid = None if raw.get("emulated") else raw.get("cid", _NO_CID)

@@ -7,17 +7,24 @@ rig of a kind may run, is an instance for each of them.
 from collections.abc import Collection, Iterator
 from collections.abc import Mapping as Known
 from dataclasses import dataclass, replace
+from pathlib import Path
 
-from dodo_dsl.diagnostics import Diagnostic, Span, has_errors
-from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, Sequence, read
-from dodo_dsl.spec import extends, matrix, slips, vary
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
+from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, path_of, read
+from dodo_dsl.spec import matrix, slips, vary
 from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
 from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
-from dodo_dsl.spec.registry import Location
+from dodo_dsl.spec.registry import Location, near_path
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
-from dodo_dsl.spec.validation import REPORTED, schema_of_keys, valid_part, validate, without_places
 from dodo_dsl.spec.validation import Path as ValuePath
+from dodo_dsl.spec.validation import schema_of_keys, valid_part, validate, without_places
 
+EXTENDS = "extends"
+MAX_CHAIN = 8
+SHIPPED = "dodo:"
+
+_OWN = (EXTENDS, "name")
+_USES = "uses"
 Loaded = tuple[list[Spec], list[Diagnostic]]
 """The instances of a file, and its problems."""
 
@@ -29,11 +36,11 @@ def load_spec(location: Location, reader: Reader = read) -> Loaded:
     """The instances of a file, as far as it can be read, and its problems."""
     node, found = reader(location.path)
     if node is None:
-        return [Spec(location)], found or [extends.nothing_in(location.path)]
+        return [Spec(location)], found or [_nothing_in(location.path)]
     node, slipped = slips.mended(node, schema_of_keys("dodo"))
-    node, problems = extends.resolve(node, location.path, location.root, reader)
+    node, problems = resolve(node, location.path, location.root, reader)
     found, is_whole = [*found, *slipped, *problems], not has_errors(problems)
-    if extends.is_open(node):
+    if isinstance(node, Mapping) and EXTENDS in node.entries:
         return [_by_name(location, node)], [*found, *_surely_wrong(node)]
     if not isinstance(node, Mapping):
         return [Spec(location)], [*found, *validate(node, "dodo")]
@@ -46,23 +53,17 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
     choices, found = matrix.choices(node)
     of_matrix = list(matrix.PLACEHOLDERS.unknown(node, "matrix-unknown"))
     of_ranges = list(vary.PLACEHOLDERS.unknown(node, "vary-unknown"))
-    unknown = [*of_matrix, *of_ranges]  # which may be meant to use any name
-    found += [] if of_matrix else matrix.PLACEHOLDERS.idle(node, "matrix-unused")
-    found += [] if of_ranges else vary.PLACEHOLDERS.idle(node, "vary-unused")
-    found += unknown
+    found += of_matrix or matrix.PLACEHOLDERS.idle(node, "matrix-unused")
+    found += of_ranges or vary.PLACEHOLDERS.idle(node, "vary-unused")
     spans = {key: entry.value.span for key, entry in node.entries.items()}
     are_alike, wrong, places = _only_in_parameters(node, matrix.PLACEHOLDERS), 0, None
-    is_broken = len(choices[0].values) < len(getattr(node.get(MATRIX), "entries", ()))
-    reported = {problem.span for problem in unknown}
     specs: list[Spec] = []
     for choice in choices:
         if wrong >= _MOST_WRONG:
             break
-        template = matrix.substitute(node, choice)
+        template = matrix.PLACEHOLDERS.filled(node, dict(choice.values))
         ranges, problems = vary.read(template)
         found += problems
-        if is_broken or has_errors(found):
-            template = _marked(template, reported, {each.name for each in ranges})
         if places is None or not are_alike:
             instance = vary.PLACEHOLDERS.filled(template, vary.nominal(ranges))
             _, problems, places = valid_part(instance if places is None else without(instance, MATRIX), "dodo")
@@ -77,30 +78,11 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
     return specs, found
 
 
-def _marked(node: Mapping, spans: Collection[Span], ranges: set[str]) -> Mapping:
-    """The test with a mark at values of which nothing more can be said: their placeholders have a problem."""
-
-    def marked(value: Node) -> Node:
-        if value.span in spans or matrix.PLACEHOLDERS.names_in(value) or vary.PLACEHOLDERS.names_in(value) - ranges:
-            return replace(value, tag=REPORTED)
-        if isinstance(value, Mapping):
-            entries = {key: Entry(entry.key, marked(entry.value)) for key, entry in value.entries.items()}
-            return replace(value, entries=entries)
-        return replace(value, items=tuple(map(marked, value.items))) if isinstance(value, Sequence) else value
-
-    entries = {k: e if k == MATRIX else Entry(e.key, marked(e.value)) for k, e in node.entries.items()}
-    return replace(node, entries=entries)
-
-
 def _hides_services(node: Mapping, places: Collection[ValuePath]) -> bool:
     """Whether services may be in what is not valid: in a layer, or in an unknown key, most likely a misspelt layer."""
     known = schema_of_keys("dodo")["properties"]
-    for first, *rest in places:
-        if first in LAYERS and (len(rest) < 2 or rest[1] in ("uses", "with")) and len(rest) <= 2:
-            return True
-        if first not in known and not rest and isinstance(node.get(str(first)), Mapping):
-            return True
-    return False
+    of_layers = any(place[0] in LAYERS and place[2:] in ((), ("uses",), ("with",)) for place in places)
+    return of_layers or any(p[0] not in known and isinstance(node.get(str(p[0])), Mapping) for p in places)
 
 
 def _by_name(location: Location, node: Node) -> Spec:
@@ -113,9 +95,102 @@ def _by_name(location: Location, node: Node) -> Spec:
 
 def _surely_wrong(node: Node) -> Iterator[Diagnostic]:
     """The problems that a test has whatever the one holds that it extends."""
-    entry = node.entries.get(extends.KEY) if isinstance(node, Mapping) else None
+    entry = node.entries.get(EXTENDS) if isinstance(node, Mapping) else None
     places = (entry.key, entry.value.span) if entry else ()
     return (d for d in validate(node, "dodo") if d.rule in ("unknown-key", "yaml-tag") or d.span in places)
+
+
+def _nothing_in(file: Path) -> Diagnostic:
+    return Diagnostic(Span(str(file)), "missing-key", "the file is empty, expected a test")
+
+
+def resolve(node: Node, file: Path, root: Path, reader: Reader = read) -> tuple[Node, list[Diagnostic]]:
+    """The spec merged over everything that it extends; spans keep the file that each value was written in.
+
+    Mappings merge deeply, scalars and lists replace, null removes.
+
+    It stays as it is, with its key ``extends``, where one of the files that it is built on cannot be read.
+
+    ``root`` is the registry's folder, which holds all files of the chain.
+    """
+    return _resolve(node, (file,), root.resolve(), reader)
+
+
+def _resolve(node: Node, chain: tuple[Path, ...], root: Path, reader: Reader) -> tuple[Node, list[Diagnostic]]:
+    written = node.get(EXTENDS) if isinstance(node, Mapping) else None
+    if not isinstance(node, Mapping) or not isinstance(written, Scalar) or not isinstance(written.value, str):
+        return node, []  # reported by the schema
+    path = path_of(chain[-1].parent, written.text)
+    if path is None:
+        return node, [Diagnostic(written.span, "extends-file", f"'{written.text[:60]}' is not a path")]
+    problem = _problem(written, path, chain, root)
+    if problem:
+        return node, [problem]
+    base, found = reader(path)
+    if not isinstance(base, Mapping):
+        if base is None and not found:
+            found = [_nothing_in(path)]
+        elif not found:
+            found = [Diagnostic(written.span, "extends-file", f"'{written.text}' does not contain a test")]
+        return node, found
+    below, deeper = _resolve(base, (*chain, path), root, reader)
+    problems = [*found, *deeper]
+    assert isinstance(below, Mapping), "a mapping resolves to one"
+    if EXTENDS in below.entries:
+        return node, problems
+    inherited = Mapping(base.span, {key: entry for key, entry in below.entries.items() if key not in _OWN})
+    own = Mapping(node.span, {key: entry for key, entry in node.entries.items() if key != EXTENDS}, node.tag)
+    return _merge(inherited, own, problems), problems
+
+
+def _problem(written: Scalar, path: Path, chain: tuple[Path, ...], root: Path) -> Diagnostic | None:
+    if not path.is_relative_to(root):
+        message = f"'{written.text}' leaves the registry"
+        return Diagnostic(written.span, "path-escape", message, "a test can only extend tests of its own registry")
+    if path in chain:
+        names = " extends ".join(p.name for p in (*chain[chain.index(path) :], path))
+        return Diagnostic(written.span, "extends-cycle", f"the test extends itself: {names}")
+    if len(chain) > MAX_CHAIN:
+        return Diagnostic(written.span, "extends-cycle", f"the chain of extended tests is longer than {MAX_CHAIN}")
+    if path.is_dir():
+        specs = sorted(p.name for p in path.glob("*.dodo.yml"))[:6]
+        hint = f"write '{written.text}/{specs[0]}'" if len(specs) == 1 else ""
+        return Diagnostic(written.span, "extends-file", f"'{written.text}' is a folder, expected a test's file", hint)
+    if not path.is_file():
+        message = f"there is no file '{written.text}' to extend"
+        fits = lambda found: found.is_file() and found not in chain  # noqa: E731
+        hint, fix = near_path(written.text, chain[-1].parent, root, fits)
+        if written.text.startswith(SHIPPED):
+            hint, fix = "'dodo new NAME --extends TEST' copies a test that ships with DoDo", None
+        return Diagnostic(written.span, "extends-file", message, hint, fix=fix)
+    return None
+
+
+def _merge(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int = 0) -> Mapping:
+    entries = dict(base.entries)
+    for key, entry in child.entries.items():
+        under = entries.get(key)
+        if isinstance(entry.value, Scalar) and entry.value.value is None:
+            if entries.pop(key, None) is None:
+                problems.append(_nothing(key, entry.key, base))
+        elif under and isinstance(entry.value, Mapping) and isinstance(under.value, Mapping):
+            entries[key] = Entry(entry.key, _merged(under.value, entry.value, problems, depth))
+        else:
+            entries[key] = entry
+    return Mapping(child.span, entries, child.tag)
+
+
+def _merged(base: Mapping, child: Mapping, problems: list[Diagnostic], depth: int) -> Mapping:
+    """A service with another ``uses`` replaces the base's: the base's parameters do not apply to it."""
+    before, after = base.get(_USES), child.get(_USES)
+    if depth == 1 and after is not None and getattr(before, "text", None) != getattr(after, "text", None):
+        return child
+    return _merge(base, child, problems, depth + 1)
+
+
+def _nothing(key: str, span: Span, base: Mapping) -> Diagnostic:
+    message = f"'{key}' is empty, which would remove it, but {shown_path(base.span.file)} has no such key"
+    return Diagnostic(span, "extends-nothing", message, did_you_mean(key, base.entries))
 
 
 def varied(spec: Spec, values: vary.Values, choice: Choice) -> Spec:

@@ -7,12 +7,10 @@ repositories whose tests may move them. A repository's ``dodo.yml`` can only be 
 import functools
 import os
 import stat
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Mapping, parse
 from dodo_dsl.spec.rig import LIMIT_UNITS
 from dodo_dsl.spec.validation import schema_of_keys, validate, values
@@ -74,20 +72,15 @@ def _read(path: Path, _changed: int) -> Machine:
         raise MachineError(None, f"cannot be read: {error}", str(path)) from None
     node, found = parse(text, str(path))
     problems = [*found, *(validate(node, "machine") if node is not None else ())]
-    if problems or not isinstance(node, Mapping):
-        raise MachineError(None, *_first(problems, path))
+    if problems:
+        first = min(problems, key=lambda problem: problem.span)
+        message = f"{first.message}; {first.hint}" if first.hint else first.message
+        raise MachineError(None, message, f"{path}:{first.span.line}:{first.span.column}")
+    if not isinstance(node, Mapping):
+        raise MachineError(None, "is empty, expected 'dodo: 1'", str(path))
     raw = values(node, schema_of_keys("machine"))
     places = {key: Path(raw[key]) if key in raw else None for key in ("leases", "quarantine")}
     return Machine(tuple(_rig(name, rig) for name, rig in raw.get("rigs", {}).items()), **places)
-
-
-def _first(problems: Sequence[Diagnostic], path: Path) -> tuple[str, str]:
-    """The first problem of a file in its order, with its hint, and its position."""
-    if not problems:
-        return "is empty, expected 'dodo: 1'", str(path)
-    first = min(problems, key=lambda d: (d.span.line, d.span.column))
-    hint = f"; {first.hint}" if first.hint else ""
-    return f"{first.message}{hint}", f"{path}:{first.span.line}:{first.span.column}"
 
 
 def _rig(name: str, raw: dict[str, Any]) -> PermittedRig:

@@ -13,10 +13,11 @@ from typing import Any
 
 from dodo_dsl import package_data
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, shown_path
-from dodo_dsl.source import Mapping, Node, Reader, Scalar, Sequence, plain, read, walk
+from dodo_dsl.source import Mapping, Node, Reader, Scalar, Sequence, entries, part, plain, read, walk
 from dodo_dsl.spec.quantity import SHARE
 from dodo_dsl.spec.validation import validate
 
+MANIFEST = "service.yml"
 RULE = "wrong-manifest"
 RESERVED = ("cid", "help")
 
@@ -25,13 +26,7 @@ FRAMES = re.compile(r"(?P<map>[a-z0-9-]+)\.frames")
 """A placeholder for the frames at which a map has models, as in ``{map-path.frames}``."""
 _OF_TYPES = {
     "of": ("list",),
-    "per": ("list",),
-    "driving": ("list",),
     "choices": ("string", "list"),
-    "or-share": ("amount",),
-    "multiple-of": ("integer",),
-    "not-empty": ("path",),
-    "format": ("path",),
     "unit": ("number",),
     **dict.fromkeys(("minimum", "maximum"), ("number", "integer", "amount")),
 }
@@ -40,21 +35,12 @@ _OF_TYPES = {
 
 def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
     """Problems of ports, defaults, bounds and references in a manifest that its schema accepts."""
-    parameters, messages = node.get("parameters"), node.get("messages")
-    entries = parameters.entries if isinstance(parameters, Mapping) else {}
-    types = {name: str(plain(entry.value)["type"]) for name, entry in entries.items()}
-    cases = messages.get("cases") if isinstance(messages, Mapping) else None
-    conditions = (
-        [item.get("when") for item in cases.items if isinstance(item, Mapping)] if isinstance(cases, Sequence) else []
-    )
+    parameters = entries(node, "parameters")
+    types = {name: str(plain(entry.value)["type"]) for name, entry in parameters.items()}
+    cases = part(node, "messages", "cases")
+    above = [*(entry.value for entry in parameters.values()), *(cases.items if isinstance(cases, Sequence) else ())]
     named = [(each.span, "one-of", each.text) for each in _scalars(node.get("one-of"))]
-    for when in [
-        *conditions,
-        *(entry.value.get("when") for entry in entries.values() if isinstance(entry.value, Mapping)),
-    ]:
-        named += (
-            [(entry.key, "when", name) for name, entry in when.entries.items()] if isinstance(when, Mapping) else []
-        )
+    named += [(entry.key, "when", name) for each in above for name, entry in entries(each, "when").items()]
     for port in (each for key in ("messages", "memory", "devices") for each in _scalars(node.get(key))):
         for match in _PLACEHOLDER.finditer(port.text):
             frames = None if match["name"] in types else FRAMES.fullmatch(match["name"])
@@ -63,7 +49,7 @@ def inconsistencies(node: Mapping) -> Iterator[Diagnostic]:
         if name not in types:
             message = f"'{what}' names the unknown parameter '{name}'"
             yield Diagnostic(span, RULE, message, did_you_mean(name, types))
-    for name, entry in entries.items():
+    for name, entry in parameters.items():
         if name in RESERVED:
             message = f"'--{name}' is a flag of every service, so it cannot name a parameter"
             yield Diagnostic(entry.key, RULE, message, "choose another name")
@@ -95,8 +81,6 @@ def _parameter(name: str, node: Mapping, types: dict[str, str]) -> Iterator[Diag
         if other and types.get(other) != wanted:
             message = f"'{key}' names '{other}', expected a parameter of type {wanted}"
             yield wrong(key, message, did_you_mean(other, [n for n, t in types.items() if t == wanted]))
-    if set(raw.get("when", {})) & set(list(types)[list(types).index(name) :]):
-        yield wrong("when", f"'{name}' is above what it depends on", "put it below")
     if kind == "path" and "default" in raw:
         yield wrong("default", f"'{name}' is a path in a test, so it cannot have a default")
     elif "default" in raw:
@@ -259,16 +243,15 @@ def load_manifest(path: Path, reader: Reader = read) -> tuple[Manifest | None, l
         found = [*found, *validate(node, "service")]
     if isinstance(node, Mapping) and not has_errors(found):
         found = [*found, *inconsistencies(node)]
-    if node is None or has_errors(found):
-        return None, found
-    raw = plain(node)
+    return (None if node is None or has_errors(found) else _manifest(path.parent, plain(node))), found
+
+
+def _manifest(folder: Path, raw: dict[str, Any]) -> Manifest:
     messages, memory = raw.pop("messages", {}), _ports(raw.pop("memory", {}))
     parameters = {name: _read(name, about) for name, about in raw.pop("parameters", {}).items()}
     cases = tuple(Case(_when(case["when"]), _ports(case)) for case in messages.get("cases", ()))
     facts = {key.replace("-", "_"): _fixed(value) for key, value in raw.items()}
-    return Manifest(
-        path.parent, **facts, parameters=parameters, messages=_ports(messages), memory=memory, cases=cases
-    ), found
+    return Manifest(folder, **facts, parameters=parameters, messages=_ports(messages), memory=memory, cases=cases)
 
 
 def _fixed(value: Any) -> Any:
@@ -276,23 +259,44 @@ def _fixed(value: Any) -> Any:
     return tuple(map(_fixed, value)) if isinstance(value, list) else value
 
 
+class Manifests(Map[str, Manifest]):
+    """Manifests by service name: a deployment's ``own``, and the shipped ones, each read when it is asked for."""
+
+    def __init__(self, own: dict[str, Manifest]) -> None:
+        files = package_data.services().glob(f"*/{MANIFEST}")
+        self._shipped = {file.parent.name.replace("_", "-"): file for file in sorted(files)}
+        self._own = own
+
+    def __getitem__(self, name: str) -> Manifest:
+        return self._own[name] if name in self._own else _shipped(self._shipped[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self._shipped, **self._own})
+
+    def __len__(self) -> int:
+        return len({**self._shipped, **self._own})
+
+
 @functools.cache
-def load_manifests(
-    folders: tuple[Path, ...] = (), reader: Reader = read
-) -> tuple[dict[str, Manifest], tuple[Diagnostic, ...]]:
-    """Every manifest ``<folder>/<service>/service.yml``, by service name: the shipped ones and those of ``folders``."""
-    manifests: dict[str, Manifest] = {}
-    found: list[Diagnostic] = []
-    for folder in (package_data.services(), *folders):
-        for path in sorted(folder.glob("*/service.yml")):
-            manifest, problems = load_manifest(path, reader)
-            found.extend(problems)
-            if manifest and manifest.name in manifests:
-                other = manifests[manifest.name].folder
-                is_shipped = other.parent == package_data.services()
-                owner = "a service of DoDo" if is_shipped else f"the service in {shown_path(str(other))}"
-                message = f"the name '{manifest.name}' is taken by {owner}"
-                found.append(Diagnostic(Span(str(path)), "name-taken", message, "choose another name"))
-            elif manifest:
-                manifests[manifest.name] = manifest
-    return manifests, tuple(found)
+def _shipped(file: Path) -> Manifest:
+    node, _ = read(file)
+    assert node is not None, "tests validate what ships"
+    return _manifest(file.parent, plain(node))
+
+
+@functools.cache
+def load_manifests(folders: tuple[Path, ...] = (), reader: Reader = read) -> tuple[Manifests, tuple[Diagnostic, ...]]:
+    """Every manifest ``<folder>/<service>/service.yml``, shipped ones and those of ``folders``, and their problems."""
+    own: dict[str, Manifest] = {}
+    known, found = Manifests(own), list[Diagnostic]()
+    for path in (path for folder in folders for path in sorted(folder.glob(f"*/{MANIFEST}"))):
+        manifest, problems = load_manifest(path, reader)
+        found.extend(problems)
+        if manifest and manifest.name in known:
+            is_own = manifest.name in own
+            owner = f"the service in {shown_path(str(own[manifest.name].folder))}" if is_own else "a service of DoDo"
+            message = f"the name '{manifest.name}' is taken by {owner}"
+            found.append(Diagnostic(Span(str(path)), "name-taken", message, "choose another name"))
+        elif manifest:
+            own[manifest.name] = manifest
+    return known, tuple(found)

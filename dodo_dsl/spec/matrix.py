@@ -5,8 +5,9 @@ Placeholders of ``vary`` are of the same form.
 
 import functools
 import itertools
+import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from collections.abc import Mapping as Values
 from dataclasses import dataclass
 
@@ -14,38 +15,24 @@ from dodo_dsl.diagnostics import Diagnostic, did_you_mean
 from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, walk
 
 MATRIX = "matrix"
-_MAX_ATTEMPT = 200
-_TYPOGRAPHIC = "\u2018\u2019\u201a\u201c\u201d\u201e\u00ab\u00bb\u2039\u203a"
+REPORTED = "\0"
+"""The tag of values with a problem that is known already, which no file can have."""
 
 
 def without(node: Mapping, key: str) -> Mapping:
     return Mapping(node.span, {name: entry for name, entry in node.entries.items() if name != key}, node.tag)
 
 
-def _written(node: Node) -> str:
-    """A scalar, or what is meant as one: ``{vary.light}`` is a mapping with an empty value; empty for other nodes."""
-    if isinstance(node, Scalar):
-        return node.text
-    if isinstance(node, Mapping) and len(node.entries) == 1:
-        ((key, entry),) = node.entries.items()
-        return f"{{{key}}}" if isinstance(entry.value, Scalar) and not entry.value.text else ""
-    return ""
-
-
 @dataclass(frozen=True)
 class Placeholders:
-    """Those of one ``key`` of specs.
+    """Those of one ``key`` of specs; ``advice`` is the hint if it has no names at all.
 
-    ``lacks`` is the message about a name that the key does not have, with ``{}`` for the name, and ``advice`` the hint
-    if it has no names at all; ``why_idle`` is what a name is for that nothing uses.
-    With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so
-    that problems are shown there and not at the placeholder.
+    With ``points_at_value`` a value that replaces a whole scalar keeps its own position, so that problems are shown
+    there and not at the placeholder.
     """
 
     key: str
-    lacks: str
     advice: str
-    why_idle: str
     points_at_value: bool = False
 
     @functools.cached_property
@@ -53,13 +40,9 @@ class Placeholders:
         return re.compile(rf"\$\{{{self.key}\.(?P<name>[a-z][a-z0-9-]*)\}}")
 
     @functools.cached_property
-    def _near(self) -> re.Pattern[str]:
-        """A name, with the key or signs around it."""
-        return re.compile(rf"(?P<begin>\W*)(?P<key>{self.key}\.)?(?P<name>[a-z][a-z0-9-]*)(?P<end>\W*)")
-
-    @functools.cached_property
     def _attempt(self) -> re.Pattern[str]:
-        return re.compile(rf"\$\{{\s*{self.key}\b[^}}]*\}}?")
+        """What is meant as a placeholder, also as other tools have them."""
+        return re.compile(rf"\$\{{{{1,2}}\s*{self.key}\b(?:\.(?P<name>[a-z][a-z0-9-]*))?[^}}]*\}}?")
 
     def names(self, node: Node) -> set[str]:
         """The names that placeholders below a node have."""
@@ -72,8 +55,7 @@ class Placeholders:
 
     def used(self, node: Mapping) -> set[str]:
         """The names that a spec uses outside the key itself."""
-        others = (entry.value for key, entry in node.entries.items() if key != self.key)
-        return {name for value in others for name in self.names(value)}
+        return set[str]().union(*(self.names(entry.value) for key, entry in node.entries.items() if key != self.key))
 
     def _known(self, node: Mapping) -> dict[str, Entry]:
         written = node.get(self.key)
@@ -84,52 +66,34 @@ class Placeholders:
         used = self.used(node)
         for name, entry in self._known(node).items():
             if name not in used and (self.key == MATRIX or entry.key.file == node.span.file):
-                message = f"nothing uses ${{{self.key}.{name}}}, {self.why_idle}"
+                message = f"nothing uses ${{{self.key}.{name}}}, so that its values change nothing"
                 yield Diagnostic(entry.key, rule, message, severity="warning")
 
     def unknown(self, node: Mapping, rule: str) -> Iterator[Diagnostic]:
         """Placeholders of a spec with names that are not known, or without one."""
         known = self._known(node)
-        for key, part in node.entries.items():
-            for one in walk(part.value) if key != self.key else ():
-                if name := self._meant(one, known):
-                    right = f"${{{self.key}.{name}}}"
-                    message = f"'{_written(one)[:60]}' is not a placeholder, expected {right}"
-                    yield Diagnostic(one.span, rule, message, f'write "{right}"')
-                elif isinstance(one, Scalar) and "${" in one.text:
-                    yield from self._unknown(one, known, rule)
-
-    def _meant(self, node: Node, known: Collection[str]) -> str:
-        """The known name in a value that is nothing but an attempt at its placeholder; empty for any other value."""
-        written = _written(node)
-        match = self._near.fullmatch(written) if known and len(written) <= _MAX_ATTEMPT else None
-        if match is None or match["name"] not in known:
-            return ""
-        around = match["begin"] + match["end"]
-        if self._one.search(match[0]):  # the signs around it may be meant, but for quotation marks as in books
-            return match["name"] if around.strip("${}") and not around.strip(_TYPOGRAPHIC + "${}") else ""
-        return match["name"] if match["key"] or "$" in around else ""
-
-    def _unknown(self, scalar: Scalar, known: Collection[str], rule: str) -> Iterator[Diagnostic]:
-        for attempt in self._attempt.finditer(scalar.text):
-            match = self._one.fullmatch(attempt[0])
-            if match is None:
-                message = f"'{attempt[0][:60]}' is not a placeholder, expected one such as ${{{self.key}.light}}"
-                yield Diagnostic(scalar.span, rule, message)
-            elif match["name"] not in known:
-                hint = did_you_mean(match["name"], known) if known else self.advice
-                yield Diagnostic(scalar.span, rule, self.lacks.format(match["name"]), hint)
+        values = (entry.value for key, entry in node.entries.items() if key != self.key)
+        for scalar in (one for value in values for one in walk(value) if isinstance(one, Scalar)):
+            for attempt in self._attempt.finditer(scalar.text) if "${" in scalar.text else ():
+                name = attempt["name"]
+                right = f"${{{self.key}.{name if name in known else 'light'}}}"
+                if not self._one.fullmatch(attempt[0]):
+                    message = f"'{attempt[0][:60]}' is not a placeholder, expected one such as {right}"
+                    yield Diagnostic(scalar.span, rule, message, f'write "{right}"' if name in known else "")
+                elif name not in known:
+                    hint = did_you_mean(name, known) if known else self.advice
+                    yield Diagnostic(scalar.span, rule, f"'{self.key}' has no '{name}'", hint)
 
     def filled(self, node: Mapping, values: Values[str, Scalar]) -> Mapping:
         """The node with values for the placeholders; nodes without placeholders stay the same objects.
 
-        A spec's matrix, which may be large, stays as it is: its values are filled where they are used.
+        A spec's matrix, which may be large, stays as it is: its values are filled where they are used. A scalar with a
+        placeholder that has no value gets the tag REPORTED, as nothing more can be said of it.
         """
-        filled = self._filled(without(node, MATRIX), values) if values else node
+        kept = {key: entry for key, entry in node.entries.items() if key in (MATRIX, self.key)}
+        filled = self._filled(Mapping(node.span, {k: e for k, e in node.entries.items() if k not in kept}), values)
         assert isinstance(filled, Mapping)
-        return Mapping(
-            node.span, {key: filled.entries.get(key, entry) for key, entry in node.entries.items()}, node.tag
-        )
+        return Mapping(node.span, {key: kept.get(key) or filled.entries[key] for key in node.entries}, node.tag)
 
     def _filled(self, node: Node, values: Values[str, Scalar]) -> Node:
         if isinstance(node, Scalar):
@@ -147,27 +111,21 @@ class Placeholders:
         return Mapping(node.span, entries, node.tag) if changed else node
 
     def _scalar(self, node: Scalar, values: Values[str, Scalar]) -> Scalar:
-        if "${" not in node.text:
+        if "${" not in node.text or not self._attempt.search(node.text):
             return node
         whole = self._one.fullmatch(node.text)
-        if whole:
-            chosen = values.get(whole["name"])
-            span = chosen.span if chosen and self.points_at_value else node.span
-            return Scalar(span, chosen.value, chosen.text, node.tag) if chosen else node
+        if whole and (chosen := values.get(whole["name"])):
+            span = chosen.span if self.points_at_value else node.span
+            return Scalar(span, chosen.value, chosen.text, node.tag)
         text = self._one.sub(lambda m: values[m["name"]].text if m["name"] in values else m[0], node.text)
-        return node if text == node.text else Scalar(node.span, text, text, node.tag)
+        return Scalar(node.span, text, text, REPORTED if self._attempt.search(text) else node.tag)
 
 
 KEY = MATRIX
 MAX_INSTANCES = 2_000
 MAX_SLUG = 180
 
-PLACEHOLDERS = Placeholders(
-    KEY,
-    "the matrix has no dimension '{}'",
-    "add it with its values under 'matrix'",
-    "so its instances are all the same",
-)
+PLACEHOLDERS = Placeholders(KEY, "add it with its values under 'matrix'")
 _NOT_SLUG = re.compile(r"[^a-z0-9]+")
 SLUG = re.compile(r"[a-z0-9]+(-+[a-z0-9]+)*")
 """The slug of any test or instance."""
@@ -213,9 +171,7 @@ def choices(node: Node) -> tuple[list[Choice], list[Diagnostic]]:
         if isinstance(dimension.value, Sequence)
     }
     found = [problem for name, values in dimensions.items() for problem in _alike(name, values)]
-    number = 1
-    for values in dimensions.values():
-        number *= len(values)
+    number = math.prod(map(len, dimensions.values()))
     if number > MAX_INSTANCES:
         message = f"the matrix has {number} instances, expected at most {MAX_INSTANCES}"
         hint = "choose fewer values, or write several tests that extend this one"
@@ -239,20 +195,6 @@ def _alike(name: str, values: list[Scalar]) -> Iterator[Diagnostic]:
             yield Diagnostic(value.span, "matrix-value", message)
         elif slug in seen:
             message = f"'{value.text}' and '{seen[slug].text}' of '{name}' would both be called '{slug}'"
-            yield Diagnostic(value.span, "matrix-value", message, _otherwise(value.text))
+            hint = "names have letters and digits only: write one of them otherwise"
+            yield Diagnostic(value.span, "matrix-value", message, hint)
         seen.setdefault(slug, value)
-
-
-def _otherwise(text: str) -> str:
-    """A hint how to write a value so that its name is another one: signs are not part of names, digits are."""
-    whole = re.match(r"[+-]?\d+(?![\d.])", text)
-    if not whole:
-        return "names have letters and digits only: write one of them otherwise"
-    return (
-        f"names have letters and digits only: write one of them otherwise, such as '{whole[0]}.0{text[whole.end() :]}'"
-    )
-
-
-def substitute(node: Mapping, choice: Choice) -> Mapping:
-    """The node with the choice's values for the placeholders; nodes without placeholders stay the same objects."""
-    return PLACEHOLDERS.filled(node, dict(choice.values))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.source import Entry, Mapping, Node, Scalar
+from dodo_dsl.source import Entry, Mapping, Scalar, entries, part
 from dodo_dsl.spec import vary
 from dodo_dsl.spec.matrix import Choice
 from dodo_dsl.spec.registry import Location
@@ -151,28 +151,20 @@ def spec_of(location: Location, node: Mapping, choice: Choice, spans: dict[str, 
         copies_times="sample-times" in response,
         resources=ResourceLimits(*map(resources.get, _RESOURCES)) if "resources" in raw else None,
         uses=tuple(_uses(node)),
-        variables=_entries(_part(node.get("application"), "env")),
-        goals=_entries(node.get("goals")),
+        variables=entries(node, "application", "env"),
+        goals=entries(node, "goals"),
         choice=choice,
         spans=spans,
         is_whole=is_whole,
     )
 
 
-def _part(node: Node | None, key: str) -> Node | None:
-    return node.get(key) if isinstance(node, Mapping) else None
-
-
-def _entries(node: Node | None) -> dict[str, Entry]:
-    return dict(node.entries) if isinstance(node, Mapping) else {}
-
-
 def _uses(node: Mapping) -> Iterator[Use]:
     for layer in LAYERS:
-        for name, entry in _entries(node.get(layer)).items():
-            uses = _part(entry.value, "uses")
+        for name, entry in entries(node, layer).items():
+            uses = part(entry.value, "uses")
             if isinstance(uses, Scalar):
-                yield Use(layer, name, entry.key, uses, _entries(_part(entry.value, "with")))
+                yield Use(layer, name, entry.key, uses, entries(entry.value, "with"))
 
 
 _MOST_WEIGHT = 1000

@@ -31,14 +31,7 @@ _FACTORS: dict[str, dict[str, Decimal]] = {
     "step count": {"steps": Decimal(1)},
     "step density": {"steps/m": Decimal(1), "steps/mm": Decimal(1000)},
     "angular step density": {"steps/rad": Decimal(1), "steps/deg": 180 / _PI},
-    "growth of memory": {
-        "MB/min": Decimal(1),
-        "kB/min": Decimal("0.001"),
-        "GB/min": Decimal(1000),
-        "kB/s": Decimal("0.06"),
-        "MB/s": Decimal(60),
-        "MB/h": Decimal(1) / 60,
-    },
+    "growth of memory": {"MB/min": Decimal(1), "kB/min": Decimal("0.001"), "MB/s": Decimal(60)},
     "mass": {"kg": Decimal(1), "g": Decimal("0.001")},
 }
 _DIMENSION = {unit: dimension for dimension, units in _FACTORS.items() for unit in units}
@@ -83,8 +76,10 @@ def convert(value: object, unit: str) -> Decimal:
     written = (match["unit"] or (SHARE if unit == SHARE else "")) if match else None
     if match is None or (unit == SHARE and written not in siblings):
         hint, fix = repaired(text, lambda other: _is_quantity(other, unit)) if len(text) <= _MAX_TEXT else ("", None)
-        shown = text if len(text) <= _MAX_TEXT else f"{text[:20]}..."
-        raise QuantityError(f"'{shown}' is not {expected}", hint or _pointed(text, unit) or _example("1", unit), fix)
+        shown, point = text if len(text) <= _MAX_TEXT else f"{text[:20]}...", text.replace(",", ".", 1)
+        if not hint and point != text and _is_quantity(point, unit):
+            hint = f"write '{point}', with a point"
+        raise QuantityError(f"'{shown}' is not {expected}", hint or _example("1", unit), fix)
     if not written:
         raise QuantityError(f"'{text}' has no unit, expected {_a(_DIMENSION[unit])} in {unit}", _example(text, unit))
     if written not in _DIMENSION:
@@ -122,16 +117,6 @@ def with_point(text: str) -> str:
     """A hint about a decimal comma; empty if there is none."""
     point = text.replace(",", ".", 1)
     return f"write '{point}', with a point" if point != text and _QUANTITY.fullmatch(point) else ""
-
-
-def _pointed(text: str, unit: str) -> str:
-    """A hint about a decimal comma, in a quantity of this unit."""
-    if hint := with_point(text):
-        try:
-            convert(text.replace(",", ".", 1), unit)
-        except QuantityError as other:
-            return other.hint
-    return hint
 
 
 def written_unit(text: str) -> str | None:

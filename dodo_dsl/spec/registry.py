@@ -3,20 +3,28 @@
 A test is called as its file, which is a job of a pipeline, too.
 """
 
+import glob
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dodo_dsl.diagnostics import Fix, closest, shown_path
 from dodo_dsl.source import resolve
 
 SUFFIX = ".dodo.yml"
 MAX_FOLDERS = 10_000
 
 
-class RegistryTooLarge(Exception):
-    """A folder has too many folders below it to be a registry; one sentence."""
+class RegistryError(Exception):
+    """A folder is too large for a registry, or a file is named as DoDo does not read it; one sentence."""
+
+
+def refuse_yaml(path: Path) -> None:
+    """Raises RegistryError for a file that is called ``.yaml`` where DoDo reads ``.yml``, if it is there."""
+    if path.is_file():
+        raise RegistryError(f"'{shown_path(str(path))}' is not read: call it '{path.with_suffix('.yml').name}'")
 
 
 @dataclass(frozen=True, order=True)
@@ -32,13 +40,17 @@ class Location:
 
 
 def _specs_below(folder: Path) -> Iterator[Path]:
-    """The specs of a folder on its own file system, without hidden folders; raises RegistryTooLarge."""
+    """The specs of a folder on its own file system, without hidden folders; raises RegistryError."""
     found, device = [], folder.stat().st_dev
     for number, (place, folders, files) in enumerate(os.walk(folder), 1):
         if number > MAX_FOLDERS:
-            raise RegistryTooLarge(f"'{folder}' has more than {MAX_FOLDERS} folders: name the folder with the tests")
+            raise RegistryError(f"'{folder}' has more than {MAX_FOLDERS} folders: name the folder with the tests")
         folders[:] = [name for name in folders if not name.startswith(".") and _is_on(device, Path(place, name))]
-        specs = (Path(place, name) for name in files if name.endswith(SUFFIX) and not name.startswith("."))
+        names = [name for name in files if not name.startswith(".")]
+        for name in names:
+            if name.endswith(".dodo.yaml"):
+                refuse_yaml(Path(place, name))
+        specs = (Path(place, name) for name in names if name.endswith(SUFFIX))
         found += [path for path in specs if path.is_file()]
     yield from sorted(found)
 
@@ -71,7 +83,7 @@ def locate(
 ) -> tuple[list[Location], list[Path]]:
     """The specs at or below ``paths`` (all ``registries`` without any), and the paths without specs.
 
-    ``others`` are further registries, which are only the roots of specs. Raises RegistryTooLarge.
+    ``others`` are further registries, which are only the roots of specs. Raises RegistryError.
     """
     own = [r.resolve() for r in registries]
     roots = [*own, *(r.resolve() for r in others)]
@@ -125,14 +137,21 @@ def is_free(text: str) -> bool:
     return is_name(text) and text not in KEYWORDS and resolve(text) == text
 
 
-def near(text: str) -> str:
-    """A name like a text."""
-    slug = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
-    return next(filter(is_free, (slug[:_LONGEST].strip("-"), f"sil-{slug}"[:_LONGEST].strip("-"))), "sil-test")
+def near_path(
+    text: str, folder: Path, root: Path, fits: Callable[[Path], bool] = Path.exists
+) -> tuple[str, Fix | None]:
+    """A hint about a path from a folder that leads nowhere: where DoDo looked, and a path like it that ``fits``.
 
-
-def as_file(stem: str, ending: str) -> str:
-    """A hint for a test in a file of this name: the name, where it may have it, or another for both."""
-    if is_free(stem):
-        return f"write 'name: {stem}', as the file is called"
-    return f"rename the file to {near(stem)}{ending}, and write 'name: {near(stem)}'"
+    That is within ``root``: of a like name beside it, the test of its name, or the same from a folder above.
+    """
+    target = (folder / text).resolve()
+    beside = [path.name for path in target.parent.iterdir()] if target.parent.is_dir() else []
+    found = [target.parent / name for name in closest(target.name, beside)]
+    for name in (target.name, f"{target.name}{SUFFIX}"):
+        found += sorted(folder.parent.glob(f"*/{glob.escape(name)}"))
+    hint = f"DoDo looked in {shown_path(str(target.parent))}"
+    for path in (each.resolve() for each in (*found, folder / ".." / text, folder / "../.." / text)):
+        if fits(path) and path.is_relative_to(root.resolve()):
+            near = Path(os.path.relpath(path, folder)).as_posix()
+            return f"{hint}; did you mean '{near}'?", Fix(text, near)
+    return hint, None

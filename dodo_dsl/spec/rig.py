@@ -4,7 +4,7 @@ import functools
 from dataclasses import dataclass
 from pathlib import Path
 
-from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, parse
+from dodo_dsl.source import Entry, Mapping, Node, Scalar, Sequence, entries, parse
 from dodo_dsl.spec import quantity
 
 EMULATED = "emulated"
@@ -134,13 +134,8 @@ def is_simulated(port: str) -> bool:
 
 
 def _at(node: Node, key: str) -> Entry | None:
-    entry = None
-    for part in key.split("."):
-        entry = node.entries.get(part) if isinstance(node, Mapping) else None
-        if entry is None:
-            return None
-        node = entry.value
-    return entry
+    *above, last = key.split(".")
+    return entries(node, *above).get(last)
 
 
 def emulated(name: str = EMULATED) -> Rig:

@@ -1,10 +1,13 @@
 """What keys and values mean that are almost right: units, minus signs, decimal commas, missing spaces, indentation."""
 
+import math
 import re
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
-from dodo_dsl.diagnostics import Diagnostic, Fix, Span, closest, did_you_mean, only_fix
+import yaml
+
+from dodo_dsl.diagnostics import Diagnostic, Fix, closest, did_you_mean, only_fix
 from dodo_dsl.source import Entry, Mapping, Node, Scalar
 
 _ALIASES = {
@@ -21,8 +24,8 @@ _ALIASES = {
 }
 _WORDS = {"yes": "true", "y": "true", "on": "true", "no": "false", "n": "false", "off": "false"}
 _MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014"
-_WHOLE = re.compile(r"[-+]?[0-9]{1,20}")
 _REST = re.compile(r"[0-9]{1,20}( ?[A-Za-z%][^ ]{0,10})?")
+"""What stands behind a decimal comma, which in braces begins another key."""
 _CLOSING = {"{": "}", "[": "]"}
 
 
@@ -55,33 +58,6 @@ def boolean_meant(text: str) -> tuple[str, Fix | None]:
     return (f"write {meant}", Fix(text, meant)) if meant else ("", None)
 
 
-def joined(node: Node) -> Node:
-    """The node with decimal commas as they are meant: YAML reads ``{z: 9,5 cm}`` as ``z: 9`` and a key ``5 cm``."""
-    if not isinstance(node, Mapping):
-        return node
-    entries: dict[str, Entry] = {}
-    last = ""
-    for key, entry in node.entries.items():
-        before = entries[last].value if last else None
-        if isinstance(before, Scalar) and _continues(before, key, entry):
-            text = f"{before.text},{key}"
-            place = before.span
-            whole = Span(place.file, place.line, place.column, len(text))
-            entries[last] = Entry(entries[last].key, Scalar(whole, text, text))
-        else:
-            entries[key] = Entry(entry.key, joined(entry.value))
-            last = key
-    return Mapping(node.span, entries, node.tag)
-
-
-def _continues(before: Scalar, key: str, entry: Entry) -> bool:
-    """Whether a key without a value directly follows the comma of a number."""
-    empty = isinstance(entry.value, Scalar) and entry.value.value is None and not entry.value.text
-    place = (before.span.line, before.span.column + len(before.text) + 1)
-    adjacent = (entry.key.line, entry.key.column) == place
-    return empty and adjacent and bool(_WHOLE.fullmatch(before.text) and _REST.fullmatch(key))
-
-
 _MISSING = (
     (re.compile(r"(?P<key>[^:\s]+):(?P<value>.*\S.*)", re.DOTALL), "a space is missing after the colon of '{}'"),
     (re.compile(r"(?P<key>[^\s=]+)[\s=]+(?P<value>.+)", re.DOTALL), "a colon is missing after '{}'"),
@@ -98,6 +74,8 @@ def unknown_key(
             key, value = found["key"], found["value"].strip()
             fix = None if number else Fix(word, f"{key}: {value}")
             return message.format(key), _write(key, value), fix
+    if is_empty and _REST.fullmatch(word):
+        return "", f"a comma separates keys: write a number as 0.{word}, with a point", None
     return "", did_you_mean(word, known), only_fix(word, known, beside)
 
 
@@ -114,13 +92,27 @@ def _write(key: str, value: str) -> str:
     return f"write '{key}: {value if len(value) <= 60 else f'{value[:57]}...'}'"
 
 
+def in_line(value: object) -> str:
+    """YAML in one line."""
+    text = str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf))
+    return text.strip().removesuffix("\n...")
+
+
+def to_write(key: str, schema: dict[str, Any]) -> str:
+    """A hint for a key that is missing: ``write 'kind: closed-loop'``."""
+    first = (schema.get("examples") or schema.get("enum") or [schema.get("const")])[0]
+    others = [in_line(other) for other in schema.get("enum", ()) if other != first]
+    more = f", or {', '.join(others)}" if others else ""
+    return f"write '{key}: {in_line(first)}'{more}" if first is not None else ""
+
+
 def mended(node: Node, schema: dict[str, Any]) -> tuple[Node, list[Diagnostic]]:
     """The node as it is meant, and what is said about keys that are indented one level too little or too much.
 
     The schema has no references.
     """
     found: list[Diagnostic] = []
-    return _indented(joined(node), schema, found), found
+    return _indented(node, schema, found), found
 
 
 def _indented(node: Node, schema: dict[str, Any], found: list[Diagnostic]) -> Node:

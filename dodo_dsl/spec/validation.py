@@ -8,29 +8,24 @@ import functools
 import itertools
 import json
 import math
+import operator
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator
-from pathlib import PurePath
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
-
-import yaml
 
 from dodo_dsl import __version__, package_data
 from dodo_dsl.diagnostics import Diagnostic, closest, did_you_mean, only_fix, shown_path
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Mapping, Node, Scalar, Sequence, plain, resolve
 from dodo_dsl.spec import quantity
-from dodo_dsl.spec.registry import SUFFIX, as_file
-from dodo_dsl.spec.slips import boolean_meant, meant, repaired, schema_at, unknown_key
+from dodo_dsl.spec.matrix import REPORTED
+from dodo_dsl.spec.slips import boolean_meant, in_line, meant, repaired, schema_at, to_write, unknown_key
 
 OF_COMPOSE = "application"
-REPORTED = "\0"
-"""The tag of values with a problem that is known already, which no file can have."""
 UNIT, RANGE, WORDS, EXPECT = "x-unit", "x-range", "x-words", "x-expect"
 """The unit of a quantity, its bounds, words that may stand in place of it, and in words what a pattern asks for."""
 _WHOLE = "x-whole"
 """Beside ``type: integer``, for JSON Schema takes 1.0 for a whole number."""
-_OF_TYPE = ("type", UNIT, _WHOLE)
 _TYPE_NAMES = {
     "object": "a mapping (key: value)",
     "array": "a list",
@@ -40,30 +35,27 @@ _TYPE_NAMES = {
     "boolean": "true or false",
     "null": "no value",
 }
-_MOST_READ = 200
 
 Path = tuple[str | int, ...]
 
 
 @functools.cache
-def schema_of(name: str) -> dict[str, Any]:
-    """``schemas/<name>.schema.json`` without what is for editors alone."""
-    text = (package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8")
-    schema: dict[str, Any] = json.loads(text, object_hook=None if name == OF_COMPOSE else _exact)
-    if (use := schema.get("$defs", {}).get("use")) is not None:
+def schema_of_keys(name: str) -> dict[str, Any]:
+    """``schemas/<name>.schema.json`` without references, and without what is for editors alone."""
+    file = _file(name, None if name == OF_COMPOSE else _exact)
+    if (use := file.get("$defs", {}).get("use")) is not None:
         use.pop("allOf")  # parameters are read by their manifests
         use["properties"]["with"].pop("additionalProperties")
         use["required"] = ["uses"]  # what a test extends is merged here, of which editors know nothing
-        schema["else"].pop("properties")
-    return schema
-
-
-@functools.cache
-def schema_of_keys(name: str) -> dict[str, Any]:
-    """The same without references."""
-    found: dict[str, Any] = _inlined(schema_of(name), schema_of(name))
+        file["else"].pop("properties")
+    found: dict[str, Any] = _inlined(file, file)
     del found["$defs"]
     return found
+
+
+def _file(name: str, hook: Callable[[dict[str, Any]], dict[str, Any]] | None) -> dict[str, Any]:
+    text = (package_data.schemas() / f"{name}.schema.json").read_text(encoding="utf-8")
+    return json.loads(text, object_hook=hook)  # type: ignore[no-any-return]
 
 
 def _inlined(part: Any, root: dict[str, Any]) -> Any:
@@ -71,15 +63,12 @@ def _inlined(part: Any, root: dict[str, Any]) -> Any:
         return [_inlined(each, root) for each in part]
     if not isinstance(part, dict):
         return part
-    base = _inlined(*_target(part["$ref"], root)) if isinstance(part.get("$ref"), str) else {}
+    base = {}
+    if isinstance(part.get("$ref"), str):
+        file, _, pointer = part["$ref"].partition("#/")
+        there = _file(file.removesuffix(".schema.json"), _exact) if file else root
+        base = _inlined(functools.reduce(operator.getitem, pointer.split("/"), there), there)
     return {**base, **{key: _inlined(value, root) for key, value in part.items() if key != "$ref"}}
-
-
-def _target(reference: str, root: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """What a reference means, and the file in which that stands."""
-    file, _, pointer = reference.partition("#/")
-    root = _by_address(file) if file else root
-    return functools.reduce(lambda below, key: below[key], pointer.split("/"), root), root
 
 
 def values(node: Node, schema: dict[str, Any]) -> Any:
@@ -114,11 +103,7 @@ class _Range:
     def validate(self, instance: object) -> None:
         with contextlib.suppress(quantity.QuantityError):  # of which the unit is wrong
             if not self._low <= quantity.convert(instance, self._unit) <= self._high:
-                raise _OutOfRange
-
-
-class _OutOfRange(Exception):
-    """A quantity is beyond its bounds."""
+                raise ValueError(instance)
 
 
 class _Whole:
@@ -132,21 +117,12 @@ class _Whole:
 def _validator(schema: dict[str, Any]) -> Any:
     import jsonschema_rs
 
-    return jsonschema_rs.Draft202012Validator(
-        schema, keywords={UNIT: _Quantity, RANGE: _Range, _WHOLE: _Whole}, retriever=_by_address
-    )
-
-
-@functools.cache
-def _by_address(address: str) -> dict[str, Any]:
-    """The schema that a reference means: ``application.schema.json``."""
-    text = (package_data.schemas() / address.rpartition("/")[2]).read_text(encoding="utf-8")
-    return json.loads(text, object_hook=_exact)  # type: ignore[no-any-return]
+    return jsonschema_rs.Draft202012Validator(schema, keywords={UNIT: _Quantity, RANGE: _Range, _WHOLE: _Whole})
 
 
 @functools.cache
 def _validator_of(name: str) -> Any:
-    return _validator(schema_of(name))
+    return _validator(schema_of_keys(name))
 
 
 class Violation:
@@ -160,12 +136,12 @@ class Violation:
     def __init__(self, error: Any, root: Node, name: str) -> None:
         *steps, self.keyword = error.evaluation_path
         self.path: Path = tuple(error.instance_path)
-        self.schema = _part(_root_of(steps, name), steps)
+        self.schema: Any = functools.reduce(operator.getitem, steps, schema_of_keys(name))
         self.wanted = error.kind.property if self.keyword == "required" else self.schema[self.keyword]
         is_of_key = error.kind.name == "propertyNames"
         self.instance: Any = error.kind.error.instance if is_of_key else error.instance
         self.of_key: str | None = self.instance if is_of_key else None
-        around = self.schema if self.path else schema_of(name)
+        around = self.schema if self.path else schema_of_keys(name)
         self.known, self.is_closed = around.get("properties", {}), around.get("additionalProperties") is False
         self._find(root)
 
@@ -186,13 +162,6 @@ class Violation:
         self.inherited = {k: e for k, e in beside.items() if key is not None and e.key.file != key.file}
 
     @property
-    def of_file(self) -> str:
-        """A hint for the name of a test, which is that of its file."""
-        file = PurePath(self.span.file).name
-        is_name = self.path == ("name",) and file.endswith(SUFFIX)
-        return as_file(file.removesuffix(SUFFIX), SUFFIX) if is_name else ""
-
-    @property
     def places(self) -> Iterator[Path]:
         """What is not valid: without it the rest is, as far as this violation goes."""
         if self.keyword == "additionalProperties":
@@ -206,28 +175,8 @@ def _violations(document: object, root: Node, name: str) -> list[Violation]:
     """At most MAX_PROBLEMS; of several about one value the first about its type alone."""
     errors = itertools.islice(_validator_of(name).iter_errors(document), MAX_PROBLEMS)
     found = [Violation(error, root, name) for error in errors]
-    typed = {v.path: v for v in reversed(found) if v.keyword in _OF_TYPE and v.of_key is None}
+    typed = {v.path: v for v in reversed(found) if v.keyword in ("type", UNIT, _WHOLE) and v.of_key is None}
     return [v for v in found if v.of_key or typed.get(v.path, v) is v]
-
-
-def _root_of(steps: list[str], name: str) -> dict[str, Any]:
-    """The schema in which a path begins: of keywords of our own it is that in the file where they stand."""
-    schema = schema_of(name)
-    if steps[:1] != ["$defs"] or steps[1] in schema["$defs"]:
-        return schema
-    roots = (_by_address(f"{other}.schema.json") for other in ("deployment", OF_COMPOSE))
-    return next(root for root in roots if steps[1] in root["$defs"])
-
-
-def _part(schema: dict[str, Any], steps: Iterable[str | int]) -> Any:
-    """What these steps lead to; a reference to what it means and what stands beside it."""
-    root, part = schema, schema
-    for step in steps:
-        beside, part = part, part[step]  # type: ignore[index]
-        if step == "$ref":
-            part, root = _target(str(part), root)
-            part = {key: value for key, value in beside.items() if key != "$ref"} | part
-    return part
 
 
 def validate(node: Node, schema: str) -> list[Diagnostic]:
@@ -241,7 +190,7 @@ def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], 
     Values with the tag REPORTED are not judged. A service's parameters stay, as they are read by its manifest.
     """
     found, places, tagged = list[Diagnostic](), set[Path](), list[tuple[Path, Node]]()
-    document = _document(node, schema, (), tagged)
+    document = _document(node, (), tagged, schema == OF_COMPOSE)
     for path, one in tagged:
         if "with" not in path:
             places.add(path)
@@ -259,7 +208,7 @@ def valid_part(node: Node, schema: str) -> tuple[Node | None, list[Diagnostic], 
     return _without(node, (), places), found, places
 
 
-def _document(node: Node, schema: str, path: Path, tagged: list[tuple[Path, Node]]) -> Any:
+def _document(node: Node, path: Path, tagged: list[tuple[Path, Node]], is_compose: bool) -> Any:
     """As ``plain``, but for numbers that JSON does not have: their texts, or for compose the largest one.
 
     What is ``tagged`` is added to the list.
@@ -267,11 +216,11 @@ def _document(node: Node, schema: str, path: Path, tagged: list[tuple[Path, Node
     if node.tag:
         tagged.append((path, node))
     if isinstance(node, Mapping):
-        return {key: _document(entry.value, schema, (*path, key), tagged) for key, entry in node.entries.items()}
+        return {key: _document(entry.value, (*path, key), tagged, is_compose) for key, entry in node.entries.items()}
     if isinstance(node, Sequence):
-        return [_document(item, schema, (*path, number), tagged) for number, item in enumerate(node.items)]
+        return [_document(item, (*path, number), tagged, is_compose) for number, item in enumerate(node.items)]
     if isinstance(node.value, float) and not math.isfinite(node.value):
-        return sys.float_info.max if schema == OF_COMPOSE else node.text
+        return sys.float_info.max if is_compose else node.text
     return node.value
 
 
@@ -306,11 +255,6 @@ def _fits(schema: dict[str, Any], value: object) -> bool:
     return bool(_validator(schema).is_valid(value))
 
 
-def _in_line(value: object) -> str:
-    """YAML in one line."""
-    return str(yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=math.inf)).strip()
-
-
 def _additional(v: Violation) -> Iterator[Diagnostic]:
     known = v.schema.get("properties", {})
     for *_, name in itertools.islice(v.places, MAX_PROBLEMS):
@@ -325,29 +269,16 @@ def _additional(v: Violation) -> Iterator[Diagnostic]:
 def _required(v: Violation) -> Iterator[Diagnostic]:
     missing, known = v.wanted, v.known
     unknown = {name: value for name, value in v.instance.items() if name not in known}
-    if missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
-        almost = next((name for name in unknown if only_fix(name, [missing])), "")
-        if not v.is_closed and almost:  # else it is reported as an unknown key
-            hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
-            yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
-        if v.is_closed or almost:
-            return
-    hint = _to_write(missing, known.get(missing, {}))
+    if v.is_closed and missing in (meant(name, known, is_empty=value is None) for name, value in unknown.items()):
+        return  # it is reported as an unknown key
+    if not v.is_closed and (almost := next((name for name in unknown if only_fix(name, [missing])), "")):
+        hint, fix = did_you_mean(almost, [missing]), only_fix(almost, [missing])
+        yield Diagnostic(v.entries[almost].key, "unknown-key", f"unknown key {_shown(almost)}", hint, fix=fix)
+        return
+    hint = to_write(missing, known.get(missing, {}))
     if near := closest(v.key, v.inherited):
         hint = f"did you mean '{near[0]}' of {shown_path(v.inherited[near[0]].key.file)}?"
     yield Diagnostic(v.span, "missing-key", f"{v.name} has no key '{missing}'", hint)
-
-
-def _to_write(key: str, schema: Any) -> str:
-    """A hint for a key that is missing: ``write 'kind: closed-loop'``."""
-    examples = schema.get("examples", schema.get("enum", ())) if isinstance(schema, dict) else ()
-    examples = [schema["const"]] if isinstance(schema, dict) and "const" in schema else examples
-    if not examples:
-        return ""
-    others = [_in_line(other).removesuffix("\n...") for other in schema.get("enum", ()) if other != examples[0]]
-    return f"write '{key}: {_in_line(examples[0]).removesuffix(chr(10) + '...')}'" + (
-        f", or {', '.join(others)}" if others else ""
-    )
 
 
 def _companion(v: Violation) -> Iterator[Diagnostic]:
@@ -367,23 +298,17 @@ def _type(v: Violation) -> Iterator[Diagnostic]:
     found = _shown(v.text) if v.text else "empty"
     if isinstance(value, dict | list):
         found = _TYPE_NAMES["object" if isinstance(value, dict) else "array"]
-    if schema.get(EXPECT) == _TYPE_NAMES["boolean"]:
-        names = names[:1]
-    hint, fix = schema.get("x-hint") or v.of_file or _in_quotes(v), None
+    span, hint, fix = v.span, schema.get("x-hint") or _in_quotes(v), None
     items = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
-    if hint or wanted is None:
-        pass
-    elif wanted == "array" and v.key and (items or "examples" in schema):
-        is_meant = items and not any(" " in item for item in items) and _fits(schema, items)
-        shown = items if is_meant else schema.get("examples", [None])[0]
-        hint = f"write {'' if is_meant else 'for example '}{v.key}: {_in_line(shown)}" if shown else ""
-    elif wanted == "boolean" and isinstance(value, str):
-        hint, fix = boolean_meant(value)
-    elif wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
-        hint = f"write {value}, without quotation marks" if _fits(schema, int(value)) else ""
-    span = v.span
     if isinstance(v.node, Sequence) and wanted == "object":
         span, hint = v.node.span, hint or "write 'key: value' in place of list items"
+    elif not hint and wanted == "array" and v.key:
+        shown = items if items and _fits(schema, items) else schema.get("examples", [None])[0]
+        hint = f"write {v.key}: {in_line(shown)}" if shown else ""
+    elif not hint and wanted == "boolean" and isinstance(value, str):
+        hint, fix = boolean_meant(value)
+    elif not hint and wanted in ("integer", "number") and isinstance(value, str) and re.fullmatch(r"-?\d{1,20}", value):
+        hint = f"write {value}, without quotation marks"
     yield Diagnostic(span, "wrong-type", f"{v.name} is {found}, expected {' or '.join(names)}", hint, fix=fix)
 
 
@@ -421,12 +346,9 @@ def _choices(v: Violation) -> Iterator[Diagnostic]:
 
 
 def _const(v: Violation) -> Iterator[Diagnostic]:
-    message = f"{v.name} is {_shown(v.instance)}, expected {v.wanted}"
-    hint = f"write '{v.key}: {v.wanted}'"
-    if v.key == "dodo" and type(v.instance) is int and v.instance > v.wanted:
-        message = f"the file is of language version {v.instance}, the installed DoDo {__version__} reads "
-        message += f"{v.wanted}"
-        hint = f"install a DoDo that reads version {v.instance}, or, if the number is a mistake, {hint}"
+    message, hint = f"{v.name} is {_shown(v.instance)}, expected {v.wanted}", f"write '{v.key}: {v.wanted}'"
+    if v.key == "dodo":
+        message += f", which the installed DoDo {__version__} reads"
     yield Diagnostic(v.span, "wrong-value", message, hint)
 
 
@@ -434,31 +356,27 @@ def _pattern(v: Violation) -> Iterator[Diagnostic]:
     value = str(v.instance)
     expected = v.schema.get(EXPECT, f"a string that matches {v.schema.get('pattern')}")
     span = v.span if v.of_key is None else v.entries[v.of_key].key
-    name = re.sub(r"[^a-z0-9]+", "-", value[:_MOST_READ].lower()).strip("-")[:40]
+    name = re.sub(r"[^a-z0-9]+", "-", value[:100].lower()).strip("-")[:40]
     is_text = name != value and resolve(name) == name != "" and _fits(v.schema, name)
-    hint = v.of_file or (f"for example '{name}'" if is_text else "")
+    hint = f"for example '{name}'" if is_text else ""
     yield Diagnostic(span, "wrong-value", f"{_shown(value)} is not allowed here, expected {expected}", hint)
 
 
 def _bounds(v: Violation) -> Iterator[Diagnostic]:
-    schema = v.schema
-    low, high = schema.get(RANGE) or (schema.get("minimum"), schema.get("maximum"))
-    shown = v.text if len(v.text) <= 60 else f"{v.text[:57]}..."
-    yield Diagnostic(v.span, "out-of-range", f"{v.name} is {shown}, expected {low} to {high}")
+    low, high = v.schema.get(RANGE) or (v.schema.get("minimum"), v.schema.get("maximum"))
+    yield Diagnostic(v.span, "out-of-range", f"{v.name} is {_shown(v.text)}, expected {low} to {high}")
 
 
-def _too_many(v: Violation) -> Iterator[Diagnostic]:
-    if EXPECT in v.schema:
+def _count(v: Violation) -> Iterator[Diagnostic]:
+    if v.keyword.startswith("min"):
+        expected = "a string" if v.keyword == "minLength" else "at least one entry"
+        yield Diagnostic(v.span, "missing-key", f"{v.name} is empty, expected {expected}")
+    elif EXPECT in v.schema:
         yield from _pattern(v)
-        return
-    what = "characters" if v.keyword == "maxLength" else "entries"
-    message = f"{v.name} has {len(v.instance)} {what}, expected at most {v.wanted}"
-    yield Diagnostic(v.span, "too-large", message)
-
-
-def _too_few(v: Violation) -> Iterator[Diagnostic]:
-    expected = "a string" if v.keyword == "minLength" else "at least one entry"
-    yield Diagnostic(v.span, "missing-key", f"{v.name} is empty, expected {expected}")
+    else:
+        what = "characters" if v.keyword == "maxLength" else "entries"
+        message = f"{v.name} has {len(v.instance)} {what}, expected at most {v.wanted}"
+        yield Diagnostic(v.span, "too-large", message)
 
 
 def _other(v: Violation) -> Iterator[Diagnostic]:
@@ -477,12 +395,6 @@ _TRANSLATORS: dict[str, Callable[[Violation], Iterator[Diagnostic]]] = {
     "enum": _choices,
     "const": _const,
     "pattern": _pattern,
-    "maxLength": _too_many,
-    "minimum": _bounds,
-    "maximum": _bounds,
-    "maxProperties": _too_many,
-    "maxItems": _too_many,
-    "minProperties": _too_few,
-    "minItems": _too_few,
-    "minLength": _too_few,
+    **dict.fromkeys(("minimum", "maximum"), _bounds),
+    **dict.fromkeys(("maxLength", "maxProperties", "maxItems", "minProperties", "minItems", "minLength"), _count),
 }

@@ -13,13 +13,7 @@ from dodo_dsl.spec import quantity
 from dodo_dsl.spec.matrix import Placeholders
 
 KEY = "vary"
-PLACEHOLDERS = Placeholders(
-    KEY,
-    "'vary' has no range '{}'",
-    "add it with its range under 'vary'",
-    "so a search would vary nothing by it",
-    points_at_value=True,
-)
+PLACEHOLDERS = Placeholders(KEY, "add it with its range under 'vary'", points_at_value=True)
 Values = dict[str, Scalar]
 """One value of each range, by its name."""
 

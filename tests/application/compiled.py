@@ -13,8 +13,7 @@ from typing import Any
 import yaml
 
 from dodo_dsl import compiler
-from dodo_dsl.application.compose_paths import mapped_texts
-from dodo_dsl.application.interpolation import dotenv, interpolate
+from dodo_dsl.application.interpolation import dotenv, interpolate, mapped_texts
 from dodo_dsl.diagnostics import Diagnostic, forget_lines
 from dodo_dsl.emit.render import render_plan
 from dodo_dsl.plan.model import Plan

@@ -96,7 +96,6 @@ CIDS = (
     ({"environment": {"CID": 112}}, "own"),
     ({"environment": {"FLAGS": "--cid=112 --freq=10"}}, "own"),
     ({"env_file": "b.env"}, "own"),
-    ({"env_file": [{"path": "b.env", "format": "raw"}]}, "own"),
     ({"x-dodo-process": ["./three", "--cid=112"]}, "own"),
     ({"x-dodo": {"cid": 112}}, "own"),
     ({"command": "--cid=111 --cid-to=112"}, "bridge"),
@@ -355,21 +354,20 @@ def test_folders_that_dodo_yml_allows(root: Path, tmp_path: Path) -> None:
 
 
 def test_services_share_a_copy_and_nothing_beside_it(root: Path) -> None:
-    bound = {"driver_opts": {"o": "bind", "type": "none", "device": "./data"}}
     services = {
         "a": car(volumes=["./new:/d"]),
         "b": car(volumes=["./new/:/e:ro", "./data/x:/f:ro"]),
         "c": car(volumes=[".:/app"]),
-        "d": car(volumes=["bound:/b:ro"]),
+        "d": car(volumes=[".:/b:ro"]),
     }
-    test = compiled(root, {"services": services, "volumes": {"bound": bound}})
+    test = of_services(root, **services)
     assert [service["volumes"] for service in test.services.values()] == [
         ["files-0:/d:nocopy"],
         ["files-0:/e:nocopy,ro", "./data/x:/f:ro"],
         ["files-1:/app:nocopy"],
-        ["bound:/b:nocopy,ro"],
+        ["files-1:/b:nocopy,ro"],
     ]
-    assert set(test.document["volumes"]) == {"bound", "files-0", "files-1"}
+    assert set(test.document["volumes"]) == {"files-0", "files-1"}
 
 
 def test_a_name_that_is_too_long_for_a_host(root: Path) -> None:

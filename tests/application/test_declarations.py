@@ -7,7 +7,7 @@ import pytest
 from dodo_dsl.compiler import load
 from dodo_dsl.compiler import plan as planned
 from dodo_dsl.plan.model import ApplicationService
-from dodo_dsl.spec.validation import schema_of
+from dodo_dsl.spec.validation import schema_of_keys
 from tests.application.compiled import FILE, repository
 
 COMPOSE = """\
@@ -61,6 +61,7 @@ def test_they_are_about_the_files_that_they_name(folder: Path) -> None:
 
 
 def test_a_service_has_the_keys_of_x_dodo() -> None:
-    declared = schema_of("deployment")["properties"]["application"]["properties"]["services"]
-    keys = schema_of("application")["$defs"]["service"]["properties"]["x-dodo"]["properties"]
+    declared = schema_of_keys("deployment")["properties"]["application"]["properties"]["services"]
+    services = schema_of_keys("application")["properties"]["services"]
+    keys = services["additionalProperties"]["properties"]["x-dodo"]["properties"]
     assert set(declared["additionalProperties"]["properties"]) == {*keys, "process"}

@@ -4,8 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from dodo_dsl import compiler
-from dodo_dsl.check.context import Rule, RuleContext
-from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.resolve import ResolvedTest, Rule, RuleContext
 from dodo_dsl.compiler import Checked
 from tests.check import examples
 

@@ -25,7 +25,7 @@ def test_the_bad_example_gives_its_rule(rule: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("rule", EXAMPLES)
+@pytest.mark.parametrize("rule", [rule for rule in EXAMPLES if catalogue.pages()[str(rule.values[0])].instead])
 def test_the_good_example_is_silent(rule: str, tmp_path: Path) -> None:
     examples.write(catalogue.pages()[rule].good, tmp_path)
     assert examples.problems(tmp_path) == []

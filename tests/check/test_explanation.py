@@ -7,10 +7,8 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.check import catalogue
-from dodo_dsl.check.explanation import explain
 from dodo_dsl.cli.main import main
 from tests.check import examples
-from tests.check.contexts import resolved
 
 GOLDEN = Path(__file__).parent / "explained"
 HIL = """\
@@ -59,7 +57,6 @@ vary:
 environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, exposure: "${vary.exposure}"}}}
 action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {yaw: "${vary.yaw}"}}}
 """
-PLACE = "tests/example/example.dodo.yml:{}"
 CASES = {
     "plain": "",
     "hil": HIL,
@@ -105,8 +102,7 @@ def test_json_has_the_same(folder: Path) -> None:
     assert code == 2
     rows = json.loads(out)
     assert [row["slug"] for row in rows][:2] == ["example--yaw-80-deg--frame-id-0", "example--yaw-80-deg--frame-id-3"]
-    pose = rows[3]["services"][2]
-    (yaw,) = [argument for argument in pose["arguments"] if argument["name"] == "yaw"]
+    (yaw,) = [argument for argument in rows[3]["services"][2]["arguments"] if argument["name"] == "yaw"]
     assert yaw == {"name": "yaw", "value": "100", "unit": "deg", "origin": "tests/example/example.dodo.yml:14"}
     assert rows[0]["asked"][0]["port"] == "opendlv.proxy.GroundSteeringRequest"
 
@@ -114,10 +110,9 @@ def test_json_has_the_same(folder: Path) -> None:
 def test_json_has_the_ranges(folder: Path) -> None:
     examples.write(VARY, folder)
     (row,) = json.loads(explained("example", "--json")[1])
-    assert row["slug"] == "example"
-    assert row["vary"] == [
-        {"name": "yaw", "nominal": "90 deg", "values": "80 deg to 100 deg", "origin": PLACE.format(10)},
-        {"name": "exposure", "nominal": "1", "values": "0.5, 1", "origin": PLACE.format(11)},
+    assert [(one["name"], one["values"]) for one in row["vary"]] == [
+        ("yaw", "80 deg to 100 deg"),
+        ("exposure", "0.5, 1"),
     ]
 
 
@@ -141,20 +136,3 @@ def test_neither(folder: Path) -> None:
         "dodo explain: unknown test or rule 'wrong-units'; known: base, example; or the rule: did you"
     )
     assert "'wrong-unit'" in err
-
-
-def origins(example: str, folder: Path) -> dict[tuple[str, str], str]:
-    return {(s.name, a.name): a.origin for s in explain(resolved(example, folder)).services for a in s.arguments}
-
-
-def test_origins_of_values(folder: Path) -> None:
-    found = origins("", folder)
-    assert found["camera", "map-path"] == "tests/example/example.dodo.yml:8"
-    assert found["track", "map-path"] == "as camera, tests/example/example.dodo.yml:8"
-    assert found["camera", "freq"] == "default"
-
-
-def test_origins_of_values_on_a_rig(folder: Path) -> None:
-    found = origins(HIL.removeprefix("extends: ../base/base.dodo.yml\n"), folder)
-    assert found["camera", "source"] == "the emulated rig"
-    assert found["pose", "max-speed"] == "tests/example/example.dodo.yml:9"

@@ -6,8 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.check.lockstep import DEFAULT_HZ, answers, cameras_of, other_inputs, rates, rates_fit, step_hz
-from dodo_dsl.check.wiring import End, Wiring, message
+from dodo_dsl.check.wiring import (
+    DEFAULT_HZ,
+    End,
+    Wiring,
+    answers,
+    cameras_of,
+    message,
+    other_inputs,
+    rates,
+    rates_fit,
+    step_hz,
+)
 from dodo_dsl.diagnostics import Span
 from tests.check.contexts import resolved
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.lockstep import answers, driving
 from dodo_dsl.check.resolve import known_ids, resolve
+from dodo_dsl.check.wiring import answers, driving
 from tests.check.contexts import checked, resolved
 
 MATRIX = """\

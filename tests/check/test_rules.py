@@ -34,8 +34,8 @@ def track(values: str) -> str:
     return f"evaluation: {{track: {{uses: collision, with: {{{values}}}}}}}\n"
 
 
-def source(name: str, width: int = 640, height: int = 480) -> str:
-    camera = f"{{source: {name}, width: {width}, height: {height}}}"
+def source(name: str) -> str:
+    camera = f"{{source: {name}, width: 640, height: 480}}"
     return (
         "level: hil\nrig: kiwi\nenvironment:\n  camera: {uses: camera, with: {map-path: ../maps/plain}}\n"
         f"# dodo.yml\nrigs: {{kiwi: {{kind: static, cid: 121, camera: {camera}}}}}\n"
@@ -59,10 +59,6 @@ def signal(path: str, limits: str, begin: float, end: float) -> str:
 
 CHANGES = [
     (
-        "clock: lockstep\naction:\n  vehicle: {uses: dynamic-model, with: {freq: 75 Hz}}\n  pose: {uses: integrator}\n",
-        "13:41 clock-rate",
-    ),
-    (
         "clock: realtime\naction:\n  vehicle: {uses: dynamic-model, with: {freq: 75 Hz}}\n  pose: {uses: integrator}\n",
         "",
     ),
@@ -79,20 +75,14 @@ CHANGES = [
     ),
     (cam("id: [0, 2], yaw: [0 deg, 90 deg]").replace("virtual-camera", "range-finder"), ""),
     (cam("id: [0, 2], yaw: [0 deg, 90 deg, 9 deg]").replace("virtual-camera", "range-finder"), "12:93 wrong-value"),
-    (source("/dev/video0", 600), ""),
-    (source("rpicam"), ""),
-    (source("drive.rec", 600), ""),
-    (source("rpicam", 600), "dodo.yml:4:56 camera-source"),
+    (source("/dev/video0"), ""),
     (source("emulated"), "dodo.yml:4:56 camera-source"),
-    (source("rpicm"), "dodo.yml:4:56 camera-source"),
-    (source("file"), "dodo.yml:4:56 camera-source"),
     (track("goal: finish, walls: [a, finish, b]"), "12:68 unknown-name, 12:79 unknown-name"),
     (
         track("walls: ['*', blocks, hedge, obstacle-1, obstacle-2]")
         + '# tests/maps/plain/map.json\n{"obstacles": [{"lines": [0, 0, 1, 1]}], "block": [{"name": "hedge"}]}\n',
         "base.dodo.yml:14:41 unknown-name, 12:86 unknown-name",
     ),
-    ("timeout: 40 s\n" + track("goal: finish, max-time: 40 s"), "12:70 short-timeout"),
     ("timeout: 1 min\n" + track("goal: finish, max-time: 40 s"), ""),
     (signal(END, "", 0, 0.5), "7:3 two-producers, 15:3 input-limit"),
     (signal(END, ", min-samples: 6", 0, 0.5), "7:3 two-producers"),
@@ -121,13 +111,7 @@ CHANGES = [
     (app("", S), "base.dodo.yml:11:3 no-producer, 10:3 no-producer"),
     (app("", f"{S}, {P}, {F}"), "docker-compose.yml:1:150 two-producers"),
     (app(f"opendlv.proxy.DistanceReading, {F}"), "docker-compose.yml:1:68 application-input"),
-    (cam("frame-id: 7"), "12:15 no-producer"),
-    (track("goal: finish, frame-id: 1"), "12:14 no-sample"),
     ("action: {vehicle: {uses: dynamic-model}}\n", "8:3 no-producer, 10:3 no-sample"),
-    (
-        "action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator}, ghost: {uses: integrator}}\n",
-        "11:68 two-producers",
-    ),
     (
         "environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain}}, "
         "ranges: {uses: range-finder, with: {id: [0, 2]}}}\n"
@@ -135,22 +119,11 @@ CHANGES = [
         "docker-compose.yml:1:68 application-input, docker-compose.yml:1:101 application-input, "
         "docker-compose.yml:1:101 application-input",
     ),
-    (cmd("--name=vido0.argb"), "docker-compose.yml:2:27 application-memory"),
     (cmd("--name=${MEMORY:-pictures}"), "docker-compose.yml:2:27 application-memory"),
     (cmd("--name=/video0.argb"), ""),
     (cmd("--name.in=video0.argb --name.out=seen"), ""),
     (cmd("--name=${MEMORY}"), ""),
     (cmd("--name=seen", "--name=seen"), ""),
-    (
-        cam("width: 1280, height: 720") + cmd("--name=video0.argb --width=1280 --height=720"),
-        "base.dodo.yml:9:3 application-pictures",
-    ),
-    (
-        cam("width: 1280, height: 720") + cmd("--name video0.argb --width 640 --height 480"),
-        "12:85 application-pictures",
-    ),
-    (cam("width: 1280, height: 720") + cmd("--name=/video0.argb --width=${W:-640}"), "12:85 application-pictures"),
-    (cmd("--name.bgr=video0.argb"), "base.dodo.yml:9:3 application-pictures, 8:3 application-pictures"),
 ]
 
 

@@ -6,9 +6,8 @@ import pytest
 
 from dodo_dsl.application.model import Declared
 from dodo_dsl.check.wiring import ANYTHING, Port, message, wire
-from dodo_dsl.check.wiring_rules import check_producers
 from dodo_dsl.diagnostics import Span
-from tests.check.contexts import context, resolved
+from tests.check.contexts import resolved
 
 HERE = Span("x.yml")
 
@@ -116,29 +115,3 @@ services:
     wiring = resolved(example, tmp_path).wiring
     heard = [str(end.port) for end in wiring.application_consumes if wiring.producers(end.port)]
     assert heard == [f"opendlv.{kind}/3" for kind in kinds if "Magnetic" not in kind]
-
-
-@pytest.mark.parametrize(
-    ("parameters", "sent", "hint"),
-    [
-        ("", ["PedalPosition/0", "PedalPosition/1"], "write 'drive: differential'"),
-        ("drive: differential", ["AxleAngularVelocity/0", "AxleAngularVelocity/1"], "write 'wheel-input: axle' for"),
-        ("drive: bicycle", ["GroundSteering", "PedalPosition"], "write 'drive: kiwi' for"),
-        ("", ["GroundSteering"], "list it under x-dodo.out"),
-        ("drive: differential", ["PedalPosition/0"], "list it under x-dodo.out"),
-    ],
-)  # fmt: skip
-def test_a_vehicle_that_takes_other_requests_is_told_how_it_takes_these(
-    tmp_path: Path, parameters: str, sent: list[str], hint: str
-) -> None:
-    names = [
-        f"opendlv.proxy.{kind}Request{'/' * bool(stamp)}{stamp}" for kind, _, stamp in (s.partition("/") for s in sent)
-    ]
-    example = f"""\
-action: {{vehicle: {{uses: dynamic-model, with: {{{parameters}}}}}, pose: {{uses: integrator}}}}
-# docker-compose.yml
-services:
-  driver: {{image: driver, command: --cid=1, x-dodo: {{out: [{", ".join(names)}]}}}}
-"""
-    problems = [each for each in check_producers(context(example, tmp_path)) if each.rule == "no-producer"]
-    assert problems and all(each.hint.startswith(hint) for each in problems)

@@ -46,7 +46,7 @@ ATTACKS: dict[str, tuple[list[str], list[str]]] = {
 }
 """Each with its mounts, and what it runs in them."""
 MOUNTS = [
-    "./moved:/see/0", "./moved:/see/1:ro", "./lone:/see/2/own", "./exchanged:/see/3", "bound:/see/4",
+    "./moved:/see/0", "./moved:/see/1:ro", "./lone:/see/2/own", "./exchanged:/see/3", "./exchanged/:/see/4:ro",
     "./outer/deep:/see/5", "./outer/deep/sub:/see/6:ro", "./outer/deep/own:/see/7/own", "./fresh:/see/8:ro",
     "./outer:/see/9:ro",
 ]  # fmt: skip
@@ -86,8 +86,7 @@ def repository(folder: Path, attacks: Mapping[str, tuple[list[str], list[str]]],
     begun = after([*services], "service_started")
     lookers = {f"looks-{n}": service(["sh", "-c", LOOK], mounts, host, depends_on=begun) for n in range(LOOKERS)}
     done = service(["false"], [], host, depends_on=after([*lookers], "service_completed_successfully"))
-    volumes = {"bound": {"driver_opts": {"type": "none", "o": "bind", "device": "./exchanged"}}}
-    document = {"services": {**services, **lookers, "done": done}, "volumes": volumes}
+    document = {"services": {**services, **lookers, "done": done}}
     (team / "docker-compose.yml").write_text(json.dumps(document))
     (team / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
     return team

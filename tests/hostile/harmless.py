@@ -16,15 +16,15 @@ _CARRIED = """
 build cap_add cap_drop command configs cpus cpuset depends_on deploy dns dns_opt dns_search domainname entrypoint
 env_file environment expose extra_hosts gpus group_add healthcheck hostname image init ipc links logging mem_limit
 network_mode networks pid pids_limit platform read_only runtime secrets security_opt shm_size stdin_open
-stop_grace_period stop_signal sysctls tmpfs tty ulimits umask user volumes volumes_from working_dir
+stop_grace_period stop_signal tmpfs tty ulimits umask user volumes volumes_from working_dir
 """
 KEYS = {*_CARRIED.split()}
 """Those of a service that a test carries; any other is harm. Their values are judged below."""
-_BUILT = "additional_contexts args context dockerfile dockerfile_inline extra_hosts network platforms secrets target"
+_BUILT = "additional_contexts args context dockerfile dockerfile_inline network secrets target"
 MOUNT = {
-    "": {"bind", "image", "read_only", "source", "target", "tmpfs", "type", "volume"},
-    "bind": {"create_host_path", "selinux"},
-    "volume": {"nocopy", "subpath"},
+    "": {"bind", "read_only", "source", "target", "tmpfs", "type", "volume"},
+    "bind": {"create_host_path"},
+    "volume": {"nocopy"},
 }
 TOP = {"services", "volumes", "secrets", "configs"}
 MEMORY, FILES = 2_000_000_000, 1_000_000_000
@@ -66,7 +66,7 @@ def harm(document: Document, repository: Path) -> Iterator[str]:
         ]
         yield from (f"{name}: {text}" for text in found)
     for name, volume in volumes.items():
-        yield from (f"volume {name}: {text}" for text in _volume(volume or {}, folder, repository))
+        yield from (f"volume {name}: {text}" for text in _volume(volume or {}))
     for key in ("secrets", "configs"):
         for name, about in (document.get(key) or {}).items():
             yield from (f"{key} {name}: {text}" for text in _content(about or {}, folder, repository))
@@ -171,7 +171,7 @@ def _mount(mount: Any, volumes: Document, folder: Path, repository: Path) -> Ite
             yield f"volume '{source}' of nobody"
         if _is_external(volumes.get(source)) and not is_read:
             yield f"mount {mount} could be written to"
-    elif kind not in ("volume", "tmpfs", "image", None):
+    elif kind not in ("volume", "tmpfs", None):
         yield f"mount {mount}"
 
 
@@ -216,24 +216,13 @@ def _content(about: Document, folder: Path, repository: Path) -> Iterator[str]:
         yield f"environment: {about['environment']}"
 
 
-def _volume(volume: Document, folder: Path, repository: Path) -> Iterator[str]:
-    yield from _others(volume, {"external", "name"} if _is_external(volume) else {"driver_opts"}, "")
-    name, options = str(volume.get("name") or "a"), volume.get("driver_opts") or {}
+def _volume(volume: Document) -> Iterator[str]:
+    yield from _others(volume, {"external", "name"} if _is_external(volume) else set(), "")
+    name = str(volume.get("name") or "a")
     if _is_external(volume) and (
         volume["external"] is not True or not re.fullmatch("(?!dodo-)[a-zA-Z0-9][a-zA-Z0-9_.-]*", name)
     ):
         yield f"external: {volume}"
-    if not isinstance(options, dict):
-        yield f"driver_opts: {options}"
-        return
-    words = str(options.get("o", "")).split(",")
-    if {"bind", "rbind"} & {word.strip() for word in words} and options.get("type") == "none":
-        is_read = [word for word in words if word in ("ro", "rw")][-1:] == ["ro"]
-        yield from _bound(str(options.get("device", "")), is_read, folder, repository)
-    elif options.get("type") == options.get("device") == "tmpfs" and "remount" not in words:
-        yield from _tmpfs(",".join(words))
-    elif options:
-        yield f"driver_opts: {options}"
 
 
 def _is_external(volume: Any) -> bool:

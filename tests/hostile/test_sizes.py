@@ -37,7 +37,7 @@ from dodo_dsl.run.protocol import Flooded, MemoryTaken, Noted
 from dodo_dsl.run.run_state import MOST_NOTES, Ended, RunState
 from dodo_dsl.run.service_protocol import read_line
 from dodo_dsl.spec import registry
-from dodo_dsl.spec.registry import RegistryTooLarge, locate
+from dodo_dsl.spec.registry import RegistryError, locate
 from services.camera.sources import FileCamera
 from services.rec_recorder import model
 from services.rec_recorder.model import FloodError, RecordingFile, Traffic
@@ -204,7 +204,7 @@ def test_a_registry_is_not_searched_without_end(tmp_path: Path, monkeypatch: pyt
     for number in range(30):
         (tmp_path / str(number)).mkdir()
     monkeypatch.setattr(registry, "MAX_FOLDERS", 20)
-    with pytest.raises(RegistryTooLarge, match=r"has more than 20 folders: name the folder with the tests"):
+    with pytest.raises(RegistryError, match=r"has more than 20 folders: name the folder with the tests"):
         locate([], [tmp_path])
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.check.suite_rules import prefix
+from dodo_dsl.check.spec_rules import prefix
 from dodo_dsl.plan.addresses import Subnets, cids, subnets
 from dodo_dsl.spec.deployment import Deployment
 

@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.machine_load.service_use import Used
-from dodo_dsl.run.machine_load.snapshot import Snapshot, Times
+from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
 
 T = TypeVar("T")
@@ -88,12 +87,9 @@ class ScriptedBackend:
     tails: Mapping[str, list[str]] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
     name: str = "process"
-    has_engine: bool = False
     is_on_host: bool = False
-    loads: Callable[[float], Snapshot | None] = lambda _: None
+    uses: Callable[[float], Snapshot | None] = lambda _: None
     """What was used at a time of the loop."""
-    uses: Callable[[float], Mapping[str, Used] | None] = lambda _: None
-    """What services of the application have used, as ``loads``."""
     listens: Mapping[str, float] | None = None
     """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
     printed: tuple[Unmatched, ...] = ()
@@ -123,10 +119,7 @@ class ScriptedBackend:
     async def begin(self) -> None:
         await self._call("begin")
 
-    async def load(self) -> Snapshot | None:
-        return self.loads(asyncio.get_running_loop().time())
-
-    async def use(self) -> Mapping[str, Used] | None:
+    async def use(self) -> Snapshot | None:
         return self.uses(asyncio.get_running_loop().time())
 
     async def application(self) -> Collection[int] | None:
@@ -169,9 +162,8 @@ def load(others: float, **services: tuple[float, float]) -> Callable[[float], Sn
 
     def at(now: float) -> Snapshot:
         busy = 2 * others + sum(ran for ran, _ in services.values())
-        return Snapshot(
-            now, 2, busy * now, {n: Times(ran * now, waited * now) for n, (ran, waited) in services.items()}
-        )
+        used = {name: Used(ran * now, waited * now) for name, (ran, waited) in services.items()}
+        return Snapshot(now, used, 2, busy * now)
 
     return at
 

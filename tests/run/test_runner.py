@@ -190,7 +190,7 @@ def crowded(logged: Scene) -> Scene:
         log.write_text(f"attempt {attempt}")
         now = asyncio.get_running_loop().time
         begins.append((now(), logged.backends.now))
-        return ScriptedBackend(tested, drives(1.0, FAILED), loads=BUSY if attempt == 1 else load(0.0, app=(0.2, 0.0)))
+        return ScriptedBackend(tested, drives(1.0, FAILED), uses=BUSY if attempt == 1 else load(0.0, app=(0.2, 0.0)))
 
     begins = logged.begins
     logged.backends.make = make
@@ -214,7 +214,7 @@ def test_what_a_busy_machine_left_undecided_is_tried_again_alone(crowded: Scene)
 
 
 def always_too_busy(tested: Plan, _: int) -> ScriptedBackend:
-    return ScriptedBackend(tested, drives(1.0, FAILED), loads=BUSY)
+    return ScriptedBackend(tested, drives(1.0, FAILED), uses=BUSY)
 
 
 @pytest.mark.parametrize("retries", [0, 2])

@@ -74,6 +74,14 @@ def test_own_manifests_beside_the_shipped_ones(tmp_path: Path) -> None:
     assert manifests["collision"].folder.parent == package_data.services()
 
 
+def test_what_ships_is_sound_and_named_as_its_folder() -> None:
+    """So that it is read without a check, when it is asked for."""
+    for file in package_data.services().glob("*/service.yml"):
+        manifest, problems = load_manifest(file)
+        assert manifest is not None and problems == []
+        assert manifest == load_manifests()[0][file.parent.name.replace("_", "-")]
+
+
 def test_names_that_are_taken(tmp_path: Path) -> None:
     write(tmp_path / "a", "own", OWN.format(name="own"))
     write(tmp_path / "b", "own", OWN.format(name="own"))

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.spec.registry import Location, locate
+from dodo_dsl.spec.deployment import find_deployment
+from dodo_dsl.spec.registry import Location, RegistryError, locate
 
 
 @pytest.fixture
@@ -47,3 +48,11 @@ def test_other_registries_are_roots_only(folder: Path) -> None:
 
 def test_an_empty_registry_is_not_reported(folder: Path) -> None:
     assert locate([folder / "empty"], [folder / "empty"]) == ([], [])
+
+
+@pytest.mark.parametrize("name", ["tests/x/x.dodo.yaml", "dodo.yaml"])
+def test_a_file_of_the_other_suffix_is_refused(name: str, tmp_path: Path) -> None:
+    (tmp_path / "tests" / "x").mkdir(parents=True)
+    (tmp_path / name).touch()
+    with pytest.raises(RegistryError, match=r"is not read: call it '.*[.]yml'"):
+        locate([tmp_path / "tests"], [find_deployment(tmp_path) or tmp_path])

@@ -136,8 +136,6 @@ def _target(path: Path, settings: Settings, ids: Ids) -> Iterator[InputError]:
 
 def _table(path: Path) -> list[InputError]:
     """What is wrong with any table: services that read the same one report it alike."""
-    pass
-
     problem = problem_in_table(path)
     return [] if problem is None else [problem]
 
@@ -223,7 +221,7 @@ def _column(path: Path, line: int, what: str) -> int:
     if not line or quoted is None:
         return 1
     try:
-        lines = regular_file.text(path, encoding="utf-8-sig").splitlines()
+        lines = regular_file.text(path).splitlines()
     except (OSError, ValueError):
         return 1
     return lines[line - 1].find(quoted[1]) + 1 or 1 if line <= len(lines) else 1
@@ -239,7 +237,7 @@ Row = tuple[int, str, list[str]]
 def problem_in_table(path: Path) -> InputError | None:
     """The first problem of a CSV table; None if each reader has to say what is wrong, and for what is not text."""
     try:
-        rows = list(_rows(regular_file.text(path, encoding="utf-8-sig")))
+        rows = list(_rows(regular_file.text(path)))
     except (OSError, ValueError, csv.Error):
         return None
     if not rows:

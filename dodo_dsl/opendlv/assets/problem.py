@@ -40,7 +40,7 @@ class InputError(ValueError):
         """Line and column in the file, from 1; the file is read again for a position in JSON."""
         if self.where and not self._line:
             try:
-                text = regular_file.text(self.file, encoding="utf-8-sig")
+                text = regular_file.text(self.file)
                 return json_position(text, self.where, self._is_of_key)
             except (OSError, ValueError, RecursionError):
                 return 1, 1

@@ -19,8 +19,7 @@ MOST_BYTES = 64 << 20
 SMALL_BYTES = 16 << 20
 """Of a recording that is looked through even when what is needed has been found: it may be cut."""
 _BUFFER = 1 << 16
-_TYPE_FIELD, _PAYLOAD_FIELD, _STAMP_FIELD = 1, 2, 6
-_WIDTH_FIELD, _HEIGHT_FIELD = 2, 3
+_TYPE_FIELD, _STAMP_FIELD = 1, 6
 _TIMES = (5, 4, 3)
 """Fields of when a message was sampled, received and sent."""
 _FIRST, _OWN = 13, 2900
@@ -55,16 +54,6 @@ def look(path: Path, message: int, sender: int) -> LookedThrough:
                     found.is_whole = found.size > SMALL_BYTES or _end(stream.read()) + found.ends_at == found.size
                     return found
     return found
-
-
-def picture_size(path: Path, message: int, sender: int) -> tuple[int, int]:
-    """Width and height of the first image of a sender, 0 if there is none; raises OSError."""
-    with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
-        for body in _bodies(stream, LookedThrough(0)):
-            if _type(body) == message and first_number(body, _STAMP_FIELD) == sender:
-                picture = first_message(body, _PAYLOAD_FIELD)
-                return first_number(picture, _WIDTH_FIELD), first_number(picture, _HEIGHT_FIELD)
-    return 0, 0
 
 
 def count(path: Path, message: int, sender: int, most: int) -> int | None:

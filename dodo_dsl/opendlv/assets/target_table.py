@@ -23,7 +23,7 @@ class TargetError(ValueError):
 def read(path: Path, field: str) -> list[tuple[int, float]]:
     """Times in microseconds and values in a table: the column named `field`, or else `value`. Raises TargetError."""
     try:
-        rows = csv.reader(io.StringIO(regular_file.text(path, encoding="utf-8-sig"), newline=""))
+        rows = csv.reader(io.StringIO(regular_file.text(path), newline=""))
         columns = _columns(next(rows, []), field, path)
         samples = list(_samples(rows, columns, path))
     except (OSError, UnicodeError, csv.Error) as error:
@@ -36,7 +36,7 @@ def read(path: Path, field: str) -> list[tuple[int, float]]:
 
 def misspelt(path: Path, field: str) -> Iterator[InputError]:
     """Columns of a table that nothing reads: they are almost spelt like the one of `field`; the table is read."""
-    header = next(csv.reader(io.StringIO(regular_file.text(path, encoding="utf-8-sig"), newline="")), [])
+    header = next(csv.reader(io.StringIO(regular_file.text(path), newline="")), [])
     names = [name.strip() for name in header]
     for close in difflib.get_close_matches(field, names, cutoff=0.75) if field not in names else ():
         if close not in (TIME, VALUE):

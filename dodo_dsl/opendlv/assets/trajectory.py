@@ -164,7 +164,7 @@ def read_table(path: Path, height: float) -> list[PathPoint]:
     with #. Raises TrajectoryError with file and line.
     """
     try:
-        text = regular_file.text(path, encoding="utf-8-sig")
+        text = regular_file.text(path)
     except OSError as error:
         raise TrajectoryError(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:

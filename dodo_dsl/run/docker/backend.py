@@ -21,12 +21,11 @@ from dodo_dsl.run.docker import shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
 from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
-from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerProcesses, ContainerUse
+from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, copy_into
 from dodo_dsl.run.docker.pulls import Pulls, Say
-from dodo_dsl.run.machine_load.service_use import Used
-from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
@@ -48,7 +47,6 @@ class DockerBackend:
     """One test as its own compose project; ``subnets`` are tried in turn until the engine accepts one."""
 
     name = "docker"
-    has_engine = True
     compose_kind: type[Compose] = Compose
 
     def __init__(
@@ -77,7 +75,6 @@ class DockerBackend:
         self._compose = self.compose_kind(plan, folder, report, project, say, channel)
         self._application = tuple(service.name for service in plan.application.services)
         self._containers: dict[str, Any] = {}
-        self._processes = ContainerProcesses({})
         self._use = ContainerUse({})
         self.lines = PrintedLines(plan, folder, lambda text: self._events.put_nowait(Noted(text)))
         """What the application's containers print."""
@@ -133,8 +130,7 @@ class DockerBackend:
 
         try:
             self._containers = await asyncio.to_thread(self._find_containers)
-            self._processes = ContainerProcesses(self._containers)
-            self._use = ContainerUse({name: c for name, c in self._containers.items() if name in self._application})
+            self._use = ContainerUse(self._containers, self._application)
             self._require_health()
             await asyncio.to_thread(self._watch.begin, self._client, self.project)
             for name in (SANDBOX, FILES):
@@ -357,7 +353,7 @@ class DockerBackend:
         return await self._events.get()
 
     async def listeners(self) -> Collection[str] | None:
-        return await asyncio.to_thread(self._processes.listeners, self._application, self.cid)
+        return await asyncio.to_thread(self._use.listeners, self._application, self.cid)
 
     async def require_own_host(self) -> None:
         """Raises BackendError where the test is on the network of a host that is not this machine.
@@ -375,14 +371,11 @@ class DockerBackend:
         assert self._relay is not None, "the application was started"
         self._relay.send(begin_frame(self.plan.seed), hearers(self.plan))
 
-    async def load(self) -> Snapshot | None:
-        return await asyncio.to_thread(self._processes.load)
-
-    async def use(self) -> Mapping[str, Used] | None:
+    async def use(self) -> Snapshot | None:
         return await asyncio.to_thread(self._use.take)
 
     async def application(self) -> Collection[int] | None:
-        return await asyncio.to_thread(self._processes.first, self._application)
+        return await asyncio.to_thread(self._use.first, self._application)
 
     async def close(self, keep: bool) -> list[str]:
         self._is_closing = True

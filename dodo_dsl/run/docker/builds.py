@@ -14,8 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.interpolation import filled
+from dodo_dsl.application.interpolation import escaped, filled
 from dodo_dsl.run.docker.mounts import whole
 
 REPOSITORY = "dodo-build"

@@ -17,9 +17,8 @@ from typing import Any
 
 from dodo_dsl import advice, atomic
 from dodo_dsl.application import secret_variables
-from dodo_dsl.application.compose_paths import escaped
-from dodo_dsl.application.host_paths import holds_port, is_port, is_rule_for_port
-from dodo_dsl.application.interpolation import EnvironmentProblem, interpolate
+from dodo_dsl.application.host_paths import is_port
+from dodo_dsl.application.interpolation import EnvironmentProblem, escaped, interpolate
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.containers import CHANNEL
 from dodo_dsl.emit.output_folder import PLAN_FILE
@@ -113,12 +112,12 @@ class Compose:
                     raise BackendError(f"{what} lies where tests, their output or .git are kept")
         ports = tuple(known_ports(self.plan))
         for name, mounted in self._binds.items():
-            service = self.services.get(name, {})
-            devices = [str(d["source"] if isinstance(d, dict) else d) for d in service.get("devices") or ()]
-            if (
-                any(holds_port(whole(device.partition(":")[0], self.folder), ports) for device in devices)
-                or any(is_port(bind.source, ports) for bind in mounted)
-                or any(is_rule_for_port(rule, ports) for rule in service.get("device_cgroup_rules") or ())
+            devices = self.services.get(name, {}).get("devices") or ()
+            paths = [
+                whole(str(d["source"] if isinstance(d, dict) else d).partition(":")[0], self.folder) for d in devices
+            ]
+            if any(is_port(path, ports, within=True) for path in paths) or any(
+                is_port(bind.source, ports) for bind in mounted
             ):
                 raise BackendError(f"service '{name}' may not have the port of a rig, which only its service opens")
             for bind in mounted:

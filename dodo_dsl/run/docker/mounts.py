@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.application.compose_paths import is_path
 from dodo_dsl.application.host_paths import HostPaths
+from dodo_dsl.application.merge import is_path
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ application's use of processors and memory become checks where the test asks for
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 from dodo_dsl.outcome import (
     MEMORY_GROWTH,
@@ -41,16 +40,8 @@ TIMED_WAY_OUT = (
 )
 
 
-@dataclass(frozen=True)
-class FindingUnderLoad:
-    """A finding, and the load with which it was made."""
-
-    finding: Finding
-    load: MachineLoad | None
-
-
-def consider(finding: Finding, load: MachineLoad | None, is_timed: bool = False) -> FindingUnderLoad:
-    """An error in place of a failure that may be due to a busy machine; anything else as it is.
+def consider(finding: Finding, load: MachineLoad | None, is_timed: bool = False) -> tuple[Finding, MachineLoad | None]:
+    """An error in place of a failure that may be due to a busy machine; anything else as it is. The load says so, too.
 
     ``is_timed`` means that the application acts by its own clock, so that lockstep does not help.
 
@@ -64,10 +55,10 @@ def consider(finding: Finding, load: MachineLoad | None, is_timed: bool = False)
     to be late at all is another machine than the rig, whatever else was measured.
     """
     if load is None or finding.result != "failed" or not finding.is_verdict or not (why := too_busy(load)):
-        return FindingUnderLoad(finding, load)
+        return finding, load
     found = finding.reason if len(finding.reason) <= _MAX_FOUND else f"{finding.reason[:_MAX_FOUND]}..."
     reason = f"the machine was too busy to judge: {why}; it found: {found}; {TIMED_WAY_OUT if is_timed else WAY_OUT}"
-    return FindingUnderLoad(replace(finding, result="error", reason=reason), replace(load, undecided=True))
+    return replace(finding, result="error", reason=reason), replace(load, undecided=True)
 
 
 def too_busy(load: MachineLoad) -> str:
@@ -94,15 +85,19 @@ def too_busy(load: MachineLoad) -> str:
 
 
 UNSEEN = "the limit of the time of an answer is not judged, because what containers wait for a processor cannot be seen"
+UNTIMED = "the time of answers is not judged, as with clock virtual computing takes no test time"
+UNSEEN_USE = (
+    "the limits of processor time and memory are not judged, because what the application uses cannot be measured here"
+)
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
 MOST_SURPLUS_FRAMES = 0.1
 """Share of frames that may have surplus answers before a note says so."""
 MOST_PERIODS = 10
 """The periods of frames that one answer may take before a note says so."""
-
-_Judged = tuple[str, dict[str, Any]]
-"""Why the application failed, or an empty text; and the check."""
+SOON_S = 600.0
+"""Memory that would reach its limit within this time, by the test's own, is worth a note."""
+_MB, _MINUTE_S = 1e6, 60.0
 
 
 @dataclass(frozen=True)
@@ -113,60 +108,52 @@ class JudgedFigures:
     checks: tuple[Check, ...] = ()
     notes: tuple[str, ...] = ()
 
+    def judged(
+        self, name: str, value: float, most: float, reason: str, service: str, unit: str = "", digits: int | None = None
+    ) -> "JudgedFigures":
+        """With a check of a value, which is shown with some digits, and with a finding if it is above the limit."""
+        shown = value if digits is None else round(value, digits)
+        check = {"name": name, "value": shown, "limit": {"max": most}, "unit": unit, "ok": value <= most}
+        findings = () if value <= most else (Finding("failed", reason, service),)
+        return replace(self, findings=self.findings + findings, checks=(*self.checks, with_margin(check)))
 
-UNTIMED = "the time of answers is not judged, as with clock virtual computing takes no test time"
+    def noted(self, *notes: str) -> "JudgedFigures":
+        """With those notes that are not empty."""
+        return replace(self, notes=(*self.notes, *filter(None, notes)))
 
 
 def judged_response(
     response: Response | None, lockstep: Lockstep | None, services: Sequence[str], timed: Sequence[str] = ()
 ) -> JudgedFigures:
     """Judges the answers by the limits of the test; ``services`` are the application's, ``timed`` those with timers."""
+    judged, who = JudgedFigures(), services[0] if services else ""
     if response is None or lockstep is None:
-        return JudgedFigures()
-    every = [*_times(response, lockstep), *_copies(response, lockstep)]
-    who = services[0] if services else ""
-    findings = tuple(Finding("failed", reason, who) for reason, _ in every if reason)
-    return JudgedFigures(
-        findings, tuple(with_margin(check) for _, check in every), tuple(_notes(response, lockstep, timed))
-    )
+        return judged
+    answers, over, allowed = response.answers, response.over, lockstep.response_over
+    is_seen = response.processor_median_s is not None  # else what a busy machine kept from it is among these times
+    if lockstep.max_response_s is not None and over is not None and is_seen:
+        limit = f"{lockstep.max_response_s * 1000:g} ms (at most {allowed * 100:g} %)"
+        reason = f"{over} of {answers} answers took longer than {limit}: {response.in_words()}"
+        judged = judged.judged(SLOW_ANSWERS, over / answers, allowed, reason, who)
+    if lockstep.is_copied:
+        reason = f"{response.uncopied} of {answers} answers did not carry the sample time of their frame"
+        judged = judged.judged(SAMPLE_TIMES, response.uncopied, 0, reason, who)
+    return judged.noted(*_notes(response, lockstep, timed, is_seen))
 
 
-def _times(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
-    if lockstep.max_response_s is None or response.over is None:
-        return
-    share, allowed = response.over / response.answers, lockstep.response_over
-    if response.processor_median_s is None:  # what a busy machine kept from the application is among these times
-        return
-    limit = f"{lockstep.max_response_s * 1000:g} ms (at most {allowed * 100:g} %)"
-    reason = f"{response.over} of {response.answers} answers took longer than {limit}: {response.in_words()}"
-    ok = share <= allowed
-    yield "" if ok else reason, {"name": SLOW_ANSWERS, "value": share, "limit": {"max": allowed}, "unit": "", "ok": ok}
-
-
-def _copies(response: Response, lockstep: Lockstep) -> Iterator[_Judged]:
-    if not lockstep.is_copied:
-        return
-    reason = f"{response.uncopied} of {response.answers} answers did not carry the sample time of their frame"
-    ok = response.uncopied == 0
-    check = {"name": SAMPLE_TIMES, "value": response.uncopied, "limit": {"max": 0}, "unit": "", "ok": ok}
-    yield "" if ok else reason, check
-
-
-def _notes(response: Response, lockstep: Lockstep, timed: Sequence[str]) -> Iterator[str]:
-    if note := own_clock(response, timed):
-        yield note
+def _notes(response: Response, lockstep: Lockstep, timed: Sequence[str], is_seen: bool) -> Iterator[str]:
+    yield own_clock(response, timed)
     if response.slow > MOST_SLOW * response.answers:
         slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
         yield f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
     if response.worst_s > MOST_PERIODS * response.period_s:
         which = f" to frame {response.worst_frame}" if response.worst_frame else ""
-        waits = " with what it waited for a processor" if response.processor_median_s is None else ""
+        waits = "" if is_seen else " with what it waited for a processor"
         frames = f"{response.worst_s / response.period_s:.0f} frames, which outside lockstep would not have waited"
         yield f"the answer{which} took {response.worst_s:.3g} s{waits}, as long as {frames}"
     if lockstep.max_response_s is not None and response.over is None:
         yield UNTIMED
-    is_unseen = response.processor_median_s is None and response.over is not None
-    if is_unseen and (response.over or 0) > lockstep.response_over * response.answers:
+    if not is_seen and (response.over or 0) > lockstep.response_over * response.answers:
         yield UNSEEN
 
 
@@ -192,76 +179,30 @@ def own_clock(response: Response, timed: Sequence[str] = ()) -> str:
     return f"{counts[0]}: the first answer to a frame counts, and the others are dropped"
 
 
-SOON_S = 600.0
-"""Memory that would reach its limit within this time, by the test's own, is worth a note."""
-UNSEEN_USE = (
-    "the limits of processor time and memory are not judged, because what the application uses cannot be measured here"
-)
-_MB, _MINUTE_S = 1e6, 60.0
-
-
-class _Measure(NamedTuple):
-    """A figure of a service with its limit; ``words`` say what it is, for a sentence."""
-
-    check: str
-    value: float | None
-    limit: float | None
-    unit: str
-    words: str
-
-
 def judged_use(uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> JudgedFigures:
     """Judges what each service used by the limits of the test; its growth is noted whatever these are."""
-    notes = [note for use in uses if (note := _growth_note(use))]
+    judged = JudgedFigures().noted(*map(_growth_note, uses))
     if limits is None:
-        return JudgedFigures(notes=tuple(notes))
-    findings, checks = [], []
+        return judged
     for use in uses:
-        for measure in _measures(use, limits):
-            if measure.limit is None:
+        growth = use.memory_growth_bytes_per_s
+        rate = None if growth is None else growth * _MINUTE_S / _MB
+        for name, value, most, unit, words in (
+            (PEAK_MEMORY, use.peak_memory_bytes / _MB, limits.max_memory_mb, "MB", "used {:,.4g} MB of memory"),
+            (MEMORY_GROWTH, rate, limits.max_memory_growth, "MB/min", "grew by {:,.4g} MB/min in memory"),
+            (PROCESSOR_TIME, use.processor_s, limits.max_processor_time_s, "s", "took {:.2f} s of processor time"),
+            (PROCESSOR_SHARE, use.processor_share, limits.max_processor_share, "", "took {:.0f} % of a processor"),
+        ):
+            if most is None:
                 continue
-            if measure.value is None:
-                notes.append(
-                    f"{measure.check} of service '{use.service}' is not judged: the test was too short to measure it"
-                )
+            if value is None:
+                short = "is not judged: the test was too short to measure it"
+                judged = judged.noted(f"{name} of service '{use.service}' {short}")
                 continue
-            ok = measure.value <= measure.limit
-            checks.append(_check(use, measure, ok))
-            if not ok:
-                reason = f"application service '{use.service}' {measure.words}, at most {_text(measure.limit, measure)}"
-                findings.append(Finding("failed", reason, use.service))
-    if not uses:
-        notes.append(UNSEEN_USE)
-    return JudgedFigures(tuple(findings), tuple(checks), tuple(notes))
-
-
-def _measures(use: ServiceUse, limits: ResourceLimits) -> Iterator[_Measure]:
-    peak, growth = use.peak_memory_bytes / _MB, use.memory_growth_bytes_per_s
-    rate = None if growth is None else growth * _MINUTE_S / _MB
-    share = use.processor_share
-    yield _Measure(PEAK_MEMORY, peak, limits.max_memory_mb, "MB", f"used {peak:,.4g} MB of memory")
-    yield _Measure(
-        MEMORY_GROWTH, rate, limits.max_memory_growth, "MB/min", f"grew by {rate or 0.0:,.4g} MB/min in memory"
-    )
-    yield _Measure(
-        PROCESSOR_TIME,
-        use.processor_s,
-        limits.max_processor_time_s,
-        "s",
-        f"took {use.processor_s:.2f} s of processor time",
-    )
-    yield _Measure(
-        PROCESSOR_SHARE, share, limits.max_processor_share, "", f"took {(share or 0.0) * 100:.0f} % of a processor"
-    )
-
-
-def _check(use: ServiceUse, measure: _Measure, ok: bool) -> Check:
-    name, value = f"{measure.check}-{use.service}", round(measure.value or 0.0, 3)
-    return with_margin({"name": name, "value": value, "limit": {"max": measure.limit}, "unit": measure.unit, "ok": ok})
-
-
-def _text(limit: float, measure: _Measure) -> str:
-    return f"{limit:,.6g} {measure.unit}" if measure.unit else f"{limit * 100:g} %"
+            at_most = f"at most {most:,.6g} {unit}" if unit else f"at most {most * 100:g} %"
+            reason = f"application service '{use.service}' {words.format(value if unit else 100 * value)}, {at_most}"
+            judged = judged.judged(f"{name}-{use.service}", value, most, reason, use.service, unit, digits=3)
+    return judged.noted("" if uses else UNSEEN_USE)
 
 
 def _growth_note(use: ServiceUse) -> str:

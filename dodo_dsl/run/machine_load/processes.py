@@ -1,66 +1,123 @@
-"""Processes by ``/proc``: which descend from which, their memory, and their processor time and run delay by service.
+"""Processes by ``/proc``: which descend from which, their processor time, and their memory.
 
 Memory is measured without cgroups, which not every machine has. Programs and files that are only read do not count.
 Files in memory that only a descriptor holds (memfd_create(2)), and System V memories that processes are attached to,
 count as shared memory that is mapped does; the larger of both. System V memories to which no process is attached count
-in addition. Time is by thread, added up by service.
+in addition.
 """
 
 import contextlib
 import os
-from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-
-def parents(proc: Path = Path("/proc")) -> Iterator[tuple[int, int]]:
-    """The pids of every process that is not a zombie and of its parent."""
-    for entry in proc.iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(OSError):
-                fields = (entry / "stat").read_text(errors="replace").rpartition(")")[2].split()
-                if fields[0] != "Z":
-                    yield int(entry.name), int(fields[1])
-
-
-def owners(services: Mapping[int, str], proc: Path = Path("/proc")) -> Iterator[tuple[int, str]]:
-    """The pids of the processes of ``services``, which are pids and names, and of what they started, with the name."""
-    known = dict(parents(proc))
-    for pid in known:
-        ancestor = pid
-        while ancestor in known and ancestor not in services:
-            ancestor = known[ancestor]
-        if ancestor in services:
-            yield pid, services[ancestor]
-
-
 PROC = Path("/proc")
-_RESIDENT = (b"RssAnon:", b"RssShmem:")
-_PROPORTIONAL = (b"Pss_Anon:", b"Pss_Shmem:")
+_STATE, _PARENT, _SESSION, _TIMES, _START = 0, 1, 3, slice(11, 15), 19
+"""Fields of ``/proc/PID/stat`` (proc_pid_stat(5)) behind the program's name; times are those of it and its children."""
+_ANONYMOUS = re.compile(rb"^(?:RssAnon|Pss_Anon):\s*(\d+)", re.MULTILINE)
+_SHARED = re.compile(rb"^(?:RssShmem|Pss_Shmem):\s*(\d+)", re.MULTILINE)
+"""Rows of ``/proc/PID/status``, and of ``smaps_rollup``, where what processes share counts in parts."""
+_SMALL = 4 << 20
+"""Bytes up to which it does not matter how much of their memory processes share."""
 _MEMFD = "/memfd:"
 _BLOCK = 512
+_TRIES = 3
 
 
-class SegmentUse(NamedTuple):
-    """A System V memory; ``creator`` is the process that made it, 0 for one of another namespace."""
+class Process(NamedTuple):
+    """``ticks`` on processors are also those of the children that it waited for.
 
-    creator: int
-    size: int
-    is_attached: bool
+    ``start`` in ticks since the machine started distinguishes it from a later one with its number.
+    """
 
-
-def resident(pid: int, proc: Path = PROC) -> tuple[int, int]:
-    """Bytes of anonymous and of shared memory: quick to read, but what processes share counts in each of them."""
-    return _rows(f"{proc}/{pid}/status", _RESIDENT)
-
-
-def proportional(pid: int, proc: Path = PROC) -> tuple[int, int]:
-    """The same with the process's part of what it shares (proc_pid_smaps(5)); the kernel looks at every page for it."""
-    return _rows(f"{proc}/{pid}/smaps_rollup", _PROPORTIONAL)
+    parent: int
+    session: int
+    start: int
+    ticks: int
+    is_zombie: bool
 
 
-def held(pids: Iterable[int], proc: Path = PROC) -> int:
+def table(proc: Path = PROC, counted: Collection[int] = ()) -> dict[int, Process]:
+    """Every process.
+
+    A process that is waited for is in its parent's time from then on: if one of those that are ``counted`` ends as they
+    are read, all are read again.
+    """
+    for _ in range(_TRIES):
+        pids = [int(entry.name) for entry in proc.iterdir() if entry.name.isdigit()]  # all before the first is read
+        found = {pid: process for pid in pids if (process := _process(pid, proc))}
+        if found.keys() >= {*counted} & {*pids}:
+            break
+    return found
+
+
+def _process(pid: int, proc: Path) -> Process | None:
+    try:
+        words = (proc / str(pid) / "stat").read_bytes().rpartition(b")")[2].split()
+    except OSError:  # it has ended meanwhile
+        return None
+    parent, session, start = (int(words[place]) for place in (_PARENT, _SESSION, _START))
+    return Process(parent, session, start, sum(map(int, words[_TIMES])), words[_STATE] == b"Z")
+
+
+def living(proc: Path = PROC) -> dict[int, Process]:
+    """Every process that is not a zombie."""
+    return {pid: process for pid, process in table(proc).items() if not process.is_zombie}
+
+
+def owners(services: Mapping[int, str], known: Mapping[int, Process]) -> dict[int, str]:
+    """The processes of ``services``, which are pids and names, and what they started, with the name.
+
+    A name ``''`` is for what descends from a process and belongs to no other service, also not by its session.
+    """
+    found = {}
+    for pid, process in known.items():
+        ancestor = pid
+        while ancestor in known and ancestor not in services:
+            ancestor = known[ancestor].parent
+        if (name := services.get(ancestor)) is not None:
+            found[pid] = name or services.get(process.session, "")
+    return found
+
+
+def above(limits: Mapping[str, int], services: Mapping[int, str], proc: Path = PROC) -> dict[str, int]:
+    """Bytes of memory of the services that use more than their limits, by name; see ``owners``."""
+    found, memories, owned = {}, segments(proc), owners(services, living(proc))
+    for name, most in limits.items():
+        pids = [pid for pid, owner in owned.items() if owner == name]
+        if memory(pids, memories, proc) > most and (size := memory(pids, memories, proc, is_exact=True)) > most:
+            found[name] = size
+    return found
+
+
+def memory(pids: Collection[int], segments: Iterable["Segment"], proc: Path = PROC, is_exact: bool = False) -> int:
+    """Bytes that processes use together. With ``is_exact``, what they share counts once, if this user may know it.
+
+    That takes long, as the kernel looks at every page for it.
+    """
+    sizes = [_sizes(f"{proc}/{pid}/status") or (0, 0) for pid in pids]
+    if is_exact and sum(map(sum, sizes)) - max(map(sum, sizes), default=0) > _SMALL:
+        sizes = [_sizes(f"{proc}/{pid}/smaps_rollup") or size for pid, size in zip(pids, sizes, strict=True)]
+    anonymous, shared = (sum(size[part] for size in sizes) for part in (0, 1))
+    attached, detached = _of_service(segments, pids, proc)
+    return anonymous + max(shared, _held(pids, proc) + attached) + detached
+
+
+def _sizes(path: str) -> tuple[int, int] | None:
+    """Bytes of anonymous and of shared memory, 0 of a process that has ended; None if this user may not read them."""
+    try:
+        text = Path(path).read_bytes()
+    except PermissionError:
+        return None
+    except OSError:
+        return 0, 0
+    anonymous, shared = (sum(map(int, rows.findall(text))) * 1024 for rows in (_ANONYMOUS, _SHARED))
+    return anonymous, shared
+
+
+def _held(pids: Iterable[int], proc: Path) -> int:
     """Bytes of the files in memory of which these processes have descriptors, each once."""
     sizes: dict[tuple[int, int], int] = {}
     for pid in pids:
@@ -73,17 +130,24 @@ def held(pids: Iterable[int], proc: Path = PROC) -> int:
     return sum(sizes.values())
 
 
-def segments(proc: Path = PROC) -> list[SegmentUse]:
+class Segment(NamedTuple):
+    """A System V memory; ``creator`` is the process that made it, 0 for one of another namespace."""
+
+    creator: int
+    size: int
+    is_attached: bool
+
+
+def segments(proc: Path = PROC) -> list[Segment]:
     """The System V memories of this process's IPC namespace, with bytes in memory and swap (proc_pid_sysvipc(5))."""
     with contextlib.suppress(OSError):
-        with open(f"{proc}/sysvipc/shm", "rb", buffering=0) as file:  # noqa: PTH123
-            names, *rows = [line.split() for line in file.readall().splitlines()]
-        creator, attached, resident_, swapped = (names.index(name) for name in (b"cpid", b"nattch", b"rss", b"swap"))
-        return [SegmentUse(int(r[creator]), int(r[resident_]) + int(r[swapped]), int(r[attached]) > 0) for r in rows]
+        names, *rows = map(str.split, (proc / "sysvipc" / "shm").read_text().splitlines())
+        creator, attached, resident, swapped = (names.index(name) for name in ("cpid", "nattch", "rss", "swap"))
+        return [Segment(int(r[creator]), int(r[resident]) + int(r[swapped]), int(r[attached]) > 0) for r in rows]
     return []
 
 
-def of_service(found: Iterable[SegmentUse], pids: Collection[int], proc: Path = PROC) -> tuple[int, int]:
+def _of_service(found: Iterable[Segment], pids: Collection[int], proc: Path) -> tuple[int, int]:
     """Bytes of System V memories of a service: those with processes attached, and others.
 
     They are of the service whose process created them. Where the creator has ended, they are of every service, if this
@@ -91,137 +155,7 @@ def of_service(found: Iterable[SegmentUse], pids: Collection[int], proc: Path = 
     """
     attached = detached = 0
     for creator, size, is_attached in found:
-        is_orphan = creator > 0 and os.getpid() == 1 and not os.path.exists(f"{proc}/{creator}")  # noqa: PTH110
+        is_orphan = creator > 0 and os.getpid() == 1 and not (proc / str(creator)).exists()
         if creator in pids or is_orphan:
             attached, detached = attached + size * is_attached, detached + size * (not is_attached)
     return attached, detached
-
-
-def _rows(path: str, rows: tuple[bytes, bytes]) -> tuple[int, int]:
-    """Two rows of a file, in bytes; nothing of a process that has ended. It is read many times a second."""
-    try:
-        with open(path, "rb", buffering=0) as file:  # noqa: PTH123
-            text = file.read()
-    except OSError:
-        return 0, 0
-    first, second = (_kilobytes(text, row) * 1024 for row in rows)
-    return first, second
-
-
-def _kilobytes(text: bytes, row: bytes) -> int:
-    at = text.find(b"\n" + row)
-    return int(text[at + 1 + len(row) :].split(None, 1)[0]) if at >= 0 else 0
-
-
-_PARENT, _SESSION, _START = 1, 3, 19
-"""Fields of ``/proc/PID/stat`` (proc_pid_stat(5)) behind the program's name."""
-_PER_SECOND = 1e9
-_Key = tuple[str, int, int, int]
-"""A thread: its service, its process, when that was started, and its own number."""
-
-
-class _Process(NamedTuple):
-    parent: int
-    session: int
-    start: int
-    """Ticks since the machine started, which distinguishes a process from a later one with its number."""
-
-
-class _Nanoseconds(NamedTuple):
-    ran: int
-    waited: int
-
-
-class ThreadTimes:
-    """Adds up, from call to call, what the threads of services ran, and how long each service waited.
-
-    A service waits as long as the thread of it that ran the most between two calls, as that does its work: threads that
-    wait side by side do not make its wait longer, and those that only look for something to do cost nothing.
-    """
-
-    def __init__(self, proc: Path = Path("/proc")) -> None:
-        self._proc = proc
-        self._threads: dict[_Key, _Nanoseconds] = {}
-        self._sums: dict[str, _Nanoseconds] = {}
-        self._owners: dict[tuple[int, int], str] = {}
-        """The service of each process that was seen, by process and start: its parents may have ended since."""
-        self.ended = 0
-        """Processes that were seen and have ended since."""
-
-    def add_up(self, services: Mapping[int, str]) -> dict[str, tuple[float, float]] | None:
-        """Seconds on a processor, and ready without one, by service; None if the kernel does not measure them.
-
-        ``services`` are process ids and names. What their processes have started belongs to them, too. A name ``''``
-        is for what descends from a process and belongs to none of the others; the process itself does not count.
-        """
-        processes, before = self._processes(), self._owners
-        self._owners = {
-            (pid, process.start): owner
-            for pid, process in processes.items()
-            if (owner := self._owner(pid, processes, services)) is not None
-        }
-        self.ended += len(before.keys() - self._owners.keys())
-        found: dict[_Key, _Nanoseconds] = {}
-        for (pid, start), owner in self._owners.items():
-            if owner == services.get(pid) == "":
-                continue
-            for thread in self._thread_ids(pid):
-                times = self._read(pid, thread)
-                if times is None:
-                    return None
-                found[owner, pid, start, thread] = times
-        self._add(found)
-        totals = {name: self._sums.get(name, _Nanoseconds(0, 0)) for name in {*services.values(), *self._sums} if name}
-        totals |= self._sums
-        return {name: (ran / _PER_SECOND, waited / _PER_SECOND) for name, (ran, waited) in totals.items()}
-
-    def _add(self, found: Mapping[_Key, _Nanoseconds]) -> None:
-        ran: dict[str, int] = defaultdict(int)
-        busiest: dict[str, _Nanoseconds] = defaultdict(lambda: _Nanoseconds(0, 0))
-        for key, now in found.items():
-            before = self._threads.get(key, _Nanoseconds(0, 0))
-            if now.ran < before.ran or now.waited < before.waited:  # another thread with its number
-                before = _Nanoseconds(0, 0)
-            spent = _Nanoseconds(now.ran - before.ran, now.waited - before.waited)
-            ran[key[0]] += spent.ran
-            busiest[key[0]] = max(busiest[key[0]], spent)
-        for name, nanoseconds in ran.items():
-            total = self._sums.get(name, _Nanoseconds(0, 0))
-            self._sums[name] = _Nanoseconds(total.ran + nanoseconds, total.waited + busiest[name].waited)
-        self._threads = dict(found)
-
-    def _processes(self) -> dict[int, _Process]:
-        found = {}
-        for entry in self._proc.iterdir():
-            if entry.name.isdigit():
-                try:
-                    words = (entry / "stat").read_text(errors="replace").rpartition(")")[2].split()
-                except OSError:  # it has ended meanwhile
-                    continue
-                found[int(entry.name)] = _Process(int(words[_PARENT]), int(words[_SESSION]), int(words[_START]))
-        return found
-
-    def _owner(self, pid: int, processes: Mapping[int, _Process], services: Mapping[int, str]) -> str | None:
-        """The service that a process belongs to: as when it was first seen, by its ancestors, or by its session."""
-        key = pid, processes[pid].start
-        if key in self._owners:
-            return self._owners[key]
-        ancestor, owner = pid, None
-        while ancestor in processes and owner is None:
-            owner, ancestor = services.get(ancestor), processes[ancestor].parent
-        return services.get(processes[pid].session, "") if owner == "" else owner
-
-    def _thread_ids(self, pid: int) -> list[int]:
-        try:
-            return [int(entry.name) for entry in (self._proc / str(pid) / "task").iterdir()]
-        except OSError:  # it has ended meanwhile
-            return []
-
-    def _read(self, pid: int, thread: int) -> _Nanoseconds | None:
-        """The times of a thread, none for one that has ended; None if the kernel does not measure them."""
-        folder = self._proc / str(pid) / "task" / str(thread)
-        try:
-            words = (folder / "schedstat").read_text().split()
-        except OSError:
-            return None if (folder / "stat").exists() else _Nanoseconds(0, 0)
-        return _Nanoseconds(int(words[0]), int(words[1]))

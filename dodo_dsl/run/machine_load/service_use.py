@@ -1,277 +1,150 @@
-"""What services use so far, with all their processes: by ``/proc``, or of a container by its control group.
-
-The kernel counts for control groups of versions 1 and 2.
-"""
+"""What the services of a test use so far, and how long they wait for a processor, with all their processes."""
 
 import contextlib
 import os
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from dodo_dsl.run.machine_load.processes import PROC, held, of_service, proportional, resident, segments
+from dodo_dsl.run.machine_load.processes import PROC, Segment, memory, owners, segments, table
 
-_STATE, _PARENT, _TIMES = 0, 1, slice(11, 15)
-"""Fields of ``/proc/PID/stat`` (proc_pid_stat(5)) behind the program's name; times are those of it and its children."""
+_BUSY = (0, 1, 2, 5, 6, 7)
+"""Columns of ``/proc/stat`` (proc_stat(5)) in which a core is not free; that of guests is part of the user's."""
 _TICKS = os.sysconf("SC_CLK_TCK")
-_LOOK_S = 0.25
-"""After how long at least new processes, and files in memory, are looked for again."""
-_SMALL = 4 << 20
-"""Bytes up to which it does not matter how much of a process's memory others share."""
-_TIMES_COST = 100
-"""How many times as long as a look took, or to find out what processes share, that is taken to be so."""
-_TRIES = 3
+_NANOSECONDS = 1e-9
+_SHARED_S, _TIMES_COST = 0.25, 100
+"""For how long, and how many times as long as it took to find it out, what processes share is taken to be so."""
 
 
 class Used(NamedTuple):
-    """Seconds on processors since a service began, and bytes of memory now; ``limit`` in bytes, 0 for none.
+    """Seconds on processors and ready to run without one since a service began, and bytes of memory now.
 
-    A service that has ended has no memory.
+    ``limit`` of memory in bytes, 0 for none. A service that has ended has no memory.
     """
 
-    processor_s: float
-    memory: int
+    processor_s: float = 0.0
+    waited_s: float = 0.0
+    memory: int = 0
     limit: int = 0
 
 
-class _Process(NamedTuple):
-    parent: int
-    ticks: int
-    """On processors, with those of its children that it waited for."""
-    is_zombie: bool
+@dataclass(frozen=True)
+class Snapshot:
+    """What the ``services`` of a test used so far; ``at_s`` by the monotonic clock.
 
+    The service ``''`` is for processes that belong to none. ``busy_s`` is how long the ``cores`` that the test may use
+    were busy with any process, None where the kernel does not say, or not who waits. ``changes`` is another number when
+    processes or threads began or processes ended, whose time may be in no service's account.
+    """
 
-class _Sharing(NamedTuple):
-    """Which part of the memory of some processes counts, because it is partly the same, and until when."""
-
-    part: float
-    among: Set[int]
-    until_s: float
+    at_s: float
+    services: Mapping[str, Used]
+    cores: int = 0
+    busy_s: float | None = None
+    changes: int = 0
 
 
 class UseReader:
-    """Measures from call to call. ``take`` costs a tenth of a millisecond a service; use it from one thread."""
+    """Measures from call to call, by one thread."""
 
     def __init__(self, proc: Path = PROC) -> None:
+        self.sized: set[str] = set()
+        """The services of which memory is measured, too."""
         self._proc = proc
-        self._look_at_s = float("-inf")
-        self._pids: dict[str, list[int]] = {}
-        self._held: dict[str, int] = {}
-        self._detached: dict[str, int] = {}
-        self._sharing: dict[str, _Sharing] = defaultdict(lambda: _Sharing(1.0, frozenset(), float("-inf")))
+        self._pids: dict[str, list[int]] = defaultdict(list)
         self._ticks: dict[str, int] = defaultdict(int)
         """What the processes said at last, and what is to be added, as some ended for which nobody waited."""
         self._lost: dict[str, int] = defaultdict(int)
+        self._threads: dict[tuple[int, int, str], tuple[int, int]] = {}
+        """Nanoseconds that each thread ran and waited, by its process, when that was started, and its own number."""
+        self._waited: dict[str, int] = defaultdict(int)
+        self._shared: dict[str, tuple[Sequence[int], float, float]] = {}
+        """Which part of the memory of some processes counts, and until when that is taken to be so."""
+        self._ended = 0
+        """Processes that were seen and have ended since."""
 
-    def take(self, services: Mapping[int, str]) -> dict[str, Used]:
-        """What services use, by name; ``services`` are the ids of their first processes, and names."""
-        now = time.monotonic()
-        if now >= self._look_at_s:
-            self._look(services)
-        found: dict[str, Used] = {}
-        for pid, name in services.items():
-            self._add_children(name)
-            alive = self._count(pid, name, services)
+    def take(self, services: Mapping[int, str]) -> Snapshot:
+        """What ``services`` use, which are the ids of their first processes, and names; that of ``''`` is not counted.
+
+        Time of processes that ended counts as far as it was seen, or as another one waited for them.
+        """
+        before = {pid for pids in self._pids.values() for pid in pids}
+        known, self._pids = table(self._proc, before), defaultdict(list)
+        owned = {pid: name for pid, name in owners(services, known).items() if name or services.get(pid) != ""}
+        for pid, name in owned.items():
+            self._pids[name].append(pid)
+        self._ended += len(before - owned.keys())
+        for name in {*filter(None, services.values()), *self._ticks, *self._pids}:
+            ticks = sum(known[pid].ticks for pid in self._pids[name])
+            self._lost[name] += max(self._ticks[name] - ticks, 0)
+            self._ticks[name] = ticks
+        self._add_waits({pid: (name, known[pid].start) for pid, name in owned.items()})
+        cores, memories = os.sched_getaffinity(0), segments(self._proc) if self.sized else []
+        found = {}
+        for name in self._ticks:
+            living = [pid for pid in self._pids[name] if not known[pid].is_zombie]
+            size = self._memory(name, living, memories) if living and name in self.sized else 0
             ticks = self._ticks[name] + self._lost[name]
-            found[name] = Used(ticks / _TICKS, self._memory(name, alive, now) if alive else 0)
-        return found
+            found[name] = Used(ticks / _TICKS, self._waited[name] * _NANOSECONDS, size)
+        return Snapshot(time.monotonic(), found, len(cores), self._busy_s(cores), self._ended + self._begun())
 
-    def note_end(self, pid: int, name: str) -> None:
-        """Takes the last figures of a service whose first process ended, and has not been waited for."""
-        if (process := self._read(pid)) is not None:
-            self._set(name, process.ticks)
-            self._pids[name] = []
+    def _add_waits(self, owned: Mapping[int, tuple[str, int]]) -> None:
+        """Adds what services waited since the last call, as long as the thread that ran the most, which does the work.
 
-    def _look(self, services: Mapping[int, str]) -> None:
-        """Finds the processes of services, ancestors first."""
-        began = time.thread_time()
-        known = {int(e.name): p for e in self._proc.iterdir() if e.name.isdigit() and (p := self._read(int(e.name)))}
-        found: dict[str, list[tuple[int, int]]] = {name: [] for name in services.values()}
-        for pid in known:
-            ancestor, depth = pid, 0
-            while ancestor in known and ancestor not in services:
-                ancestor, depth = known[ancestor].parent, depth + 1
-            if ancestor in services:
-                found[services[ancestor]].append((depth, pid))
-        self._pids = {name: [pid for _, pid in sorted(pids)] for name, pids in found.items()}
-        memories = segments(self._proc)
-        for name, pids in self._pids.items():
-            attached, self._detached[name] = of_service(memories, pids, self._proc)
-            self._held[name] = held(pids, self._proc) + attached
-        self._look_at_s = time.monotonic() + _patience_s(began)
-
-    def _add_children(self, name: str) -> None:
-        """Adds what known processes have started since the last look, which is cheap to read.
-
-        A sandbox that is just being set up has not started the service yet. Other threads' children wait for the look.
+        Threads that wait side by side do not make the wait longer, and those that only look for something to do cost
+        nothing.
         """
-        pids = self._pids.get(name, [])
-        for pid in pids:  # which grows: children have children
-            with contextlib.suppress(OSError), open(f"{self._proc}/{pid}/task/{pid}/children", "rb") as file:  # noqa: PTH123
-                pids += [child for child in map(int, file.read().split()) if child not in pids]
+        threads, busiest = {}, dict[str, tuple[int, int]]()
+        for pid, (name, start) in owned.items():
+            for thread, now in _threads(self._proc / str(pid) / "task"):
+                key = pid, start, thread
+                ran, waited = self._threads.get(key, (0, 0))
+                spent = now[0] - ran, now[1] - waited
+                busiest[name] = max(busiest.get(name, (0, 0)), spent if min(spent) >= 0 else now)
+                threads[key] = now
+        for name, (_, waited) in busiest.items():
+            self._waited[name] += waited
+        self._threads = threads
 
-    def _count(self, first: int, name: str, services: Mapping[int, str]) -> list[int]:
-        """Adds up the processor time of a service; returns its processes.
-
-        A process that is waited for is in its parent's time from then on, so that one which ends in between would be
-        missed: then all are read again.
-        """
-        for _ in range(_TRIES):
-            read = {pid: self._read(pid) for pid in self._pids.get(name, ())}
-            processes = {pid: process for pid, process in read.items() if process is not None}
-            if len(processes) == len(read):
-                break
-            self._look(services)
-        if first in processes:
-            self._set(name, sum(process.ticks for process in processes.values()))
-        return [pid for pid, process in processes.items() if not process.is_zombie]
-
-    def _set(self, name: str, ticks: int) -> None:
-        self._lost[name] += max(self._ticks[name] - ticks, 0)
-        self._ticks[name] = ticks
-
-    def _memory(self, name: str, pids: Iterable[int], now: float) -> int:
-        """Bytes of all processes; one that began since then counts at the next update."""
-        sizes = {pid: resident(pid, self._proc) for pid in pids}
-        large = {pid for pid, size in sizes.items() if sum(size) > _SMALL}
-        part, detached = 1.0, self._detached.get(name, 0)
-        if len(large) > 1:
-            sharing = self._shared(name, large, sizes, now)
-            known = {pid: size for pid, size in sizes.items() if pid not in large - sharing.among}
-            if not large & sharing.among:
-                return max(map(sum, sizes.values())) + detached
-            part, sizes = sharing.part, known
-        anonymous, shared = (sum(parts) for parts in zip(*sizes.values(), strict=True))
-        return int((anonymous + max(shared, self._held.get(name, 0))) * part) + detached
-
-    def _shared(self, name: str, large: Set[int], sizes: Mapping[int, tuple[int, int]], now: float) -> _Sharing:
-        """Which part of their memory counts, by the kernel's last figures of processes that stayed as they were."""
-        sharing = self._sharing[name]
-        if now >= sharing.until_s:
+    def _memory(self, name: str, pids: Sequence[int], memories: Sequence[Segment]) -> int:
+        """Bytes; which part of it counts, as processes share it, is found out seldom, and when there are others."""
+        size = memory(pids, memories, self._proc)
+        among, part, until_s = self._shared.get(name, ((), 1.0, 0.0))
+        if pids != among or time.monotonic() >= until_s:
             began = time.thread_time()
-            theirs = {pid: sum(proportional(pid, self._proc)) for pid in large}
-            after = {pid: sum(resident(pid, self._proc)) for pid in large}
-            before, every = sum(sum(sizes[pid]) for pid in large), sum(map(sum, sizes.values()))
-            if abs(sum(after.values()) - before) <= _SMALL * len(large):  # else others have now what one gave back
-                is_known = all(theirs[pid] for pid in large if after[pid])  # not readable for everybody
-                part = min(1 - (before - sum(theirs.values())) / every, 1.0) if is_known else 1.0
-                sharing = _Sharing(part, frozenset(large), now)
-            sharing = self._sharing[name] = sharing._replace(until_s=now + _patience_s(began))
-        return sharing
+            part = min(memory(pids, memories, self._proc, is_exact=True) / max(size, 1), 1.0)
+            until_s = time.monotonic() + max(_TIMES_COST * (time.thread_time() - began), _SHARED_S)
+            self._shared[name] = pids, part, until_s
+        return int(size * part)
 
-    def _read(self, pid: int) -> _Process | None:
+    def _busy_s(self, cores: Collection[int]) -> float | None:
         try:
-            with open(f"{self._proc}/{pid}/stat", "rb", buffering=0) as file:  # noqa: PTH123
-                words = file.read().rpartition(b")")[2].split()
+            (self._proc / "self" / "schedstat").stat()
+            return busy_s((self._proc / "stat").read_text(), cores)
         except OSError:
             return None
-        return _Process(int(words[_PARENT]), sum(map(int, words[_TIMES])), words[_STATE] == b"Z")
+
+    def _begun(self) -> int:
+        """The last number of a process or thread in this process's own namespace; 0 elsewhere, as others begin too."""
+        return int((self._proc / "loadavg").read_text().split()[-1]) if os.getpid() == 1 else 0
 
 
-def _patience_s(began: float) -> float:
-    """Seconds to the next time for what began at a processor time of this thread, so that it takes little of it."""
-    return max(_TIMES_COST * (time.thread_time() - began), _LOOK_S)
+def _threads(folder: Path) -> Iterable[tuple[str, tuple[int, int]]]:
+    """The threads of a process, with the nanoseconds that each ran and waited, if the kernel counts them."""
+    with contextlib.suppress(OSError):  # it has ended meanwhile
+        for thread in folder.iterdir():
+            with contextlib.suppress(OSError):
+                ran, waited = map(int, (thread / "schedstat").read_bytes().split()[:2])
+                yield thread.name, (ran, waited)
 
 
-_NANOSECONDS, _MICROSECONDS = 1e-9, 1e-6
-_MOST = 4096
-_OF_1 = ("total_rss", "total_shmem")
-_OF_2 = ("anon", "shmem")
-"""Anonymous and shared memory in ``memory.stat``; copies of files do not count, which the kernel drops when it must."""
-
-
-@dataclass(frozen=True)
-class ControlGroup:
-    """The files with memory and processor time; ``tick_s`` is the unit of the latter."""
-
-    memory: Path
-    processor: Path
-    tick_s: float
-
-    def used(self) -> Used | None:
-        """What was used so far; None if the kernel does not report it, or when the group is gone."""
-        try:
-            memory = memory_of(numbers(self.memory.read_text()))
-            text = self.processor.read_text()
-        except (OSError, ValueError):
-            return None
-        ticks = numbers(text).get("usage_usec") if " " in text else int(text)
-        return None if memory is None or ticks is None else Used(ticks * self.tick_s, memory)
-
-
-def processor_s(descriptor: int) -> float | None:
-    """Seconds by an open ``cpuacct.usage`` or ``cpu.stat``; None if the kernel does not report it."""
-    try:
-        text = os.pread(descriptor, _MOST, 0).decode()
-        ticks = numbers(text).get("usage_usec") if " " in text else int(text)
-    except (OSError, ValueError):
+def busy_s(text: str, cores: Iterable[int]) -> float | None:
+    """Seconds for which ``cores`` were busy, by the text of ``/proc/stat``; None when it has nothing of one."""
+    rows = {words[0]: words[1:] for words in map(str.split, text.splitlines()) if words}
+    own = [rows.get(f"cpu{core}", []) for core in cores]
+    if any(len(row) <= max(_BUSY) for row in own):
         return None
-    return None if ticks is None else ticks * (_MICROSECONDS if " " in text else _NANOSECONDS)
-
-
-def of_process(pid: int, proc: Path = Path("/proc")) -> ControlGroup | None:
-    """The control group of a process; None if it has none that counts both, as without the controller of memory."""
-    try:
-        mounts = (proc / "self" / "mountinfo").read_text()
-        groups = (proc / str(pid) / "cgroup").read_text()
-    except OSError:
-        return None
-    places = _places(mounts, groups)
-    memory, processor = places.get("memory"), places.get("cpuacct")
-    if memory and processor:
-        return ControlGroup(memory / "memory.stat", processor / "cpuacct.usage", _NANOSECONDS)
-    unified = places.get("")
-    if unified and (unified / "memory.stat").is_file():
-        return ControlGroup(unified / "memory.stat", unified / "cpu.stat", _MICROSECONDS)
-    return None
-
-
-def memory_of(stat: Mapping[str, int]) -> int | None:
-    """Bytes of memory by the rows of ``memory.stat``; None if they do not have it."""
-    names = _OF_1 if _OF_1[0] in stat else _OF_2
-    return stat[names[0]] + stat.get(names[1], 0) if names[0] in stat else None
-
-
-def of_engine(stats: Mapping[str, Any]) -> Used | None:
-    """What the engine says of a container (``GET /containers/ID/stats``); None if it does not know."""
-    try:
-        memory = memory_of(stats["memory_stats"]["stats"])
-        return None if memory is None else Used(stats["cpu_stats"]["cpu_usage"]["total_usage"] * _NANOSECONDS, memory)
-    except (KeyError, TypeError):
-        return None
-
-
-def numbers(text: str) -> dict[str, int]:
-    """Rows of a name and a number."""
-    return {name: int(number) for name, number in (line.split() for line in text.splitlines())}
-
-
-def _places(mounts: str, groups: str) -> dict[str, Path]:
-    """The folder of a process's group by controller, that of version 2 under an empty name.
-
-    ``mounts`` and ``groups`` are the texts of ``mountinfo`` and ``cgroup`` (proc_pid_mountinfo(5), cgroups(7)).
-    """
-    paths: dict[str, str] = {}
-    for line in groups.splitlines():
-        _, controllers, path = line.split(":", 2)
-        paths |= dict.fromkeys(controllers.split(","), path)
-    found: dict[str, Path] = {}
-    for line in mounts.splitlines():
-        before, _, after = line.partition(" - ")
-        root, point = before.split()[3:5]
-        kind, _, options = after.split()[:3]
-        names = options.split(",") if kind == "cgroup" else [""] if kind == "cgroup2" else []
-        for name in names:
-            if name in paths and (place := _below(paths[name], root)) is not None:
-                found.setdefault(name, Path(point + place))
-    return found
-
-
-def _below(path: str, root: str) -> str | None:
-    """A group's path in a mount that shows only what is below ``root``; None if it is not shown."""
-    if root == "/":
-        return path
-    return path.removeprefix(root) if path == root or path.startswith(f"{root}/") else None
+    return sum(int(row[column]) for row in own for column in _BUSY) / _TICKS

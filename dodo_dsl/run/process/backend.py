@@ -4,13 +4,14 @@ import asyncio
 import contextlib
 import functools
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from dodo_dsl import atomic
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
@@ -19,33 +20,32 @@ from dodo_dsl.run import application_time, service_protocol
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
-from dodo_dsl.run.machine_load.service_use import Used
-from dodo_dsl.run.machine_load.snapshot import Snapshot
+from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.outcomes import how_it_ended
 from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.sandbox_client import LOG, SandboxClient
+from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off
 from dodo_dsl.spec.model import VIRTUAL
 
-LOAD_PATIENCE_S = 2.0
+LOG = "sandbox.log"
+USE_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
-_OF_SANDBOX = ("bwrap:", "setpriv:")
-"""How lines of the programs begin that confine an application's."""
+_NO_PROGRAM = "bwrap: execvp "
+"""How bubblewrap says that it cannot start the application's program."""
 
 
 class ProcessBackend:
     """One test in a sandbox; ``folder`` is the compiled test's, ``report`` takes logs and recordings."""
 
     name = "process"
-    has_engine = False
 
     def __init__(
         self,
@@ -86,9 +86,7 @@ class ProcessBackend:
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
-        self._sandbox = SandboxClient(
-            isolation, self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server
-        )
+        self._sandbox = SandboxClient(self._take, lambda why: self._events.put_nowait(Lost(why)), fork_server)
 
     @property
     def is_on_host(self) -> bool:
@@ -102,7 +100,8 @@ class ProcessBackend:
             self._commands = replace(self._commands, time=time)
             needed += [time.library.parent, time.agent.parent]
         entered = None if self.is_on_host else Entered.with_own(container, *needed)
-        await self._sandbox.open(self.slot, self.report, entered)
+        with atomic.appended(self.report / LOG) as log:
+            await self._sandbox.open(self.slot, log.fileno(), entered)
 
     def _take(self, message: dict[str, Any]) -> None:
         if "started" in message:
@@ -138,9 +137,10 @@ class ProcessBackend:
             if self.is_on_host and MOUNT_GONE.match(said) and len(starts) < MOST_TRIES:
                 self._start(starts[-1])
                 return
-            is_of_sandbox = not said or said.startswith(_OF_SANDBOX)
-            what = "its sandbox cannot be set up: " if is_of_sandbox else ""
-            self._events.put_nowait(Unstartable(exited, what + (said or f"exit code {code}")))
+            why = f"its sandbox cannot be set up: {said or f'exit code {code}'}"
+            if said.startswith(_NO_PROGRAM):
+                why = said.removeprefix(_NO_PROGRAM)
+            self._events.put_nowait(Unstartable(exited, why))
             self._conditions.failed(exited)
             return
         if used:
@@ -270,7 +270,7 @@ class ProcessBackend:
         limits = application.limits
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
-        confined = confinement(command.folder, self.isolation, self.cid, limits, hidden)
+        confined = confinement(command.folder, limits, hidden)
         confined = replace(confined, channel=self.slot.channel if self.is_on_host else "")
         if self._has_time:
             confined = replace(confined, time=self._commands.time_folder)
@@ -294,21 +294,15 @@ class ProcessBackend:
         application = [pid.result() for pid in pids if pid.done() and not pid.cancelled()]
         self._send(begin_frame(self.plan.seed, application), hearers(self.plan))
 
-    async def load(self) -> Snapshot | None:
-        """What the sandbox sees of its processes; None when it does not answer."""
-        return msgspec.convert(await self._ask("load"), Snapshot | None)
-
     async def listeners(self) -> Collection[str] | None:
         """As the sandbox sees them; None when it does not answer."""
         found: list[str] | None = await self._ask("listeners")
         return found
 
-    async def use(self) -> Mapping[str, Used] | None:
+    async def use(self) -> Snapshot | None:
         """As the sandbox sees it; None when it does not answer."""
         names = [service.name for service in self.plan.application.services]
-        found: dict[str, tuple[float, int]] | None = await self._ask("use", names=names)
-        limit = self.plan.application.limits.memory if self._is_confined else 0
-        return {name: Used(*used, limit) for name, used in found.items()} if found else None
+        return msgspec.convert(await self._ask("use", names=names), Snapshot | None)
 
     async def _ask(self, what: str, **words: object) -> Any:
         """What the sandbox answers; None when it does not."""
@@ -316,7 +310,7 @@ class ProcessBackend:
             self._asked[what] = asyncio.get_running_loop().create_future()
             self._sandbox.send({"do": what, **words})
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(LOAD_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
+            async with asyncio.timeout(USE_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
                 return await asyncio.shield(self._asked[what])
         return None
 

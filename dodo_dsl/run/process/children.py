@@ -6,6 +6,7 @@ A Python module that is forked instead of started has what its parent has loaded
 import contextlib
 import functools
 import os
+import resource
 import runpy
 import signal
 import subprocess
@@ -13,12 +14,13 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
 
-from dodo_dsl.run.machine_load.processes import owners, parents
-from dodo_dsl.run.process import confined_process, namespaces
+from dodo_dsl.run.machine_load.processes import above, living, owners
+from dodo_dsl.run.machine_load.service_use import Snapshot
+from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.confined_process import ConfinedProcess
 from dodo_dsl.run.process.confinement import Confinement
 from dodo_dsl.run.process.places import Places
@@ -108,24 +110,19 @@ class ChildExit:
 
 
 class Children:
-    """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how.
+    """Children of this process by name; ``on_exit`` is called with the name of each that ended, and how."""
 
-    Before, while the kernel still knows it, ``on_end`` is called with its process id and name.
-    """
-
-    def __init__(
-        self,
-        on_exit: Callable[[str, ChildExit], None],
-        on_end: Callable[[int, str], None] = lambda _pid, _name: None,
-        umask: int = -1,
-    ) -> None:
+    def __init__(self, on_exit: Callable[[str, ChildExit], None], umask: int = -1) -> None:
         """``umask`` is that of programs that are started, by default this process's."""
         self._on_exit = on_exit
-        self._on_end = on_end
         self._umask = umask
         self._running: dict[str, Child] = {}
         self._used: dict[str, int] = {}
-        self._took_s: dict[str, float | None] = {}
+        self._took_s: dict[str, float] = {}
+        """Processor time of those that ended, with that of their own children."""
+        self._is_all_counted = True
+        self.limits: dict[str, int] = {}
+        """Bytes of memory that the application's programs may use."""
         self.names: dict[int, str] = {}
         """All that were ever started, by process id."""
 
@@ -169,27 +166,34 @@ class Children:
         places: Places | None,
     ) -> int:
         """Starts a program of the application; raises as ``start``, and NoSeccomp."""
-        return self._add(name, ConfinedProcess(words, environment, output, confined, places, self._umask))
+        child = ConfinedProcess(words, environment, output, confined, places, self._umask)
+        self.limits[name] = confined.limits.memory
+        self._is_all_counted &= child.used_s() is not None
+        return self._add(name, child)
 
-    def took_s(self) -> dict[str, float | None]:
-        """Processor time in s of each of the application's programs, also of all that ended; None where not counted."""
-        confined = {n: c.used_s() for n, c in self._running.items() if isinstance(c, ConfinedProcess)}
-        return {**self._took_s, **confined}
+    def with_ended(self, taken: Snapshot) -> Snapshot:
+        """What services used, with the processes of the application's programs that ended, and with their limits."""
+        running = {n: c.used_s() or 0.0 for n, c in self._running.items() if isinstance(c, ConfinedProcess)}
+        took_s = {**self._took_s, **running}
+        services = {
+            name: used._replace(
+                processor_s=max(used.processor_s, took_s.get(name, 0.0)), limit=self.limits.get(name, 0)
+            )
+            for name, used in taken.services.items()
+        }
+        return replace(taken, services=services, changes=0 if self._is_all_counted else taken.changes)
 
     @property
     def are_watched(self) -> bool:
         """Whether any has a limit of memory."""
-        return any(isinstance(child, ConfinedProcess) for child in self._running.values())
+        return not self.limits.keys().isdisjoint(self._running)
 
     def watch_memory(self) -> None:
         """Ends those that use more memory than they may."""
-        confined = {c.pid: (name, c.memory) for name, c in self._running.items() if isinstance(c, ConfinedProcess)}
-        limits = {pid: most for pid, (_, most) in confined.items()}
-        for pid, size in confined_process.above(limits, dict(parents())).items():
-            name, _ = confined[pid]
-            if name not in self._used:
-                self._used[name] = size
-                os.kill(pid, signal.SIGKILL)
+        limits = {name: most for name, most in self.limits.items() if name in self._running and name not in self._used}
+        for name, size in above(limits, self.names).items():
+            self._used[name] = size
+            os.kill(self._running[name].pid, signal.SIGKILL)
 
     def _add(self, name: str, child: Child) -> int:
         self._running[name] = child
@@ -206,10 +210,9 @@ class Children:
                     os.waitpid(info.si_pid, 0)
                 else:
                     child = self._running.pop(name)
-                    self._on_end(child.pid, name)
-                    if isinstance(child, ConfinedProcess):
-                        self._took_s[name] = child.used_s()
+                    counted, before = (child.used_s() if isinstance(child, ConfinedProcess) else None), _of_children_s()
                     code = child.wait()
+                    self._took_s[name] = max(counted or 0.0, _of_children_s() - before)
                     failed = isinstance(child, ConfinedProcess) and child.failed
                     self._on_exit(name, ChildExit(code, self._used.pop(name, 0), failed))
 
@@ -238,6 +241,12 @@ class Children:
             self.reap()
 
 
+def _of_children_s() -> float:
+    """Processor time of the children that this process waited for, and of theirs."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def _begin(parent: int, masked: Sequence[str]) -> None:
     """Between fork and exec."""
     namespaces.mask(masked)
@@ -246,17 +255,15 @@ def _begin(parent: int, masked: Sequence[str]) -> None:
 
 def _within(bubblewrap: int) -> Iterator[int]:
     """The processes in a sandbox, without bubblewrap's own two: its first process, and the one that it watches."""
-    known = dict(parents())
+    known = living()
     for pid in known:
         line = [pid]
         while line[-1] in known and line[-1] != bubblewrap:
-            line.append(known[line[-1]])
+            line.append(known[line[-1]].parent)
         if line[-1] == bubblewrap and len(line) > 2:
             yield pid
 
 
 def _descendants(owns_namespace: bool) -> Iterator[int]:
-    if owns_namespace:
-        yield from (pid for pid, _ in parents() if pid != os.getpid())
-        return
-    yield from (pid for pid, _ in owners({os.getpid(): ""}) if pid != os.getpid())
+    known = living()
+    yield from (pid for pid in (known if owns_namespace else owners({os.getpid(): ""}, known)) if pid != os.getpid())

@@ -1,7 +1,6 @@
-"""A program of the application in its own sandbox, whether this machine can confine it, and how much memory it uses.
+"""A program of the application in its own sandbox.
 
-The process has the interface of subprocess.Popen that ``Children`` uses. Where an application cannot be confined, the
-probe says whether the machine lacks what that takes.
+The process has the interface of subprocess.Popen that ``Children`` uses.
 """
 
 import contextlib
@@ -11,20 +10,19 @@ import os
 import resource
 import shutil
 import subprocess
-import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from dodo_dsl.run.machine_load import processes
-from dodo_dsl.run.process import confinement, namespaces, places, process_group, seccomp_filter
-from dodo_dsl.run.process.confinement import INTERPRETER, PROGRAM, Confinement
+from dodo_dsl.run.process import confinement, namespaces, process_group, seccomp_filter
+from dodo_dsl.run.process.confinement import PROGRAM, Confinement
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.process_group import ProcessGroup
-from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _SIGNALLED = range(129, 129 + 64)
 """Exit codes by which bubblewrap reports the signal that ended the program."""
+_BEGAN = b'"exit-code"'
+"""What bubblewrap reports only of a program that it could start (``--json-status-fd``)."""
 
 
 class ConfinedProcess:
@@ -42,36 +40,38 @@ class ConfinedProcess:
         """``places`` is None on the host. Raises OSError, SubprocessError, ValueError and NoSeccomp."""
         program = _found(words[0], environment, confined.folder)
         user = places.user if places else None
-        mounts = _mounts(places, confined) if places else None
-        given = {**environment, "PWD": confined.folder, **({"HOME": confinement.HOME} if mounts else {})}
+        given = {**environment, **({"HOME": confinement.HOME} if places else {})}
         others = 0 if user is not None else _threads_of_this_user()
+        sandbox = confinement.sandbox_words(confined, places, program, given)
+        filtered = {"--seccomp": seccomp_filter.program()} if places else {}
         self._group = process_group.make(confined.limits.processes)
-        self._began, began = os.pipe()
-        filter_fd = seccomp_filter.descriptor() if places else os.open(os.devnull, os.O_RDONLY)
-        source = confinement.launcher_variables(given)
-        sandbox = confinement.sandbox_words(confined, mounts, program, user, filter_fd)
-        limit = functools.partial(_limit, confined.limits, os.getpid(), self._group, others)
+        self._status, status = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            self._process = subprocess.Popen(
-                [*sandbox, *confinement.launcher_words(source, began, program), *words],
-                env={"PATH": os.environ.get("PATH", os.defpath)},
-                cwd=confined.folder,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                start_new_session=True,
-                umask=umask,
-                pass_fds=(filter_fd, began, source),
-                preexec_fn=limit,  # noqa: PLW1509  (it has one thread)
-            )
+            with _in_files(filtered) as passed, os.fdopen(status, "wb"):
+                passed["--json-status-fd"] = status
+                if places and places.namespace is not None:  # which bubblewrap closes as it closes what it waited for
+                    passed |= {"--userns": places.namespace, "--block-fd": places.namespace}
+                sandbox += [word for name, descriptor in passed.items() for word in (name, str(descriptor))]
+                with _in_files({"--args": confinement.as_data(sandbox)}) as files:
+                    self._process = subprocess.Popen(
+                        [PROGRAM, "--args", str(files["--args"]), "--", program, *words[1:]],
+                        env={"PATH": os.environ.get("PATH", os.defpath)},
+                        cwd="/",
+                        stdin=subprocess.DEVNULL,
+                        stdout=output,
+                        stderr=output,
+                        start_new_session=True,
+                        umask=umask,
+                        user=user,
+                        group=user,
+                        extra_groups=None if user is None else [],
+                        pass_fds=(*passed.values(), *files.values()),
+                        preexec_fn=functools.partial(_limit, confined.limits, os.getpid(), self._group, others),  # noqa: PLW1509
+                    )
         except BaseException:
             self._close()
             raise
-        finally:
-            for descriptor in (began, filter_fd, source):
-                os.close(descriptor)
         self.pid = self._process.pid
-        self.memory = confined.limits.memory
         self.failed = False
         """Whether the program never began; known after ``wait``."""
 
@@ -82,19 +82,29 @@ class ConfinedProcess:
     def wait(self) -> int:
         """The program's exit code, below 0 for the signal that ended it."""
         code = self._process.wait()
-        self.failed = os.read(self._began, 16) != confinement.BEGAN
+        try:
+            said = os.read(self._status, 4096)
+        except BlockingIOError:  # what it was to start has not ended yet
+            said = b""
+        self.failed = code > 0 and _BEGAN not in said
         self._close()
         return 128 - code if code in _SIGNALLED else code
 
     def _close(self) -> None:
-        os.close(self._began)
+        os.close(self._status)
         if self._group is not None:
             self._group.remove()
 
 
-def _mounts(places: Places, confined: Confinement) -> confinement.Mounts:
-    reads = {path: places.read(path) for path in confined.reads}
-    return confinement.Mounts(*places.folder(confined.folder), places.home, places.shared, places.mounted, reads)
+@contextlib.contextmanager
+def _in_files(data: Mapping[str, bytes]) -> Iterator[dict[str, int]]:
+    """Descriptors of files with data, which have no names and are there to be read from their beginning."""
+    with contextlib.ExitStack() as stack:
+        files = {name: stack.enter_context(os.fdopen(os.memfd_create(name), "w+b")) for name in data}
+        for name, file in files.items():
+            file.write(data[name])
+            file.seek(0)
+        yield {name: file.fileno() for name, file in files.items()}
 
 
 def _found(name: str, environment: Mapping[str, str], folder: str) -> str:
@@ -138,63 +148,4 @@ def _threads_of_this_user(proc: Path = Path("/proc")) -> int:
     return threads
 
 
-BUBBLEWRAP, NAMESPACES = "bubblewrap", "namespaces"
-_FOLDER = "/usr"
-
-
-def confinement_problem() -> str:
-    """What goes wrong when a program that does nothing is confined as an application is; empty when nothing does.
-
-    To be called by a sandbox with own mounts.
-    """
-    with tempfile.TemporaryFile() as output:
-        try:
-            confined = Confinement(_FOLDER, "network", 0, INTERPRETER)
-            true = ConfinedProcess(
-                ["true"], {"PATH": os.defpath}, output.fileno(), confined, Places(places.own_user(0))
-            )
-            code = true.wait()
-        except (OSError, subprocess.SubprocessError, NoSeccomp) as error:
-            return str(error)
-        output.seek(0)
-        told = output.read(1000).decode(errors="replace").strip()
-    return "" if code == 0 else told or f"exit code {code}"
-
-
-def missing() -> str:
-    """What confining takes and this machine lacks, each tried by itself: BUBBLEWRAP, NAMESPACES, or empty."""
-    if shutil.which(PROGRAM) is None:
-        return BUBBLEWRAP
-    return NAMESPACES if namespaces.refusal() else ""
-
-
 PERIOD_S = 0.25
-
-
-def above(limits: Mapping[int, int], parents: Mapping[int, int], proc: Path = processes.PROC) -> dict[int, int]:
-    """Bytes of memory that a process uses with all that descend from it, of those which use more than their limit.
-
-    ``limits`` are bytes by process id, ``parents`` those of all processes. What processes share counts once.
-    """
-    groups: dict[int, list[int]] = {root: [] for root in limits}
-    for pid in parents:
-        ancestor = pid
-        while ancestor in parents and ancestor not in groups:
-            ancestor = parents[ancestor]
-        if ancestor in groups:
-            groups[ancestor].append(pid)
-    found, memories = {}, processes.segments(proc)
-    for root, pids in groups.items():
-        attached, detached = processes.of_service(memories, pids, proc)
-        held = processes.held(pids, proc) + attached
-        if _used(processes.resident, proc, pids, held) + detached > limits[root]:
-            size = _used(processes.proportional, proc, pids, held) + detached
-            if size > limits[root]:
-                found[root] = size
-    return found
-
-
-def _used(measure: Callable[[int, Path], tuple[int, int]], proc: Path, pids: Iterable[int], held: int) -> int:
-    """Bytes of anonymous memory, and of shared memory or of what descriptors hold."""
-    anonymous, shared = map(sum, zip(*(measure(pid, proc) for pid in pids), strict=True)) if pids else (0, 0)
-    return anonymous + max(shared, held)

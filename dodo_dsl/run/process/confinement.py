@@ -1,8 +1,8 @@
 """What a service of the application sees and may use, and the words by which bubblewrap (bwrap(1)) confines it.
 
-A program gets its environment only when it is confined and has given up root: variables such as LD_PRELOAD and PATH
-would otherwise act on the programs that confine it. They come by a file without a name, as everybody on the machine can
-read words of a command line.
+Bubblewrap reads them from a file without a name: everybody on the machine can read words of a command line, and the
+application's variables are among them. Of these, LD_PRELOAD and such act on the application's program alone, as it is
+what bubblewrap executes next.
 """
 
 import os
@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dodo_dsl.run.process.places import Places
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _PACKAGE = Path(__file__).resolve().parents[2]
@@ -25,13 +26,10 @@ SYSTEM = ("/usr", "/etc", "/opt", "/sys/devices/system")
 class Confinement:
     """``folder`` is the application's own, ``reads`` is what else it may read, ``hidden`` lies in them and stays out.
 
-    With ``isolation`` ``host`` it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
-    ``cid`` decides which user id is tried first, where DoDo runs as root.
+    On the host it has only its own processes, and sees what DoDo sees but for ``masked`` devices.
     """
 
     folder: str
-    isolation: str
-    cid: int
     reads: tuple[str, ...] = ()
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
@@ -42,12 +40,12 @@ class Confinement:
     """The folder by which it gets the test's time, where it may write into the page and wake its threads."""
 
 
-def confinement(folder: Path, isolation: str, cid: int, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
+def confinement(folder: Path, limits: SandboxLimits, hidden: Iterable[Path]) -> Confinement:
     """The confinement of an application; of the ``hidden`` paths, those matter that it would see."""
     reads = [str((folder / Path(path).expanduser()).resolve()) for path in limits.reads]
     every = tuple(dict.fromkeys([*INTERPRETER, str(_PACKAGE), *reads]))
     inside = _inside(hidden, (*SYSTEM, *every, str(folder)))
-    return Confinement(str(folder), isolation, cid, every, tuple(dict.fromkeys(inside)), limits)
+    return Confinement(str(folder), every, tuple(dict.fromkeys(inside)), limits)
 
 
 def _inside(hidden: Iterable[Path], shown: Iterable[str]) -> Iterator[str]:
@@ -69,46 +67,32 @@ _MERGED = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 """On Debian since 12 these are links into /usr."""
 _EMPTY = ("/run", "/var/tmp")
 """Folders that programs may look into, and that nobody may write to."""
-_KEPT = ("CAP_SETUID", "CAP_SETGID", "CAP_SETPCAP")
-"""What ``setpriv`` needs to give up root and then itself gives up."""
-
 _TO_UNMASK = ("CAP_SYS_ADMIN", "CAP_MKNOD", "CAP_DAC_READ_SEARCH", "CAP_SYS_MODULE", "CAP_SYS_RAWIO")
 
 
-@dataclass(frozen=True)
-class Mounts:
-    """Where the sandbox prepared the application's folder and home, ``/tmp`` and ``/dev/shm``, and what it may read."""
-
-    folder: Path
-    writable: bool
-    """The folder; what is written there goes with the test."""
-    home: Path
-    shared: Mapping[str, Path]
-    mounted: Sequence[str] = ()
-    """What is mounted there for DoDo's services, which the application must neither see nor remove."""
-    reads: Mapping[str, Path] = field(default_factory=dict)
-    """By their paths; what is not there is shown as it is."""
-
-
 def sandbox_words(
-    confined: Confinement, mounts: Mounts | None, program: str, user: int | None, filter_fd: int
+    confined: Confinement, places: Places | None, program: str, environment: Mapping[str, str]
 ) -> list[str]:
-    """The words before the application's own; ``mounts`` is None on the host, ``user`` None without root.
+    """What bubblewrap is to do, but for descriptors; ``places`` is None on the host.
 
     ``program`` is the path of the application's program, which is shown where nothing else would.
     """
-    always = [PROGRAM, "--unshare-pid", "--die-with-parent"]
-    chdir = ["--chdir", confined.folder]
-    if mounts is None:
+    words = ["--unshare-pid", "--die-with-parent", "--clearenv"]
+    words += [word for name, value in environment.items() for word in ("--setenv", name, value)]
+    if places is None:
         masked = [*_masked(confined.masked), *(["--tmpfs", confined.channel] if confined.channel else [])]
-        return [*always, "--dev-bind", "/", "/", *masked, "--proc", "/proc", *chdir, "--"]
-    seen = _seen(confined, mounts, program)
-    filtered = ["--seccomp", str(filter_fd)]
-    unshared = ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try"]
-    if user is None:
-        return [*always, *unshared, *seen, *chdir, "--cap-drop", "ALL", *filtered, "--"]
-    kept = [word for name in _KEPT for word in ("--cap-add", name)]
-    return [*always, *unshared, *seen, *chdir, "--cap-drop", "ALL", *kept, *filtered, "--", *_as_user(user)]
+        words += ["--dev-bind", "/", "/", *masked, "--proc", "/proc"]
+    else:
+        words += ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try", "--cap-drop", "ALL"]
+        words += _seen(confined, places, program)
+    return [*words, "--chdir", confined.folder]
+
+
+def as_data(words: Sequence[str]) -> bytes:
+    """Words as bubblewrap reads them from a file; raises ValueError."""
+    if any("\0" in word for word in words):
+        raise ValueError("a word or a variable holds a NUL character")
+    return b"".join(os.fsencode(f"{word}\0") for word in words)
 
 
 def _masked(devices: Iterable[str]) -> list[str]:
@@ -117,37 +101,36 @@ def _masked(devices: Iterable[str]) -> list[str]:
     return [*binds, *(word for name in _TO_UNMASK for word in ("--cap-drop", name))] if binds else []
 
 
-def _as_user(user: int) -> list[str]:
-    ids = [f"--reuid={user}", f"--regid={user}", "--clear-groups"]
-    return ["setpriv", *ids, "--inh-caps=-all", "--ambient-caps=-all", "--bounding-set=-all", "--"]
+def _seen(confined: Confinement, places: Places, program: str) -> list[str]:
+    """The file system: the system's programs, what may be read, and the application's folder; all else is absent.
 
-
-def _seen(confined: Confinement, mounts: Mounts, program: str) -> list[str]:
-    """The file system: the system's programs, what may be read, and the application's folder; all else is absent."""
-    seen = [word for path in SYSTEM for word in ("--ro-bind-try", path, path)]
+    Within them lies what is hidden, and in that again what may be read: outer paths come first.
+    """
+    shown = {path: ["--ro-bind-try", path, path] for path in SYSTEM}
     for path in _MERGED:
-        if Path(path).is_symlink():
-            seen += ["--symlink", str(Path(path).readlink()), path]
-        else:
-            seen += ["--ro-bind-try", path, path]
-    seen += ["--proc", "/proc", "--dev", "/dev"]
-    seen += [word for path, source in mounts.shared.items() for word in ("--bind", str(source), path)]
-    seen += _time(confined.time)
-    seen += [word for path in _EMPTY for word in ("--perms", "0755", "--dir", path)]
-    read = (*_shown(confined, program), *confined.reads)
-    hidden = _outermost(filter(os.path.exists, confined.hidden), (*read, confined.folder))
-    around = [path for path in hidden if Path(confined.folder).is_relative_to(path)]
-    covered = [path for path in mounts.mounted if path not in (confined.folder, *read)]
-    covered += [path for path in around if not any(Path(path).is_relative_to(one) for one in read)]
-    covered = list(dict.fromkeys(covered))
-    seen += [word for path in covered for word in ("--perms", "0755", "--tmpfs", path)]
-    seen += [*_folders(_parents((HOME, confined.folder, *read))), *_read_only(read, mounts)]
-    seen += ["--bind" if mounts.writable else "--ro-bind", str(mounts.folder), confined.folder]
-    seen += ["--bind", str(mounts.home), HOME]
-    for path in hidden:
-        if path not in around:
-            seen += _mask(path, read, mounts)
-    return [*seen, *(word for path in (*covered, "/dev", "/") for word in ("--remount-ro", path))]
+        is_link = Path(path).is_symlink()
+        shown[path] = ["--symlink", str(Path(path).readlink()), path] if is_link else ["--ro-bind-try", path, path]
+    reads = (*_programs(confined, program), *confined.reads)
+    shown |= {path: ["--ro-bind-try", str(places.read(path)), path] for path in reads}
+    own = {path: ["--bind", str(source), path] for path, source in {**places.shared, HOME: places.home}.items()}
+    own[confined.folder] = ["--bind" if places.writable else "--ro-bind", str(places.folder), confined.folder]
+    hidden = {*filter(os.path.exists, confined.hidden), *places.mounted} - {*reads, *own}
+    words = ["--proc", "/proc", "--dev", "/dev", *(word for path in _EMPTY for word in ("--dir", path))]
+    shows: dict[str, bool | None] = {"/": False}
+    """Whether what is mounted at a path shows what lies there; None where that is another folder."""
+    for path in sorted({*shown, *own, *hidden}, key=lambda path: Path(path).parts):
+        outer = next(shows[outer] for outer in map(str, Path(path).parents) if outer in shows)
+        if path in own:
+            words += own[path]
+            shows[path] = None if path in places.shared else True
+        elif path in hidden and outer is not False:
+            words += ["--tmpfs", path] if Path(path).is_dir() else ["--ro-bind", os.devnull, path]
+            shows[path] = False
+        elif path in shown and path not in hidden and outer is not True:
+            words += shown[path]
+            shows[path] = True
+    empty = [path for path, is_shown in shows.items() if is_shown is False and Path(path).is_dir()]
+    return [*words, *_time(confined.time), *(word for path in ("/dev", *empty) for word in ("--remount-ro", path))]
 
 
 def _time(folder: str) -> list[str]:
@@ -159,85 +142,8 @@ def _time(folder: str) -> list[str]:
     return ["--ro-bind", folder, folder, "--bind", page, page, *channels]
 
 
-def _mask(path: str, read: Sequence[str], mounts: Mounts) -> list[str]:
-    """Nothing in the place of a file or folder, but what may be read in it, or is that itself."""
-    if not Path(path).is_dir():
-        return [] if path in read else ["--ro-bind", os.devnull, path]
-    inside = [one for one in read if Path(one).is_relative_to(path)]
-    parents = [one for one in _parents(inside) if Path(one).is_relative_to(path) and one != path]
-    return ["--tmpfs", path, *_folders(parents), *_read_only(inside, mounts), "--remount-ro", path]
-
-
-def _folders(paths: Iterable[str]) -> list[str]:
-    return [word for path in paths for word in ("--perms", "0755", "--dir", path)]
-
-
-def _read_only(paths: Iterable[str], mounts: Mounts) -> list[str]:
-    return [word for path in paths for word in ("--ro-bind-try", str(mounts.reads.get(path, path)), path)]
-
-
-def _outermost(paths: Iterable[str], shown: Iterable[str]) -> list[str]:
-    """Paths without those that lie in another one and in nothing ``shown`` there: they are hidden already."""
-    found: dict[str, None] = {}
-    for path in sorted(set(paths), key=lambda one: Path(one).parts):  # what holds others comes before them
-        outer = [other for other in map(str, Path(path).parents) if other in found]
-        holds = [one for one in shown if outer and one != path and Path(path).is_relative_to(one)]
-        if all(any(Path(one).is_relative_to(other) for one in holds) for other in outer):
-            found[path] = None
-    return list(found)
-
-
-def _parents(paths: Iterable[str]) -> list[str]:
-    """The folders that hold paths, outer ones first: everybody may pass through, as bubblewrap would not allow."""
-    return sorted({str(parent) for path in paths for parent in Path(path).parents if parent != parent.parent})
-
-
-def _shown(confined: Confinement, program: str) -> Sequence[str]:
+def _programs(confined: Confinement, program: str) -> Sequence[str]:
     """The program's own file, where it lies in nothing that is shown."""
     shown = [Path(path) for path in (*SYSTEM, *_MERGED, *confined.reads, confined.folder)]
     paths = dict.fromkeys((program, os.path.realpath(program)))
     return [path for path in paths if not any(Path(path).is_relative_to(folder) for folder in shown)]
-
-
-LAUNCHER = """
-import errno, os, sys
-source, began, program, *words = sys.argv[1:]
-began = int(began)
-os.set_inheritable(began, False)
-with open(int(source), "rb") as file:
-    environment = dict(item.split(b"=", 1) for item in file.read().split(b"\\0") if item)
-os.write(began, b"+")
-try:
-    try:
-        os.execve(program, words, environment)
-    except OSError as error:
-        if error.errno != errno.ENOEXEC:
-            raise
-        os.execve("/bin/sh", ["sh", program, *words[1:]], environment)
-except OSError as error:
-    os.write(began, b"-")
-    sys.exit(f"{program}: {error.strerror}")
-"""
-
-BEGAN = b"+"
-
-
-def launcher_words(source: int, began: int, program: str) -> list[str]:
-    """The words before the application's own, the name of its program among them; ``source`` is of ``variables``.
-
-    ``began`` is a descriptor that gets ``BEGAN`` when all is prepared, and more when the program cannot be started.
-    """
-    return [sys.executable, "-I", "-S", "-c", LAUNCHER, str(source), str(began), program]
-
-
-def launcher_variables(environment: Mapping[str, str]) -> int:
-    """The descriptor of a file with an environment, which the caller closes."""
-    descriptor = os.memfd_create("environment", os.MFD_CLOEXEC)
-    try:
-        with os.fdopen(os.dup(descriptor), "wb") as file:
-            file.writelines(os.fsencode(f"{name}={value}\0") for name, value in environment.items())
-        os.lseek(descriptor, 0, os.SEEK_SET)
-    except BaseException:
-        os.close(descriptor)
-        raise
-    return descriptor

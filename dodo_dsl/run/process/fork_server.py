@@ -5,7 +5,7 @@ namespaces are forked from here; their services are forks of them in turn.
 
     runner to fork server   {"hold": true} with the descriptor of a lease that the forks hold, too;
                             {"load": [module of a service of DoDo's, ...]};
-                            {"slot": name, "words": [more of the sandbox's words]} with the sandbox's end of its channel
+                            {"slot": name, "entered": as the sandbox has it} with the sandbox's end of its channel
                             and its log's descriptor
 """
 
@@ -17,7 +17,7 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from dodo_dsl.run.process import sandbox
 from dodo_dsl.run.process.slot import SLOT_VARIABLE
@@ -89,12 +89,12 @@ def serve(runner: socket.socket) -> None:
             continue
         channel, log = descriptors
         if os.fork() == 0:
-            os._exit(_sandbox(runner, channel, log, message["slot"], message["words"]))
+            os._exit(_sandbox(runner, channel, log, message["slot"], message["entered"]))
         os.close(channel)
         os.close(log)
 
 
-def _sandbox(runner: socket.socket, channel: int, log: int, slot: str, words: Sequence[str]) -> int:
+def _sandbox(runner: socket.socket, channel: int, log: int, slot: str, entered: str) -> int:
     """The fork's whole life; its exit code."""
     runner.close()
     os.dup2(log, sys.stderr.fileno())
@@ -103,7 +103,7 @@ def _sandbox(runner: socket.socket, channel: int, log: int, slot: str, words: Se
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     os.environ[SLOT_VARIABLE] = slot
     try:
-        return sandbox.main([str(channel), "network", "--forks", *words])
+        return sandbox.main([str(channel), entered, "--forks"])
     except BaseException:  # noqa: BLE001  (it is printed as Python does)
         sys.excepthook(*sys.exc_info())
         return 1

@@ -1,19 +1,17 @@
-"""The runner's end of the fork server, and of sandboxes that are its forks and not the runner's own children."""
+"""The runner's end of the fork server."""
 
 import contextlib
 import json
-import os
-import select
-import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.slot import package_path
 
 END_S = 10.0
+"""How long what is about to end is waited for."""
 
 
 class ForkServer:
@@ -46,12 +44,14 @@ class ForkServer:
         with contextlib.suppress(OSError):  # it has ended, which the next sandbox finds
             self._socket.send(json.dumps({"load": sorted(modules)}).encode())
 
-    def fork(self, channel: socket.socket, log: int, slot: str, words: Sequence[str] = ()) -> None:
-        """Starts a sandbox at the other end of ``channel``, with more ``words``.
+    def fork(self, channel: socket.socket, log: int, slot: str, entered: str) -> None:
+        """Starts a sandbox at the other end of ``channel``, in its namespaces.
 
         Raises OSError when the fork server has ended.
         """
-        socket.send_fds(self._socket, [json.dumps({"slot": slot, "words": words}).encode()], [channel.fileno(), log])
+        socket.send_fds(
+            self._socket, [json.dumps({"slot": slot, "entered": entered}).encode()], [channel.fileno(), log]
+        )
 
     @property
     def is_alive(self) -> bool:
@@ -60,7 +60,11 @@ class ForkServer:
     def close(self) -> None:
         """Ends the fork server; the sandboxes stay."""
         self._socket.close()
-        end(self._process)
+        try:
+            self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
     def kill(self) -> None:
         """Ends one that nothing was asked of, at once."""
@@ -79,41 +83,3 @@ def serving(
     server = loaded or ForkServer(descriptors)
     server.load(modules)
     return server
-
-
-class ForkedSandbox:
-    """A sandbox that is the fork server's child, with the interface of subprocess.Popen."""
-
-    def __init__(self, pid: int) -> None:
-        self.pid = pid
-        try:
-            self._descriptor = os.pidfd_open(pid)
-        except ProcessLookupError:
-            self._descriptor = -1
-
-    def poll(self) -> int | None:
-        """0 when it has ended, else None."""
-        return 0 if self._descriptor < 0 or select.select([self._descriptor], [], [], 0)[0] else None
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Waits until it has ended; raises TimeoutExpired."""
-        if self._descriptor >= 0:
-            if not select.select([self._descriptor], [], [], timeout)[0]:
-                raise subprocess.TimeoutExpired("sandbox", timeout or 0.0)
-            os.close(self._descriptor)
-            self._descriptor = -1
-        return 0
-
-    def kill(self) -> None:
-        """Ends it at once."""
-        if self._descriptor >= 0:
-            signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
-
-
-def end(process: "subprocess.Popen[bytes] | ForkedSandbox") -> None:
-    """Waits for a process that is about to end, and kills it where it does not."""
-    try:
-        process.wait(END_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()

@@ -2,27 +2,24 @@
 
 import asyncio
 import contextlib
-import json
 import os
 import secrets
+import shutil
 import socket
 import struct
 import subprocess
-import sys
-from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from dodo_dsl.opendlv.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
-from dodo_dsl.run.process.confined_process import BUBBLEWRAP, NAMESPACES
-from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, PROGRAM
+from dodo_dsl.run.process.confinement import INTERPRETER, MOST_TRIES, MOUNT_GONE, PROGRAM, Confinement
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
-from dodo_dsl.run.process.sandbox import MAX_MESSAGE
-from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.process.sandbox_client import SandboxClient
+from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.spec.deployment import RESERVED_CIDS
 
@@ -31,63 +28,65 @@ PROBE_S = 0.3
 
 @dataclass(frozen=True)
 class IsolationRefusal:
-    """Why applications cannot be isolated; ``missing`` is what was found missing by its own trial, or empty."""
+    """Why applications cannot be isolated, and what to do about it; ``remedy`` is empty where nothing is known."""
 
     why: str
-    missing: str = ""
-
-    @property
-    def remedy(self) -> str:
-        """What to do about what is missing; empty if nothing is."""
-        if self.missing == NAMESPACES and os.getuid() == 0:
-            return "allow this container to make namespaces (docker run --privileged, for example)"
-        return {BUBBLEWRAP: "install bubblewrap", NAMESPACES: "allow user namespaces"}.get(self.missing, "")
-
-    def __str__(self) -> str:
-        if self.missing == BUBBLEWRAP:
-            return f"there is no program '{PROGRAM}'"
-        if self.missing == NAMESPACES:
-            return f"the kernel refuses namespaces: {self.why}"
-        return f"a trial, to run 'true' in a sandbox as applications have it, ended with: {self.why}"
+    remedy: str = ""
 
 
-def isolation_refusal(fork_server: ForkServer | None = None) -> IsolationRefusal | None:
+async def isolation_refusal(fork_server: ForkServer | None = None) -> IsolationRefusal | None:
     """Why tests and applications cannot have their own namespaces on this machine; None when they can.
 
-    A sandbox tries it, which the fork server forks, where there is one.
+    What is missing is found by its own trial.
     """
-    answer: dict[str, Any] = {}
-    if fork_server is not None:
-        with contextlib.suppress(OSError):  # it has ended, which says nothing about the machine
-            answer = _probe(fork_server.fork)
-    answer = answer or _probe(_start)
-    why = str(answer.get("probe", answer.get("down", "the sandbox ended at once")))
-    return IsolationRefusal(why, str(answer.get("missing", ""))) if why else None
+    if not (why := await _trial(fork_server)):
+        return None
+    if shutil.which(PROGRAM) is None:
+        return IsolationRefusal(f"there is no program '{PROGRAM}'", "install bubblewrap")
+    if await asyncio.to_thread(_refuses_namespaces):
+        in_container = "allow this container to make namespaces (docker run --privileged, for example)"
+        remedy = "allow user namespaces" if os.getuid() else in_container
+        return IsolationRefusal(f"the kernel refuses namespaces: {why}", remedy)
+    return IsolationRefusal(f"a trial, to run 'true' in a sandbox as applications have it, ended with: {why}")
 
 
-def _probe(start: Callable[[socket.socket, int, str], "subprocess.Popen[bytes] | None"]) -> dict[str, Any]:
-    """What a sandbox answers that was started with its channel, its log and its slot; nothing when it ended.
-
-    Raises OSError when it cannot be started.
-    """
-    process = None
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    with ours, Path(os.devnull).open("wb") as nowhere:
-        with theirs:
-            process = start(theirs, nowhere.fileno(), "")
-        answer: dict[str, Any] = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
-        if "up" in answer:
-            ours.send(b'{"do": "probe"}')
-            answer = json.loads(ours.recv(MAX_MESSAGE) or b"{}")
-    if process is not None:
-        process.wait()
-    return answer
+def _refuses_namespaces() -> bool:
+    words = ["/usr/bin/unshare", "--user", "--mount", "--pid", "--fork", "/bin/true"]
+    with contextlib.suppress(OSError):
+        return subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, check=False).returncode != 0
+    return False
 
 
-def _start(channel: socket.socket, _log: int, _slot: str) -> "subprocess.Popen[bytes]":
-    argv = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox", str(channel.fileno()), "network"]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
-    return subprocess.Popen(argv, pass_fds=(channel.fileno(),), stdin=subprocess.DEVNULL, env=environment)
+async def _trial(fork_server: ForkServer | None) -> str:
+    """What goes wrong when a program that does nothing is an application; empty when nothing does."""
+    ended: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
+
+    def take(message: dict[str, Any]) -> None:
+        if "started" not in message and not ended.done():
+            ended.set_result(message)
+
+    client = SandboxClient(take, lambda why: take({"why": why}), fork_server)
+    with os.fdopen(os.memfd_create("output"), "w+b") as output:
+        try:
+            await client.open(Slot(0), output.fileno(), Entered.with_own(0))
+        except BackendError as error:
+            return str(error)
+        start = {
+            "do": "start",
+            "id": "true",
+            "argv": ["true"],
+            "env": {"PATH": os.defpath},
+            "cwd": "/",
+            "fork": False,
+            "masked": (),
+        }
+        client.send({**start, "confined": asdict(Confinement("/usr", INTERPRETER))}, (output.fileno(),))
+        answer = await ended
+        await client.close()
+        output.seek(0)
+        said = output.read(1000).decode(errors="replace").strip()
+    code = answer.get("code", 1)
+    return str(answer.get("why", "")) or (said or f"exit code {code}" if code else "")
 
 
 def process_namespace_refusal() -> str:
@@ -185,22 +184,28 @@ def is_claimed(name: str) -> bool:
     return claim is None
 
 
-def listen(cid: int, seconds: float = PROBE_S) -> str:
-    """The address of the first sender on a CID's group within ``seconds``; empty when nobody sends."""
+@contextlib.contextmanager
+def joined(cid: int) -> Iterator[socket.socket]:
+    """A socket that receives what is sent on a CID's group; raises OSError."""
     bus = group(cid)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            receiver.bind(bus)
-            membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
-            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-        except OSError as error:
-            raise BackendError(
-                f"multicast does not work on this machine ({error.strerror}); 'dodo doctor' says what to do"
-            ) from error
-        receiver.settimeout(seconds)
-        try:
+        receiver.bind(bus)
+        membership = socket.inet_aton(bus[0]) + struct.pack("=I", socket.INADDR_ANY)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        yield receiver
+
+
+def listen(cid: int, seconds: float = PROBE_S) -> str:
+    """The address of the first sender on a CID's group within ``seconds``; empty when nobody sends."""
+    try:
+        with joined(cid) as receiver:
+            receiver.settimeout(seconds)
             _, (address, port) = receiver.recvfrom(65_535)
-        except TimeoutError:
-            return ""
-        return f"{address}:{port}"
+            return f"{address}:{port}"
+    except TimeoutError:
+        return ""
+    except OSError as error:
+        raise BackendError(
+            f"multicast does not work on this machine ({error.strerror}); 'dodo doctor' says what to do"
+        ) from error

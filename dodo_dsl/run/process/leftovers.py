@@ -3,6 +3,7 @@
 import contextlib
 import os
 import re
+import select
 import shutil
 import signal
 import time
@@ -34,36 +35,28 @@ def reap() -> list[str]:
 
 def end_slot(slot: str) -> int:
     """Ends the processes whose environment names the slot, which may be moving a rig; returns their number."""
-    ended = _signal_slot(slot, signal.SIGTERM)
-    _wait_for(ended, _END_S)
-    _wait_for(_signal_slot(slot, signal.SIGKILL) if ended else [], _KILL_S)
-    return len(ended)
+    if ended := _signal_slot(slot, signal.SIGTERM, _END_S):
+        _signal_slot(slot, signal.SIGKILL, _KILL_S)
+    return ended
 
 
-def _signal_slot(slot: str, number: signal.Signals) -> list[Path]:
+def _signal_slot(slot: str, number: signal.Signals, patience: float) -> int:
+    """How many processes got a signal; returns when all of them have ended, at the latest after ``patience`` in s."""
     mark = f"{SLOT_VARIABLE}={slot}\0".encode()
-    notified: list[Path] = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit() and int(entry.name) != os.getpid():
-            with contextlib.suppress(OSError):
-                if mark in (entry / "environ").read_bytes() + b"\0":
-                    os.kill(int(entry.name), number)
-                    notified.append(entry)
+    with contextlib.ExitStack() as stack:
+        running = set()
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit() and int(entry.name) != os.getpid():
+                with contextlib.suppress(OSError):
+                    if mark in (entry / "environ").read_bytes() + b"\0":
+                        descriptor = os.pidfd_open(int(entry.name))
+                        stack.callback(os.close, descriptor)
+                        signal.pidfd_send_signal(descriptor, number)
+                        running.add(descriptor)
+        notified, deadline = len(running), time.monotonic() + patience
+        while running and (left := deadline - time.monotonic()) > 0:
+            running -= set(select.select(running, [], [], left)[0])
     return notified
-
-
-def _wait_for(processes: list[Path], seconds: float) -> None:
-    deadline = time.monotonic() + seconds
-    while any(_is_alive(entry) for entry in processes) and time.monotonic() < deadline:
-        time.sleep(0.01)
-
-
-def _is_alive(process: Path) -> bool:
-    """Whether a process still runs: a zombie does not."""
-    try:
-        return (process / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def remove_memories(prefix: str) -> int:

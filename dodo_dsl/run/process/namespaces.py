@@ -7,6 +7,7 @@ in them those stay visible that the test needs, so that programs and specs kept 
 import contextlib
 import ctypes
 import errno
+import functools
 import os
 import signal
 import socket
@@ -18,7 +19,7 @@ from pathlib import Path
 _CLONE_NEWNS, _CLONE_NEWIPC, _CLONE_NEWUSER = 0x00020000, 0x08000000, 0x10000000
 _CLONE_NEWPID, _CLONE_NEWNET = 0x20000000, 0x40000000
 _MS_BIND, _MS_REC, _MS_PRIVATE, _MS_SLAVE, _MS_NOSUID, _MS_NODEV = 4096, 16384, 1 << 18, 1 << 19, 2, 4
-_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER, _PR_SET_SECUREBITS, _NO_SETUID_FIXUP = 1, 36, 28, 4
 _SIOCSIFFLAGS, _IFF_UP, _IFF_RUNNING = 0x8914, 1, 64
 _RTM_NEWROUTE, _NLM_F_REQUEST, _NLM_F_ACK, _NLM_F_CREATE = 24, 1, 4, 0x400
 _RTA_DST, _RTA_OIF, _RTA_PREFSRC = 1, 4, 7
@@ -79,28 +80,6 @@ def unshare() -> None:
     _unshare(_CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS | _CLONE_NEWPID)
 
 
-def refusal() -> str:
-    """Why the kernel refuses this process further namespaces with their own mounts; empty when it allows them.
-
-    A child tries it as bubblewrap would: without root within a user namespace.
-    """
-    reader, writer = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            _unshare(_CLONE_NEWNS | _CLONE_NEWPID)
-            _keep_mounts_private()
-        except OSError as error:
-            os.write(writer, str(error.strerror).encode())
-        finally:
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as answer:
-        why = answer.read().decode(errors="replace")
-    os.waitpid(child, 0)
-    return why
-
-
 def _keep_mounts_private() -> None:
     _call("mount", b"none", b"/", None, _MS_REC | _MS_PRIVATE, None)
 
@@ -119,60 +98,42 @@ def _unshare(flags: int) -> None:
 def enter(process: int) -> dict[Path, int]:
     """Joins the network and IPC namespaces of another process, and leaves the host's mounts and process numbers.
 
-    The next fork is process 1. Gives descriptors of the other process's ``SHARED`` folders, for ``furnish_entered``.
+    The next fork is process 1. Gives descriptors of the other process's ``SHARED`` folders, for ``furnish``.
     Raises OSError: only root may do so.
     """
-    _join(process, "net", _CLONE_NEWNET)
-    _join(process, "ipc", _CLONE_NEWIPC)
-    own = os.open("/proc/self/ns/mnt", os.O_RDONLY | os.O_CLOEXEC)
-    _join(process, "mnt", _CLONE_NEWNS)
+    other, own = os.pidfd_open(process), os.open("/proc/self/ns/mnt", os.O_RDONLY | os.O_CLOEXEC)
+    _call("setns", other, _CLONE_NEWNET | _CLONE_NEWIPC | _CLONE_NEWNS)
     try:
         flags = _OPEN_TREE_CLONE | os.O_CLOEXEC
         trees = {path: _syscall(_OPEN_TREE, _AT_FDCWD, bytes(path), flags) for path in SHARED}
     finally:
         _call("setns", own, _CLONE_NEWNS)
         os.close(own)
+        os.close(other)
     _call("unshare", _CLONE_NEWNS | _CLONE_NEWPID)
     return trees
 
 
-def _join(process: int, kind: str, flag: int) -> None:
-    descriptor = os.open(f"/proc/{process}/ns/{kind}", os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        _call("setns", descriptor, flag)
-    finally:
-        os.close(descriptor)
+def furnish(shown: Collection[Path], trees: Mapping[Path, int]) -> None:
+    """Mounts, and the network of new namespaces; to be called by their process 1.
 
-
-def furnish_entered(trees: Mapping[Path, int], shown: Collection[Path]) -> None:
-    """Mounts the folders of ``enter``; to be called by the new process 1.
-
-    Of the host's ``SHARED`` only the folders ``shown`` stay, which are empty to the other process.
-    """
-    _keep_mounts_private()
-    _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
-    for folder, tree in trees.items():
-        old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
-        _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(folder), _MOVE_MOUNT_F_EMPTY_PATH)
-        os.close(tree)
-        _bind_old(old, folder, shown)
-
-
-def furnish(shown: Collection[Path]) -> None:
-    """Mounts and network of the new namespaces; to be called by their process 1.
-
-    Of the folders in ``SHARED`` those stay that are ``shown``, but no files: they may be another test's tokens.
+    With the ``trees`` of ``enter``, mounts are all. Of the folders in ``SHARED`` those stay that are ``shown``, which
+    are empty to the other process, but no files: they may be another test's tokens.
     """
     _keep_mounts_private()
     with contextlib.suppress(OSError):  # containers may mask /proc; only tools like ps would miss it
         _call("mount", b"proc", b"/proc", b"proc", _MS_NOSUID | _MS_NODEV, None)
-    for folder in SHARED:
-        if folder.is_dir():
-            old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+    for folder in filter(Path.is_dir, SHARED):
+        old = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+        if trees:
+            _syscall(_MOVE_MOUNT, trees[folder], b"", _AT_FDCWD, bytes(folder), _MOVE_MOUNT_F_EMPTY_PATH)
+            os.close(trees[folder])
+        else:
             mount_tmpfs(folder, _SHARED_SIZE)
-            _bind_old(old, folder, shown)
-    _loopback_up()
-    _multicast_route()
+        _bind_old(old, folder, shown)
+    if not trees:
+        _loopback_up()
+        _multicast_route()
 
 
 def mount_tmpfs(folder: Path, options: str) -> None:
@@ -190,15 +151,14 @@ def bind_as(source: Path, target: Path, owner: int, user: int) -> None:
 
     By an ID-mapped mount (mount_setattr(2)); raises OSError if the kernel or the file system has none.
     """
-    users = _user_namespace(_swapped(owner, user))
+    users = user_namespace(_swapped(owner, user))
+    tree = _syscall(_OPEN_TREE, _AT_FDCWD, bytes(source), _OPEN_TREE_CLONE | _AT_RECURSIVE | os.O_CLOEXEC)
+    attributes = struct.pack("QQQQ", _MOUNT_ATTR_IDMAP, 0, 0, users)
     try:
-        tree = _syscall(_OPEN_TREE, _AT_FDCWD, bytes(source), _OPEN_TREE_CLONE | _AT_RECURSIVE | os.O_CLOEXEC)
-        attributes = struct.pack("QQQQ", _MOUNT_ATTR_IDMAP, 0, 0, users)
         _syscall(_MOUNT_SETATTR, tree, b"", _AT_EMPTY_PATH, attributes, len(attributes))
         _syscall(_MOVE_MOUNT, tree, b"", _AT_FDCWD, bytes(target), _MOVE_MOUNT_F_EMPTY_PATH)
-        os.close(tree)
     finally:
-        os.close(users)
+        os.close(tree)
 
 
 def _swapped(one: int, other: int) -> str:
@@ -208,26 +168,33 @@ def _swapped(one: int, other: int) -> str:
     return "".join(f"{inside} {outside} {count}\n" for inside, outside, count in between if count)
 
 
-def _user_namespace(mapping: str) -> int:
-    """A descriptor of a user namespace with a mapping of users and groups; raises OSError."""
-    reader, writer = os.pipe()
+@functools.cache
+def user_namespace(mapping: str, owner: int = 0) -> int:
+    """A descriptor of a user namespace with a mapping of users and groups, which its owner may enter; raises OSError.
+
+    Root makes it in the owner's place, who may be allowed none. It stays open.
+    """
+    ours, theirs = socket.socketpair()
     child = os.fork()
     if child == 0:
+        ours.close()
         with contextlib.suppress(OSError):
+            _call("prctl", _PR_SET_SECUREBITS, _NO_SETUID_FIXUP, 0, 0, 0)  # it keeps its capabilities
+            os.setresuid(owner, owner, owner)
             _call("unshare", _CLONE_NEWUSER)
-            os.write(writer, b"x")
-            signal.pause()
+            socket.send_fds(theirs, [b"x"], [os.open("/proc/self/ns/user", os.O_RDONLY)])
+            theirs.recv(1)
         os._exit(1)
-    os.close(writer)
+    theirs.close()
     try:
-        if not os.read(reader, 1):
+        _, descriptors, _, _ = socket.recv_fds(ours, 1, 1)
+        if not descriptors:
             raise OSError(errno.EPERM, "the kernel refuses user namespaces")
         for kind in ("uid_map", "gid_map"):
             Path(f"/proc/{child}/{kind}").write_text(mapping)
-        return os.open(f"/proc/{child}/ns/user", os.O_RDONLY | os.O_CLOEXEC)
+        return descriptors[0]
     finally:
-        os.close(reader)
-        os.kill(child, signal.SIGKILL)
+        ours.close()
         os.waitpid(child, 0)
 
 

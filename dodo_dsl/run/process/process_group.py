@@ -7,13 +7,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from dodo_dsl.run.machine_load import service_use
-
 OURS = 2
 """Processes of a service's sandbox that are not the application's: bubblewrap, and the first of its namespace."""
 _PREFIX = "dodo-"
 _PIDS, _CPUACCT = "pids", "cpuacct"
 _USAGE, _STAT = "cpuacct.usage", "cpu.stat"
+_MOST = 4096
 _UNUSED_S = 60.0
 _TRIES, _TRY_S = 20, 0.01
 
@@ -38,7 +37,9 @@ class ProcessGroup:
 
     def used_s(self) -> float | None:
         """Processor time in s of all that were ever in it; None if it is not counted."""
-        return None if self._usage is None else service_use.processor_s(self._usage)
+        with contextlib.suppress(OSError):
+            return None if self._usage is None else _seconds(os.pread(self._usage, _MOST, 0).decode())
+        return None
 
     def remove(self) -> None:
         """When all of its processes have ended; the next run removes what is left."""
@@ -101,6 +102,35 @@ def holding(proc: Path = Path("/proc/self")) -> Iterator[Path]:
         yield from (group for group in (own, *own.parents) if group.is_relative_to(top))
 
 
+def counted(process: Path, own: Path) -> tuple[float, dict[str, int]]:
+    """Processor time in s, and the rows of memory, by the groups of a process; 0 and none if they are not counted.
+
+    ``own`` is the folder of this process, by which groups are shown.
+    """
+    times = (folder / file for folder, _, _ in _shown_groups(process, _CPUACCT, own) for file in (_USAGE, _STAT))
+    seconds = (_seconds(_text(file)) for file in times)
+    memories = (_rows(_text(folder / "memory.stat")) for folder, _, _ in _shown_groups(process, "memory", own))
+    return next(filter(None, seconds), 0.0), next(filter(None, memories), {})
+
+
+def _text(file: Path) -> str:
+    with contextlib.suppress(OSError):
+        return file.read_text()
+    return ""
+
+
+def _seconds(text: str) -> float | None:
+    """By the text of ``cpuacct.usage`` or ``cpu.stat``."""
+    if text.strip().isdecimal():
+        return int(text) / 1e9
+    ticks = _rows(text).get("usage_usec")
+    return None if ticks is None else ticks / 1e6
+
+
+def _rows(text: str) -> dict[str, int]:
+    return {name: int(number) for name, number in (line.split() for line in text.splitlines())}
+
+
 def _parents(proc: Path, counter: str = _PIDS) -> Iterator[Path]:
     """The groups in which others that count processes may be made: this process's own, or the one above it."""
     for own, top, is_first_version in _shown_groups(proc, counter):
@@ -108,11 +138,14 @@ def _parents(proc: Path, counter: str = _PIDS) -> Iterator[Path]:
         yield from [own] if is_first_version else (group for group in (own, *above) if _hands_on(group))
 
 
-def _shown_groups(proc: Path, counter: str = _PIDS) -> Iterator[tuple[Path, Path, bool]]:
-    """The group of this process, the top of the tree of which it is seen, and whether that is of version 1."""
+def _shown_groups(proc: Path, counter: str = _PIDS, own: Path | None = None) -> Iterator[tuple[Path, Path, bool]]:
+    """The group of a process, the top of the tree of which it is seen, and whether that is of version 1.
+
+    ``own`` is the folder of this process, if that is another one.
+    """
     try:
         groups = [line.split(":", 2) for line in (proc / "cgroup").read_text().splitlines()]
-        mounts = [line.split() for line in (proc / "mountinfo").read_text().splitlines()]
+        mounts = [line.split() for line in ((own or proc) / "mountinfo").read_text().splitlines()]
     except OSError:
         return
     for _, controllers, path in (group for group in groups if len(group) == 3):

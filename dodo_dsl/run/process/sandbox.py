@@ -8,18 +8,15 @@ killed, the kernel sends SIGTERM to what it started. It has one thread: that sig
                         "env" being what differs from the sandbox's own (null removes), "fork" whether argv
                         is a Python module for which a fork of the sandbox will do, "masked" the device files
                         that it must not see, "confined" the application's confinement or null;
-                        {"do": "close"}; {"do": "probe"}; {"do": "load"}; {"do": "listeners"};
+                        {"do": "close"}; {"do": "listeners"};
                         {"do": "relay", "cid", "folder"}; {"do": "send", "to": [name, ...], "data"};
-                        {"do": "use", "names": [service, ...]};
+                        {"do": "use", "names": services of which memory is measured, too};
                         {"do": "keep"} with the descriptors of outputs and logs
-    sandbox to runner   {"up": pid} or {"down": why, "missing": as below}; {"started": id, "pid"} or
+    sandbox to runner   {"up": pid} or {"down": why}; {"started": id, "pid"} or
                         {"unstartable": id, "why"}; {"exited": id, "code", "used", "failed"};
-                        {"load": snapshot or null};
                         {"relay": whether it can send};
                         {"listeners": names of what listens on a bus, or null};
-                        {"use": {service: [seconds on processors, bytes of memory]} or null};
-                        {"probe": why an application cannot be confined, or "", "missing": what it lacks for that, as
-                        ``confined.missing`` has it}
+                        {"use": snapshot or null}
 """
 
 import contextlib
@@ -41,10 +38,8 @@ import msgspec
 
 from dodo_dsl.opendlv.relay import Relay
 from dodo_dsl.run.listeners import listening
-from dodo_dsl.run.machine_load import snapshot
-from dodo_dsl.run.machine_load.processes import ThreadTimes
 from dodo_dsl.run.machine_load.service_use import UseReader
-from dodo_dsl.run.process import confined_process, namespaces, places
+from dodo_dsl.run.process import namespaces, places
 from dodo_dsl.run.process.children import Children
 from dodo_dsl.run.process.confined_process import PERIOD_S
 from dodo_dsl.run.process.confinement import Confinement
@@ -52,6 +47,7 @@ from dodo_dsl.run.process.places import Places
 from dodo_dsl.run.process.seccomp_filter import NoSeccomp
 from dodo_dsl.run.process.slot import Entered
 
+HOST = "host"
 MAX_MESSAGE = 1 << 17
 MAX_DESCRIPTORS = 250
 UMASK = 0o022
@@ -61,16 +57,15 @@ UMASK = 0o022
 class Sandbox:
     """The main loop of the sandbox's process."""
 
-    def __init__(self, channel: socket.socket, isolation: str, forks: bool = False) -> None:
+    def __init__(self, channel: socket.socket, is_on_host: bool, forks: bool) -> None:
         """``forks`` means that this process has loaded what services need."""
         self.channel = channel
-        self.isolation = isolation
+        self.is_on_host = is_on_host
         self.forks = forks
-        umask = UMASK if isolation == "network" else -1
+        umask = -1 if is_on_host else UMASK
         self.use = UseReader()
-        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), self.use.note_end, umask)
+        self.children = Children(lambda name, ended: self.send(exited=name, **asdict(ended)), umask)
         self.places: Places | None = None
-        self.times = ThreadTimes()
         self.relay: Relay | None = None
         self.keep = False
         self.ended = False
@@ -111,7 +106,7 @@ class Sandbox:
                 if not self.keep:
                     break
                 sources.remove(self.channel)
-        self.children.end_all(self.isolation == "network" and os.getpid() == 1, self._wait)
+        self.children.end_all(not self.is_on_host, self._wait)
 
     def _drain_wakeup(self) -> None:
         with contextlib.suppress(BlockingIOError):
@@ -156,13 +151,9 @@ class Sandbox:
     def _confine(
         self, name: str, words: Sequence[str], environment: dict[str, str], output: int, confined: Confinement
     ) -> int:
-        if confined.isolation == "network" and self.places is None:
-            self.places = Places(places.own_user(confined.cid))
+        if self.places is None and not self.is_on_host:
+            self.places = Places(confined.folder, places.own_user())
         return self.children.confine(name, words, environment, output, confined, self.places)
-
-    def _do_probe(self, _descriptors: list[int]) -> None:
-        why = confined_process.confinement_problem()
-        self.send(probe=why, missing=confined_process.missing() if why else "")
 
     def _do_relay(self, _descriptors: list[int], cid: int, folder: str) -> None:
         with contextlib.suppress(OSError):
@@ -173,21 +164,11 @@ class Sandbox:
         if self.relay is not None:
             self.relay.send(bytes.fromhex(data), to)
 
-    def _do_load(self, _descriptors: list[int]) -> None:
-        """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
-        names, took = {**self.children.names, os.getpid(): ""}, self.children.took_s()
-        taken = snapshot.take(self.times, names) if _has_own_proc() else None
-        self.send(load=taken and asdict(snapshot.with_ended(taken, took, self.times.ended)))
-
     def _do_use(self, _descriptors: list[int], names: list[str]) -> None:
-        """Reports what some services have used so far."""
-        services = {pid: name for pid, name in self.children.names.items() if name in names}
-        took = self.children.took_s()
-        found = {
-            name: (max(used.processor_s, took.get(name) or 0.0), used.memory)
-            for name, used in (self.use.take(services).items() if _has_own_proc() else ())
-        }
-        self.send(use=found if _has_own_proc() else None)
+        """Reports what the services have used so far, if this ``/proc`` shows them by their numbers here."""
+        self.use.sized.update(names)
+        taken = self.use.take({**self.children.names, os.getpid(): ""}) if _has_own_proc() else None
+        self.send(use=taken and asdict(self.children.with_ended(taken)))
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
         found = listening(self.children.names) if _has_own_proc() else None
@@ -228,10 +209,7 @@ def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
     child = os.fork()
     if child == 0:
         namespaces.die_with_parent(signal.SIGKILL)
-        if entered.process:
-            namespaces.furnish_entered(trees, entered.shown)
-        else:
-            namespaces.furnish(entered.shown)
+        namespaces.furnish(entered.shown, trees)
         return
     channel.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -241,22 +219,18 @@ def _in_namespaces(channel: socket.socket, entered: Entered) -> None:
 
 
 def main(argv: list[str]) -> int:
-    """``sandbox DESCRIPTOR network|host [--forks] [--enter=JSON]``: serves the runner at the other end.
-
-    ``--enter`` is an ``Entered``.
-    """
+    """``sandbox DESCRIPTOR host|ENTERED [--forks]``: serves the runner at the other end."""
     channel = socket.socket(fileno=int(argv[0]))
-    isolation, outside, forks = argv[1], os.getpid(), "--forks" in argv
+    is_on_host, outside = argv[1] == HOST, os.getpid()
     try:
-        if isolation == "network":
-            _in_namespaces(channel, Entered.among(argv) or Entered.with_own(0))
+        if not is_on_host:
+            _in_namespaces(channel, Entered.of(argv[1]))
         else:
             namespaces.adopt_orphans()
     except OSError as error:
-        missing = confined_process.NAMESPACES if namespaces.refusal() else ""
-        channel.send(json.dumps({"down": str(error.strerror or error), "missing": missing}).encode())
+        channel.send(json.dumps({"down": str(error.strerror or error)}).encode())
         return 1
-    sandbox = Sandbox(channel, isolation, forks)
+    sandbox = Sandbox(channel, is_on_host, "--forks" in argv)
     sandbox.send(up=outside)
     sandbox.run()
     return 0

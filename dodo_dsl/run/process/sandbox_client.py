@@ -4,24 +4,23 @@ import asyncio
 import contextlib
 import errno
 import json
+import os
 import select
+import signal
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from dodo_dsl import atomic
 from dodo_dsl.run.process.environment import own_environment
-from dodo_dsl.run.process.fork_server_client import ForkedSandbox, ForkServer, end
-from dodo_dsl.run.process.sandbox import MAX_MESSAGE
+from dodo_dsl.run.process.fork_server_client import END_S, ForkServer
+from dodo_dsl.run.process.sandbox import HOST, MAX_MESSAGE
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
 from dodo_dsl.run.protocol import BackendError
 
 CLOSE_S = 10.0
-LOG = "sandbox.log"
 
 
 class SandboxClient:
@@ -32,80 +31,61 @@ class SandboxClient:
 
     def __init__(
         self,
-        isolation: str,
         on_message: Callable[[dict[str, Any]], None],
         on_lost: Callable[[str], None],
         fork_server: ForkServer | None = None,
     ) -> None:
-        self._isolation = isolation
-        self._fork_server = fork_server if isolation == "network" else None
+        self._fork_server = fork_server
         self._on_message = on_message
         self._on_lost = on_lost
-        self._process: subprocess.Popen[bytes] | ForkedSandbox | None = None
+        self.pid: int | None = None
+        """The sandbox's process while it runs."""
+        self._child: subprocess.Popen[bytes] | None = None
+        self._end = -1
         self._socket: socket.socket | None = None
         self._up: asyncio.Future[dict[str, Any]] | None = None
         self._closing = False
-        self._words: tuple[str, ...] = ()
 
-    @property
-    def pid(self) -> int | None:
-        """The sandbox's process while it runs."""
-        return self._process.pid if self._process is not None and self._process.poll() is None else None
-
-    async def open(self, slot: Slot, folder: Path, entered: Entered | None = None) -> None:
-        """Starts the sandbox, which logs into ``folder`` and holds the slot's leases; raises BackendError.
+    async def open(self, slot: Slot, log: int, entered: Entered | None = None) -> None:
+        """Starts the sandbox, which logs to a descriptor and holds the slot's leases; raises BackendError.
 
         ``entered`` are its namespaces; None on the host.
         """
-        self._words = (entered.word(),) if entered else ()
-        folder.mkdir(parents=True, exist_ok=True)
-        answer = await self._start(slot, folder / LOG)
-        if "down" in answer and self._fork_server is not None:  # it may have ended
-            self._fork_server = None
+        answer: dict[str, Any] = {}
+        server = self._fork_server if entered else None
+        for each in (server, None) if server else (None,):  # it may have ended
+            answer = await self._start(slot, log, entered.word() if entered else HOST, each)
+            if "up" in answer:
+                break
             self._close_socket()
-            answer = await self._start(slot, folder / LOG)
-        if "down" in answer:
-            raise BackendError(f"no sandbox of isolation {self._isolation}: {answer['down']}")
-        if self._process is None:
-            self._process = ForkedSandbox(answer["up"])
+        else:
+            raise BackendError(f"the test's sandbox does not start: {answer['down']}")
+        self.pid = answer["up"]
+        with contextlib.suppress(ProcessLookupError):
+            self._end = os.pidfd_open(answer["up"])
 
-    async def _start(self, slot: Slot, log: Path) -> dict[str, Any]:
-        """The first message of a new sandbox."""
+    async def _start(self, slot: Slot, log: int, entered: str, server: ForkServer | None) -> dict[str, Any]:
+        """The first message of a new sandbox, which a fork server forks, where there is one."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
         self._socket, self._up = ours, asyncio.get_running_loop().create_future()
-        with theirs, atomic.appended(log) as stderr:
-            if not self._is_forked(theirs, stderr.fileno(), slot):
-                self._process = subprocess.Popen(
-                    [
-                        sys.executable,
-                        "-P",
-                        "-m",
-                        "dodo_dsl.run.process.sandbox",
-                        str(theirs.fileno()),
-                        self._isolation,
-                        *self._words,
-                    ],
+        asyncio.get_running_loop().add_reader(ours, self._receive)
+        with theirs:
+            if server is not None:
+                with contextlib.suppress(OSError):
+                    server.fork(theirs, log, slot.name, entered)
+            else:
+                module = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox"]
+                self._child = subprocess.Popen(
+                    [*module, str(theirs.fileno()), entered],
                     pass_fds=(theirs.fileno(), *slot.descriptors),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
-                    stderr=stderr,
+                    stderr=log,
                     start_new_session=True,
                     env={**own_environment(), "PYTHONPATH": package_path(), SLOT_VARIABLE: slot.name},
                 )
-        asyncio.get_running_loop().add_reader(ours, self._receive)
         return await self._up
-
-    def _is_forked(self, theirs: socket.socket, log: int, slot: Slot) -> bool:
-        """Whether the fork server forks the sandbox; it does not when there is none, or it has ended."""
-        if self._fork_server is None:
-            return False
-        try:
-            self._fork_server.fork(theirs, log, slot.name, self._words)
-        except OSError:
-            self._fork_server = None
-            return False
-        return True
 
     def _close_socket(self) -> None:
         if self._socket is not None:
@@ -124,6 +104,7 @@ class SandboxClient:
             self._take(json.loads(data))
             return
         asyncio.get_running_loop().remove_reader(self._socket)
+        self.pid = None
         was_up = self._up is not None and self._up.done()
         self._resolve({"down": "it ended at once"})
         if was_up and not self._closing:
@@ -153,16 +134,23 @@ class SandboxClient:
     async def close(self) -> None:
         """Ends everything in the sandbox, and itself."""
         self._closing = True
-        if self._process is not None and self._socket is not None:
+        if self._end >= 0 and self._socket is not None:
             self.send({"do": "close"})
-            loop = asyncio.get_running_loop()
-            await loop.run_in_executor(None, end, self._process)
-            loop.remove_reader(self._socket)
+            await asyncio.get_running_loop().run_in_executor(None, self._wait)
             with contextlib.suppress(OSError):
                 while data := self._socket.recv(MAX_MESSAGE):  # how the last of them ended
                     self._take(json.loads(data))
-        if self._socket is not None:
-            self._socket.close()
+        self._close_socket()
+
+    def _wait(self) -> None:
+        """Returns when the sandbox has ended, which is killed where it does not end by itself."""
+        if not select.select([self._end], [], [], END_S)[0]:
+            signal.pidfd_send_signal(self._end, signal.SIGKILL)
+            select.select([self._end], [], [])
+        os.close(self._end)
+        self._end = -1
+        if self._child is not None:
+            self._child.wait()
 
     def keep(self, descriptors: tuple[int, ...]) -> None:
         """Lets the sandbox outlive the runner, with the descriptors of outputs, then of their logs."""

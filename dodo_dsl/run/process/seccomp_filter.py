@@ -72,11 +72,3 @@ def _bits_of_other_personalities() -> Iterator[tuple[int, int]]:
     other = [bit for bit in bits if not _PERSONALITIES & bit]
     yield from zip(other, [*other[1:], other[0]], strict=True)
     yield from ((other[0], bit) for bit in bits if _PERSONALITIES & bit)
-
-
-def descriptor() -> int:
-    """An open descriptor with the filter, from its beginning; the caller closes it."""
-    number = os.memfd_create("filter")
-    os.write(number, program())
-    os.lseek(number, 0, os.SEEK_SET)
-    return number

@@ -10,7 +10,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -47,7 +47,6 @@ class Slot:
     channel: str = ""
 
 
-_FLAG = "--enter="
 _VARIABLES = ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV", "HOME", "DODO_FIRMWARE")
 """Where DoDo's services find programs, libraries, settings and the emulated rig; no other variable shows a folder."""
 
@@ -71,17 +70,14 @@ class Entered:
         return cls(process, tuple(sorted({folder / parts[0] for folder, parts in inside if parts})))
 
     def word(self) -> str:
-        """The word of a sandbox's command line."""
-        return _FLAG + json.dumps([self.process, *map(str, self.shown)])
+        """For a sandbox's command line."""
+        return json.dumps([self.process, *map(str, self.shown)])
 
     @classmethod
-    def among(cls, words: Sequence[str]) -> Self | None:
-        """The one among the words of a sandbox's command line."""
-        for word in words:
-            if word.startswith(_FLAG):
-                process, *shown = json.loads(word.removeprefix(_FLAG))
-                return cls(process, tuple(map(Path, shown)))
-        return None
+    def of(cls, word: str) -> Self:
+        """As in a sandbox's command line."""
+        process, *shown = json.loads(word)
+        return cls(process, tuple(map(Path, shown)))
 
 
 def named_paths(words: Iterable[str]) -> list[Path]:

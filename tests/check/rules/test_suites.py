@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dodo_dsl.check.suite_rules import check_suite
+from dodo_dsl.check.spec_rules import check_suite
 from tests.check.contexts import checked
 
 

@@ -19,7 +19,7 @@ def test_what_cannot_be_examined_is_a_finding(tmp_path: Path, monkeypatch: pytes
     (tmp_path / "gone").rmdir()
     found = {finding.name: finding for finding in examine()}
     assert (found["disk"].state, found["disk"].text[:22]) == ("problem", "cannot be examined: [E")
-    assert {"multicast", "shared memory", "docker engine", "left behind"} <= set(found)
+    assert {"multicast", "receive buffer", "docker engine", "left behind"} <= set(found)
 
 
 def test_an_engine_on_a_port_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ import contextlib
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,20 +14,23 @@ from docker.errors import APIError
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
 from dodo_dsl.run.docker.backend import DockerBackend
-from dodo_dsl.run.docker.container_use import ContainerProcesses, ContainerUse
+from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.pulls import Pulls
-from dodo_dsl.run.machine_load.snapshot import Times
+from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.protocol import BackendError
 from tests.run.helpers import Bench
-from tests.run.load.test_thread_times import Proc
+from tests.run.load.test_service_use import Proc
 
 
 class Container:
     """A container as the engine's client shows it."""
 
-    def __init__(self, number: str, pid: int, problem: Exception | None = None) -> None:
-        self.id, self.problem = number, problem
-        self.attrs: dict[str, Any] = {"State": {"Pid": pid}}
+    def __init__(
+        self, number: str, pid: int, problem: Exception | None = None, stats: dict[str, Any] | None = None
+    ) -> None:
+        self.id, self.problem, self.stats = number, problem, stats or {}
+        self.attrs: dict[str, Any] = {"State": {"Pid": pid}, "HostConfig": {"Memory": 9_000_000}}
+        self.client = SimpleNamespace(api=SimpleNamespace(stats=lambda *_, **__: self.stats))
 
     def reload(self) -> None:
         if self.problem:
@@ -37,9 +41,8 @@ class Container:
 def proc(tmp_path: Path) -> Proc:
     """Process 10 belongs to container c0ffee, 11 to no container."""
     found = Proc(tmp_path)
-    (tmp_path / "stat").write_text("".join(f"cpu{core} 1 1 1 1 1 1 1 1 0 0\n" for core in range(1024)))
     for pid, group in ((10, "0::/../c0ffee"), (11, "0::/")):
-        found.put(pid, 1, {pid: (100, 10)})
+        found.put(pid, 1, megabytes=3, threads={pid: (100, 10)})
         (tmp_path / str(pid) / "cgroup").write_text(f"{group}\n")
     return found
 
@@ -48,7 +51,7 @@ def test_which_containers_listen_on_a_bus(proc: Proc, monkeypatch: pytest.Monkey
     """By their sockets; where those are hidden, by the members of their networks."""
     (proc.root / "10" / "net").mkdir()
     (proc.root / "10" / "net" / "igmp").write_text("Idx\tDevice\n2\teth0\n\t\t\t\t830000E1     1 0:00000000\t\t0\n")
-    containers = ContainerProcesses({"app": Container("c0ffee", 10), "camera": Container("beef", 12)}, proc.root)
+    containers = ContainerUse({"app": Container("c0ffee", 10), "camera": Container("beef", 12)}, proc=proc.root)
     monkeypatch.setattr(container_use, "listening", lambda services, _: set(services.values()))
     assert containers.listeners(["app"], 130) == {"app"}
     assert containers.listeners(["camera"], 130) is None
@@ -59,7 +62,7 @@ def test_which_containers_listen_on_a_bus(proc: Proc, monkeypatch: pytest.Monkey
 def test_the_first_processes_of_the_application(proc: Proc) -> None:
     """None where the engine runs one of them elsewhere, or does not tell."""
     containers = {"app": Container("c0ffee", 10), "ended": Container("beef", 0), "far": Container("beef", 11)}
-    found = ContainerProcesses({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc.root)
+    found = ContainerUse({**containers, "mute": Container("c0ffee", 10, APIError("no"))}, proc=proc.root)
     assert found.first(["app", "ended"]) == {10: "app"}
     assert (found.first(["app", "far"]), found.first(["mute"])) == (None, None)
 
@@ -78,7 +81,7 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
     async def begin() -> None:
         plan = replace(Bench(tmp_path).plan(), isolation=isolation)
         backend = DockerBackend(plan, tmp_path, tmp_path, None, Pulls(None), "p", (), print, b"")
-        backend._processes = ContainerProcesses({"app": Changing("c0ffee", 0)}, proc.root)
+        backend._use = ContainerUse({"app": Changing("c0ffee", 0)}, proc=proc.root)
         await backend.require_own_host()
 
     refused = pytest.raises(BackendError, match=r"another machine.*use --isolation network")
@@ -95,7 +98,7 @@ def test_one_thread_at_a_time_measures(proc: Proc) -> None:
             with contextlib.suppress(threading.BrokenBarrierError):
                 met.append(both.wait(0.1))
 
-    use = ContainerUse({"app": Slow("c0ffee", 0)}, proc.root)
+    use = ContainerUse({"app": Slow("c0ffee", 0)}, proc=proc.root)
     threads = [threading.Thread(target=use.take) for _ in range(2)]
     for thread in threads:
         thread.start()
@@ -104,21 +107,68 @@ def test_one_thread_at_a_time_measures(proc: Proc) -> None:
     assert not met
 
 
-def services(proc: Proc, **containers: Any) -> dict[str, Times] | None:
-    found = ContainerProcesses(containers, proc.root).load()
-    return None if found is None else dict(found.services)
+OF_1, OF_2 = "rss 5\nshmem 6\ntotal_rss 5000000\ntotal_shmem 1000000\n", "anon 5000000\nfile 777\nshmem 1000000\n"
+STATS = {
+    "cpu_stats": {"cpu_usage": {"total_usage": 2_500_000_000}},
+    "memory_stats": {"usage": 9, "stats": {"anon": 5_000_000, "shmem": 1_000_000}},
+}
 
 
-def test_what_containers_on_this_machine_used(proc: Proc) -> None:
-    used = {"app": Times(pytest.approx(0.1), pytest.approx(0.01))}
-    assert services(proc, app=Container("c0ffee", 10), **{SANDBOX: Container("c0ffee", 11)}) == used
-    assert services(proc, app=Container("c0ffee", 10), ended=Container("beef", 0)) == used
+def counted(proc: Proc, kind: str, options: str, files: dict[str, str], shown: str = "/") -> None:
+    """What the kernel counts for the group of process 10, of which this process sees what is below ``shown``."""
+    names = "" if kind == "cgroup2" else options
+    groups = f"{0 if kind == 'cgroup2' else 4}:{names}:/docker/c0ffee\n"
+    with (proc.root / "10" / "cgroup").open("a") as group, (proc.root / "self" / "mountinfo").open("a") as mounts:
+        group.write(groups)
+        mounts.write(f"30 25 0:26 {shown} {proc.root}/{names or 'unified'} rw shared:4 - {kind} x rw,{options}\n")
+    folder = proc.root / (names or "unified") / Path("/docker/c0ffee").relative_to(shown)
+    folder.mkdir(parents=True)
+    for name, text in files.items():
+        (folder / name).write_text(text)
 
 
-def test_containers_on_another_machine_are_not_measured(proc: Proc) -> None:
+def used(proc: Proc, **containers: Container) -> dict[str, Used] | None:
+    taken = ContainerUse(containers, ["app"], proc.root).take()
+    return None if taken is None else dict(taken.services)
+
+
+SEEN = Used(2.5, 0.01, 6_000_000, 9_000_000)
+
+
+@pytest.mark.parametrize("shown", ["/", "/docker", "/docker/c0ffee"])
+def test_what_containers_used_by_groups_of_version_1(proc: Proc, shown: str) -> None:
+    """Also where DoDo sees only a part of the groups, as in a container. What has ended has used what it had."""
+    counted(proc, "cgroup", "cpu,cpuacct", {"cpuacct.usage": "2500000000\n"}, shown)
+    counted(proc, "cgroup", "memory", {"memory.stat": OF_1}, shown)
+    counted(proc, "cgroup2", "nsdelegate", {"cpu.stat": "usage_usec 77\n"}, shown)
+    app, sandbox, ended = Container("c0ffee", 10), Container("c0ffee", 11), Container("beef", 0)
+    use = ContainerUse({"app": app, "ended": ended, SANDBOX: sandbox}, ["app"], proc.root)
+    assert (taken := use.take()) is not None and taken.services == {"app": SEEN}
+    proc.end(10)
+    assert (taken := use.take()) is not None and taken.services == {"app": SEEN._replace(memory=0)}
+
+
+@pytest.mark.parametrize(("files", "memory"), [({"memory.stat": OF_2}, 6_000_000), ({}, 3 << 20)])
+def test_what_containers_used_by_groups_of_version_2(proc: Proc, files: dict[str, str], memory: int) -> None:
+    """Also without the controller of memory."""
+    counted(proc, "cgroup2", "nsdelegate", {"cpu.stat": "usage_usec 2500000\nuser_usec 1\n", **files})
+    assert used(proc, app=Container("c0ffee", 10)) == {"app": SEEN._replace(memory=memory)}
+
+
+def test_what_containers_used_on_another_machine(proc: Proc) -> None:
     """A process here may have the number of one there."""
-    assert services(proc, app=Container("c0ffee", 11)) is None
-    assert services(proc, app=Container("c0ffee", 12)) is None
-    assert services(proc, app=Container("c0ffee", 10), camera=Container("beef", 12)) is None, "or counts as others"
-    assert services(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
-    assert services(proc) is None
+    assert used(proc, app=Container("c0ffee", 11, stats=STATS)) == {"app": SEEN._replace(waited_s=0.0)}
+
+
+def test_the_load_is_measured_where_all_containers_run_here(proc: Proc) -> None:
+    def is_measured(**containers: Container) -> bool:
+        taken = ContainerUse(containers, ["app"], proc.root).take()
+        return taken is not None and taken.busy_s is not None
+
+    app = Container("c0ffee", 10)
+    assert is_measured(app=app) and is_measured(app=app, ended=Container("beef", 0))
+    assert not is_measured(app=app, camera=Container("beef", 12)), "or counts as others"
+    assert not is_measured(app=Container("c0ffee", 11, stats=STATS))
+    assert used(proc, app=Container("c0ffee", 12)) is None
+    assert used(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
+    assert used(proc) is None

@@ -1,69 +1,60 @@
-"""When a failure is an error: the machine was too busy, and it was not the application that kept it so."""
+"""When a failure is an error as the machine was too busy, and what answers and use mean for a test."""
 
 from dataclasses import replace
 
 import pytest
 
-from dodo_dsl.outcome import MachineLoad, Wait
-from dodo_dsl.run.machine_load.judgement import consider
+from dodo_dsl.outcome import (
+    SAMPLE_TIMES,
+    SLOW_ANSWERS,
+    MachineLoad,
+    Response,
+    ServiceUse,
+    Wait,
+    differs_each_run,
+    with_margin,
+)
+from dodo_dsl.plan.model import Lockstep
+from dodo_dsl.run.machine_load.judgement import (
+    TIMED_WAY_OUT,
+    UNSEEN,
+    UNSEEN_USE,
+    consider,
+    judged_response,
+    judged_use,
+)
 from dodo_dsl.run.outcomes import Finding
+from dodo_dsl.spec.model import ResourceLimits
 
 CALM = MachineLoad(
     7.5, 2, Wait(1.0, 0.9, 0.7, "perception"), Wait(1.5, 0.5, 0.4, "camera"), 0.61, 7.5, 0.05, 0.05, 0.06
 )
 CROWDED = replace(CALM, application=Wait(1.0, 2.0, 1.9, "perception"))
 FAILED = Finding("failed", "only 43 frames had an answer (at least 50)", "judge", is_verdict=True)
-
-
-def test_a_failure_on_a_busy_machine_is_an_error() -> None:
-    judged = consider(FAILED, CROWDED)
-    assert judged.finding == Finding(
-        "error",
-        "the machine was too busy to judge: perception waited 1.9 s of 7.5 s for a processor, others took 71 % of it; "
-        "it found: only 43 frames had an answer (at least 50); "
-        "run it with --clock lockstep, or fewer tests at once (-j 1)",
-        "judge",
-        is_verdict=True,
-    )
-    assert judged.load == replace(CROWDED, undecided=True)
-
-
-def test_lockstep_is_no_way_out_for_an_application_with_a_clock_of_its_own() -> None:
-    reason = consider(FAILED, CROWDED, is_timed=True).finding.reason
-    assert reason.endswith(
-        "; the application acts by its own clock: run it on a quiet machine (-j 1), or with --clock virtual, not in "
-        "lockstep"
-    )
-    assert "--clock lockstep" not in reason
+CRASHED = Finding("failed", "application service 'app' ended with exit code 3 after 2.0 s", "app")
 
 
 @pytest.mark.parametrize(
     ("load", "why"),
     [
-        (replace(CALM, late_pictures_share=0.2), "20 % of the pictures came late, by up to 0.06 s"),
-        (
-            replace(CALM, late_updates_share=0.2),
-            "20 % of the updates of one of DoDo's services came late, by up to 0.06 s",
-        ),
+        (CROWDED, "perception waited 1.9 s of 7.5 s for a processor, others took 71 % of it"),
+        (replace(CALM, late_pictures_share=0.2), "20 % of the pictures came late, by up to 0.06 s, others took 71 %"),
+        (replace(CALM, late_updates_share=0.2), "20 % of the updates of one of DoDo's services came late, by up to"),
+        (replace(CALM, paused_s=0.061), "the emulated rig could not keep real time and stood still for 0.06 s; it "),
+        (MachineLoad(7.5, paused_s=0.061), "the emulated rig could not keep real time and stood still for 0.06 s; it "),
     ],
-    ids=["pictures", "updates"],
+    ids=["waits", "late pictures", "late updates", "paused", "only paused is measured"],
 )
-def test_what_hinders_dodo_is_no_fault_of_the_application(load: MachineLoad, why: str) -> None:
-    assert consider(FAILED, load).finding.reason.startswith(
-        f"the machine was too busy to judge: {why}, others took 71 %"
-    )
-
-
-@pytest.mark.parametrize("load", [CALM, MachineLoad(7.5)], ids=["measured", "not measured"])
-def test_an_emulated_rig_that_stood_still_is_no_rig(load: MachineLoad) -> None:
-    paused = replace(load, paused_s=0.061)
-    judged = consider(FAILED, paused)
-    assert judged.finding.reason.startswith(
-        "the machine was too busy to judge: the emulated rig could not keep real time and stood still for 0.06 s; it "
-    )
-    assert judged.load == replace(paused, undecided=True)
-    passed = Finding("passed", "it drove", "judge", is_verdict=True)
-    assert consider(passed, paused).finding == passed
+def test_a_failure_on_a_busy_machine_is_an_error(load: MachineLoad, why: str) -> None:
+    finding, found = consider(FAILED, load)
+    assert (finding.result, finding.service, found) == ("error", "judge", replace(load, undecided=True))
+    assert finding.reason.startswith(f"the machine was too busy to judge: {why}")
+    way = "; it found: only 43 frames had an answer (at least 50); run it with --clock lockstep, or fewer tests at once"
+    assert f"{way} (-j 1)" in finding.reason
+    assert consider(FAILED, load, is_timed=True)[0].reason.endswith(f"(at least 50); {TIMED_WAY_OUT}")
+    assert f"it found: {'x' * 300}...; run it" in consider(replace(FAILED, reason="x" * 2000), load)[0].reason
+    for other in (replace(FAILED, result="passed"), replace(FAILED, result="error"), CRASHED):
+        assert consider(other, load) == (other, load), "does not depend on time"
 
 
 @pytest.mark.parametrize(
@@ -78,33 +69,153 @@ def test_an_emulated_rig_that_stood_still_is_no_rig(load: MachineLoad) -> None:
         replace(CALM, duration_s=0.5, application=Wait(0.1, 0.2, 0.2, "app"), services=Wait(0.1, 0.2, 0.2, "camera")),
     ],
     ids=[
-        "lockstep",
-        "calm",
-        "services that keep to their schedule",
-        "not measured",
-        "its own threads",
-        "late by the application's fault",
-        "over at once",
+        "lockstep", "calm", "services that keep to their schedule", "not measured", "its own threads",
+        "late by the application's fault", "over at once",
     ],
-)
+)  # fmt: skip
 def test_a_failure_stays_one(load: MachineLoad | None) -> None:
-    judged = consider(FAILED, load)
-    assert (judged.finding, judged.load) == (FAILED, load)
+    assert consider(FAILED, load) == (FAILED, load)
+
+
+FAST = Response(60, 0.1, 0.012, 0.02, 0.03, 0.01, 0.015, 0.02, 0, None, "Some CPU, 2000 MHz")
+UNSEEN_TIMES = replace(FAST, processor_median_s=None, processor="")
+PLAIN, LIMITED = Lockstep(1, 60.0), Lockstep(1, 60.0, 0.1, 0.1)
+COPIED = replace(PLAIN, is_copied=True)
+TIMED = replace(FAST, surplus=174, surplus_frames=17, differing=9, pauses=2, unasked=2)
+WAY = ": results can differ from run to run; run it with --clock realtime, or --clock virtual"
 
 
 @pytest.mark.parametrize(
-    "finding",
+    ("response", "lockstep", "timed", "note"),
     [
-        replace(FAILED, result="passed"),
-        replace(FAILED, result="error"),
-        Finding("failed", "application service 'app' ended with exit code 3 after 2.0 s", "app"),
+        (None, LIMITED, (), ""),
+        (FAST, None, (), ""),
+        (FAST, PLAIN, (), ""),
+        (replace(FAST, slow=6, worst_s=1.0), PLAIN, (), ""),
+        (
+            replace(FAST, median_s=0.5, p95_s=0.52, worst_s=0.75, slow=58),
+            PLAIN,
+            (),
+            "too slow for real time: 58 of 60 answers took longer than the frames' period of 100 ms; an answer took "
+            "500 ms (median), 520 ms (95 %), 750 ms (worst), 10 ms of it on the processor, on Some CPU, 2000 MHz",
+        ),
+        (
+            replace(FAST, worst_s=1.5, worst_frame=17),
+            PLAIN,
+            (),
+            "the answer to frame 17 took 1.5 s, as long as 15 frames, which outside lockstep would not have waited",
+        ),
+        (
+            replace(UNSEEN_TIMES, worst_s=1.5),
+            PLAIN,
+            (),
+            "the answer took 1.5 s with what it waited for a processor, as long as 15 frames, which outside lockstep "
+            "would not have waited",
+        ),
+        (replace(UNSEEN_TIMES, over=6), LIMITED, (), ""),
+        (replace(UNSEEN_TIMES, over=7), LIMITED, (), UNSEEN),
+        (replace(FAST, surplus=6, surplus_frames=6, pauses=2), PLAIN, (), ""),
+        (
+            TIMED,
+            PLAIN,
+            (),
+            "the application acts by its own clock: it sent messages in 2 of 2 pauses without a frame; 174 surplus "
+            f"answers in 17 of 61 frames, 9 of them with other values{WAY}",
+        ),
+        (
+            replace(FAST, pauses=2),
+            PLAIN,
+            ("driver",),
+            f"the application acts by its own clock: 'driver' declares timers (x-dodo: timed){WAY}",
+        ),
+        (
+            replace(TIMED, unasked=0, differing=0),
+            PLAIN,
+            (),
+            "174 surplus answers in 17 of 61 frames: the first answer to a frame counts, and the others are dropped",
+        ),
     ],
-    ids=["passed", "error", "crashed"],
 )
-def test_what_does_not_depend_on_time_stays(finding: Finding) -> None:
-    judged = consider(finding, CROWDED)
-    assert (judged.finding, judged.load) == (finding, CROWDED)
+def test_how_an_application_answers_is_a_note(
+    response: Response | None, lockstep: Lockstep | None, timed: tuple[str, ...], note: str
+) -> None:
+    found = judged_response(response, lockstep, ["steering"], timed)
+    assert (found.notes, found.findings, found.checks) == ((note,) if note else (), (), ())
 
 
-def test_a_long_reason_is_cut() -> None:
-    assert f"it found: {'x' * 300}...; run it" in consider(replace(FAILED, reason="x" * 2000), CROWDED).finding.reason
+@pytest.mark.parametrize(
+    ("response", "lockstep", "name", "value", "most", "reason"),
+    [
+        (replace(FAST, over=0), LIMITED, SLOW_ANSWERS, 0.0, 0.1, ""),
+        (replace(FAST, over=6), LIMITED, SLOW_ANSWERS, 0.1, 0.1, ""),
+        (
+            replace(FAST, over=7), LIMITED, SLOW_ANSWERS, 7 / 60, 0.1,
+            "7 of 60 answers took longer than 100 ms (at most 10 %): an answer took 12 ms (median)",
+        ),
+        (FAST, COPIED, SAMPLE_TIMES, 0, 0, ""),
+        (
+            replace(FAST, uncopied=1), COPIED, SAMPLE_TIMES, 1, 0,
+            "1 of 60 answers did not carry the sample time of their frame",
+        ),
+    ],
+)  # fmt: skip
+def test_a_limit_of_answers_is_a_check(
+    response: Response, lockstep: Lockstep, name: str, value: float, most: float, reason: str
+) -> None:
+    found = judged_response(response, lockstep, ["perception", "steering"])
+    check = {"name": name, "value": value, "limit": {"max": most}, "unit": "", "ok": not reason}
+    assert found.checks == (with_margin(check),)
+    assert [(each.result, each.service) for each in found.findings] == [("failed", "perception")] * bool(reason)
+    assert all(each.reason.startswith(reason) for each in found.findings)
+
+
+QUIET = ServiceUse("steering", 1.5, 0.25, 150_000_000, 0.0, 2_000_000_000)
+LEAKS = replace(QUIET, service="vision", peak_memory_bytes=1_460_000_000, memory_growth_bytes_per_s=300e6)
+
+
+@pytest.mark.parametrize(
+    ("growth", "limit", "told"),
+    [
+        (300e6, 2_000_000_000, "in 2 s"),
+        (20e6, 2_000_000_000, "in 27 s"),
+        (1.0e6, 2_000_000_000, "in 9 min"),
+        (0.89e6, 2_000_000_000, ""),
+        (None, 2_000_000_000, ""),
+        (300e6, None, ""),
+    ],
+)
+def test_memory_that_is_full_within_ten_minutes_is_a_note(growth: float | None, limit: int | None, told: str) -> None:
+    found = judged_use([QUIET, replace(LEAKS, memory_growth_bytes_per_s=growth, memory_limit_bytes=limit)], None)
+    assert (found.findings, found.checks, len(found.notes)) == ((), (), bool(told))
+    so_far = f"in a second of test time, to 1,460 MB so far: it would reach its limit of 2,000 MB {told}"
+    assert all(note.startswith("the memory of application service 'vision' grows by ") for note in found.notes)
+    assert all(note.endswith(so_far) for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("key", "most", "name", "value", "unit", "reason"),
+    [
+        ("max_memory_mb", 1459.0, "peak-memory", 1460.0, "MB", "used 1,460 MB of memory, at most 1,459 MB"),
+        (
+            "max_memory_growth", 1.0, "memory-growth", 18000.0, "MB/min",
+            "grew by 1.8e+04 MB/min in memory, at most 1 MB/min",
+        ),
+        ("max_processor_time_s", 1.4, "processor-time", 1.512, "s", "took 1.51 s of processor time, at most 1.4 s"),
+        ("max_processor_share", 0.2, "processor-share", 0.25, "", "took 25 % of a processor, at most 20 %"),
+    ],
+)  # fmt: skip
+def test_limits_of_use_are_checks(key: str, most: float, name: str, value: float, unit: str, reason: str) -> None:
+    """Of each service, in the order of their names."""
+    found = judged_use([replace(LEAKS, processor_s=1.5123)], ResourceLimits(**{key: most}))
+    check = {"name": f"{name}-vision", "value": value, "limit": {"max": most}, "unit": unit, "ok": False}
+    assert found.checks == (with_margin(check),) and differs_each_run(found.checks[0]["name"])
+    assert found.findings == (Finding("failed", f"application service 'vision' {reason}", "vision"),), "no verdict"
+    both = judged_use([LEAKS, QUIET], ResourceLimits(**{key: value}))
+    assert [(each["name"], each["ok"]) for each in both.checks][1:] == [(f"{name}-steering", True)]
+
+
+def test_what_cannot_be_judged_is_said() -> None:
+    limits = ResourceLimits(max_memory_growth=1.0)
+    assert judged_use([], limits).notes == (UNSEEN_USE,)
+    (note,) = judged_use([replace(QUIET, memory_growth_bytes_per_s=None)], limits).notes
+    assert note == "memory-growth of service 'steering' is not judged: the test was too short to measure it"

@@ -1,32 +1,59 @@
-"""What snapshots add up to: who waited, and whose fault it was."""
+"""What snapshots add up to: who waited and whose fault it was, and how memory grows."""
 
 import asyncio
-import contextlib
+import random
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import pytest
 
-from dodo_dsl.outcome import MachineLoad, Wait
-from dodo_dsl.run.machine_load.meter import LAST_PATIENCE_S, PERIOD_S, LoadMeter, add_up
-from dodo_dsl.run.machine_load.snapshot import Snapshot, Times, with_ended
+from dodo_dsl.outcome import MachineLoad, ServiceUse, Wait
+from dodo_dsl.run.machine_load.meter import (
+    FIRST_PERIOD_S,
+    LAST_PATIENCE_S,
+    MOST_PERIOD_S,
+    Meter,
+    growth,
+    period_s,
+)
+from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from tests.run.scripted import load, run
+
+MB = 1e6
+TIMES = [0.1 * n for n in range(60)]
+
+
+async def nothing() -> None:
+    return None
+
+
+def added(
+    snapshots: Iterable[Snapshot],
+    is_application: Callable[[str], bool] = lambda name: name == "app",
+    test_s: Callable[[], float] = float,
+) -> Meter:
+    meter = Meter(nothing, test_s, is_application)
+    for snapshot in snapshots:
+        meter.add(snapshot)
+    return meter
 
 
 def measured(others: float, app: tuple[float, float], camera: tuple[float, float] = (0.2, 0.0)) -> MachineLoad:
     """Two cores for 10 s."""
     at = load(others, app=app, camera=camera)
-    found = add_up([at(100.0 + number) for number in range(11)], lambda name: name == "app")
+    found = added(at(100.0 + 0.1 * number) for number in range(101)).load()
     assert found is not None
     return found
 
 
 def test_the_load_of_a_busy_machine() -> None:
     found = measured(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))
-    assert (found.duration_s, found.cores) == (10.0, 2)
-    assert found.others_share == pytest.approx(0.8)
-    assert found.crowded_s == 10.0
+    assert (found.duration_s, found.cores) == (pytest.approx(10.0), 2)
+    assert (found.others_share, found.crowded_s) == (pytest.approx(0.8), pytest.approx(10.0))
     assert found.application == Wait(pytest.approx(2.0), pytest.approx(3.0), pytest.approx(3.0), "app")
     assert found.services == Wait(pytest.approx(2.0), pytest.approx(0.5), pytest.approx(0.5), "camera")
+    over = measured(0.8, app=(0.2, 1.4)).application
+    assert over == Wait(pytest.approx(2.0), pytest.approx(10.0), pytest.approx(10.0), "app"), "no longer than the test"
 
 
 @pytest.mark.parametrize(
@@ -44,66 +71,52 @@ def test_a_wait_that_nobody_else_caused(others: float, app: tuple[float, float])
 def test_processes_that_came_and_went_may_have_been_the_others() -> None:
     """Where nobody counts what they took, nothing is put down to others."""
     at = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))
-    found = add_up([replace(at(100.0 + n), changes=min(n, 4)) for n in range(11)], lambda name: name == "app")
+    found = added(replace(at(100.0 + n), changes=min(n, 4)) for n in range(11)).load()
     assert found is not None and found.application is not None
     assert (found.crowded_s, found.application.displaced_s) == (6.0, pytest.approx(1.8))
 
 
-def test_what_ended_is_the_applications() -> None:
-    taken = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))(10.0)
-    found = with_ended(taken, {"app": 9.0}, 3)
-    assert (found.services["app"].ran_s, found.services["camera"], found.changes) == (9.0, taken.services["camera"], 0)
-    assert with_ended(taken, {"app": None}, 3) == replace(taken, changes=3)
-
-
-def after(first: Snapshot, more: Snapshot) -> Snapshot:
-    """What both have used together."""
-    services = {name: Times(*map(sum, zip(first.services[name], more.services[name], strict=True))) for name in "ab"}
-    return Snapshot(first.at_s + more.at_s, 2, first.busy_s + more.busy_s, services)
-
-
 def test_the_service_that_others_kept_waiting_the_longest_is_named() -> None:
     """One waits more, but in the second half others have left."""
-    busy, free = load(0.8, a=(0.1, 0.2), b=(0.1, 0.1)), load(0.0, a=(0.1, 0.2), b=(0.1, 0.9))
-    later = [after(busy(5.0), free(float(n))) for n in range(1, 6)]
-    found = add_up([*(busy(float(n)) for n in range(6)), *later], lambda _: True)
-    assert found is not None
-    assert found.application is not None
+    used = [{"a": Used(0.1 * n, 0.2 * n), "b": Used(0.1 * n, 0.1 * n + 0.8 * max(n - 5, 0))} for n in range(11)]
+    found = added((Snapshot(float(n), used[n], 2, 1.8 * min(n, 5)) for n in range(11)), lambda _: True).load()
+    assert found is not None and found.application is not None
     assert (found.application.longest, found.crowded_s) == ("a", 5.0)
     assert found.application.displaced_s == pytest.approx(1.0)
     assert found.services == Wait(0.0, 0.0, 0.0, "")
 
 
-def test_no_wait_is_longer_than_the_test() -> None:
-    found = measured(0.8, app=(0.2, 1.4))
-    assert found.application == Wait(pytest.approx(2.0), 10.0, 10.0, "app")
-
-
-def test_two_snapshots_at_least() -> None:
+def test_two_snapshots_of_the_machine_at_least() -> None:
     at = load(0.5)
-    assert add_up([], bool) is None
-    assert add_up([at(1.0)], bool) is None
-    assert add_up([at(1.0), at(1.0)], bool) is None
+    assert [added(few).load() for few in ([], [at(1.0)], [at(1.0)] * 2)] == [None] * 3
+    assert added(replace(at(float(n)), busy_s=None) for n in range(9)).load() is None
 
 
 def test_snapshots_are_taken_from_begin_to_end() -> None:
     async def scene() -> list[float]:
-        async def take() -> Snapshot:
-            return load(0.5)(asyncio.get_running_loop().time())
+        times: list[float] = []
 
-        meter = LoadMeter(take)
+        async def take() -> None:
+            times.append(asyncio.get_running_loop().time())
+
+        meter = Meter(take, float, bool)
         meter.begin()
-        await asyncio.sleep(2.5 * PERIOD_S)
+        await asyncio.sleep(2.5 * FIRST_PERIOD_S)
         await meter.end()
-        await asyncio.sleep(9 * PERIOD_S)
-        return [snapshot.at_s / PERIOD_S for snapshot in meter.snapshots]
+        await asyncio.sleep(9 * FIRST_PERIOD_S)
+        return [time_s / FIRST_PERIOD_S for time_s in times]
 
     assert run(scene()) == pytest.approx([0.0, 1.0, 2.0, 2.5])
 
 
+def test_a_long_test_is_looked_at_less_often() -> None:
+    assert [period_s(t) for t in (0.0, 1.0, 1000.0)] == [FIRST_PERIOD_S, FIRST_PERIOD_S, MOST_PERIOD_S]
+    assert [period_s(0.0, took_s) for took_s in (0.02, 9.0)] == pytest.approx([0.06, MOST_PERIOD_S])
+
+
 def test_a_backend_that_does_not_answer_holds_up_nothing_for_long() -> None:
     async def scene() -> float:
-        meter = LoadMeter(lambda: asyncio.sleep(600, None))
+        meter = Meter(lambda: asyncio.sleep(600, None), float, bool)
         meter.begin()
         await asyncio.sleep(1.0)
         await meter.end()
@@ -112,18 +125,69 @@ def test_a_backend_that_does_not_answer_holds_up_nothing_for_long() -> None:
     assert run(scene()) == pytest.approx(1.0 + LAST_PATIENCE_S)
 
 
-def test_a_snapshot_that_comes_as_it_is_cancelled_ends_it_all_the_same() -> None:
-    """As with ``asyncio.wait_for`` of Python 3.11, which then gives the result and forgets the cancellation."""
+def noise(size: float) -> float:
+    return random.Random(size).uniform(-0.3 * MB, 0.3 * MB)
 
-    async def take() -> Snapshot | None:
-        with contextlib.suppress(asyncio.CancelledError):
-            await asyncio.sleep(600)
-        return None
 
-    async def scene() -> None:
-        meter = LoadMeter(take)
-        meter.begin()
-        await asyncio.sleep(0)
-        await meter.end()
+@pytest.mark.parametrize(
+    ("sizes", "expected"),
+    [
+        ([100 * MB + 5 * MB * t for t in TIMES], 5 * MB),
+        ([100 * MB + 5 * MB * t + noise(t) for t in TIMES], pytest.approx(5 * MB, rel=0.1)),
+        ([100 * MB + 50 * MB * (n // 5) for n in range(60)], pytest.approx(100 * MB, rel=0.1)),
+        ([100 * MB + (900 * MB if n in (33, 50) else 0) + 5 * MB * t for n, t in enumerate(TIMES)], 5 * MB),
+        ([100 * MB + noise(t) for t in TIMES], 0.0),
+        ([100 * MB + 0.2 * MB * t for t in TIMES], 0.0),
+        ([100 * MB + min(t, 2.5) * 80 * MB for t in TIMES], 0.0),
+        ([100 * MB + (200 * MB if t > 4.4 else 0) for t in TIMES], 0.0),
+        ([100 * MB + (200 * MB if t > 5.5 else 0) for t in TIMES], 0.0),
+        ([300 * MB - 5 * MB * t for t in TIMES], 0.0),
+    ],
+    ids=["leak", "noisy", "stairs", "spikes", "quiet", "small", "warms-up", "once", "at-the-end", "falls"],
+)
+def test_growth(sizes: list[float], expected: float) -> None:
+    found = growth(list(zip(TIMES, sizes, strict=True)))
+    assert found == (pytest.approx(expected, rel=0.02) if isinstance(expected, float) else expected)
 
-    run(asyncio.wait_for(scene(), 100 * LAST_PATIENCE_S))
+
+def test_a_test_that_stands_still_counts_by_its_time() -> None:
+    """As in lockstep, where the last answer does not come for two seconds."""
+    drive = [(0.1 * n, 100 * MB + n * 20 * MB) for n in range(11)]
+    assert growth([*[(0.0, MB)] * 50, *drive, *[drive[-1]] * 200]) == pytest.approx(200 * MB)
+    assert growth([(1.0, n * 50 * MB) for n in range(6)]) is None, "no time has passed"
+
+
+@pytest.mark.parametrize(("count", "expected"), [(0, None), (1, None), (3, None), (6, pytest.approx(500 * MB))])
+def test_a_few_frames_tell(count: int, expected: float | None) -> None:
+    assert growth([(0.1 * n, n * 50 * MB) for n in range(count)]) == expected
+
+
+@pytest.mark.parametrize(("step", "expected"), [(6, None), (5, pytest.approx(5 * MB, rel=0.1))])
+def test_between_two_times_of_a_clock_in_steps_nobody_knows(step: int, expected: float | None) -> None:
+    """As in lockstep, where ten pictures pass in a quarter of a second: a step then stands still for two."""
+    points = [(n // step * step / 10, 100 * MB + 0.5 * MB * n) for n in range(60)]
+    assert growth(points, in_steps=True) == expected
+    assert growth(points) == pytest.approx(5 * MB, rel=0.1)
+
+
+def test_figures_are_by_the_test_s_own_time() -> None:
+    """Ten times as fast as the wall: half of a processor by its time is a twentieth by the test's."""
+    sizes = [900 * MB if n == 777 else 100 * MB + 10 * MB * 0.002 * n for n in range(5000)]
+    taken = [
+        Snapshot(50.0 + 0.002 * n, {"a": Used(3.0 + 0.001 * n, 0.0, int(size), 2_000_000_000)})
+        for n, size in enumerate(sizes)
+    ]
+    snapshots = [*taken, Snapshot(60.0, {"a": Used(8.0, 0.0, 0, 2_000_000_000)})]
+    times = iter(10 * (snapshot.at_s - 50.0) for snapshot in snapshots)
+    (use,) = added(snapshots, test_s=lambda: next(times)).figures(["a", "b"])
+    expected = ServiceUse("a", 5.0, pytest.approx(0.05), 900_000_000, pytest.approx(MB, rel=0.01), 2_000_000_000)
+    assert (use, added([]).figures(["a"])) == (expected, ())
+
+
+def test_a_service_that_ended_has_grown_until_then() -> None:
+    size = [n * 1_000_000 if n < 50 else 0 for n in range(100)]
+    times = iter(0.1 * n for n in range(100))
+    taken = (Snapshot(0.0, {"b": Used(memory=7), "a": Used(memory=size[n])}) for n in range(100))
+    first, second = added(taken, test_s=lambda: next(times)).figures(["a", "b"])
+    assert (first.memory_growth_bytes_per_s, first.memory_limit_bytes) == (pytest.approx(10 * MB), None)
+    assert (second.service, second.memory_growth_bytes_per_s) == ("b", 0.0)

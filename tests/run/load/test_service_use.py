@@ -1,177 +1,202 @@
-"""What services use, by a ``/proc`` that is written for each test, and by the kernel's own."""
+"""What services use and wait for, by a ``/proc`` that is written for each test, and by the kernel's own."""
 
+import json
 import os
-import subprocess
+import shutil
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from dodo_dsl.run.machine_load import service_use
-from dodo_dsl.run.machine_load.service_use import Used, UseReader
+from dodo_dsl.run.machine_load.processes import above, memory
+from dodo_dsl.run.machine_load.service_use import Snapshot, Used, UseReader, busy_s
+from dodo_dsl.run.process.children import Children
 
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 MB = 1 << 20
 
 
-def put(
-    proc: Path,
-    pid: int,
-    parent: int,
-    ticks: tuple[int, int] = (0, 0),
-    megabytes: int = 0,
-    proportional: int | None = None,
-    state: str = "S",
-) -> None:
-    """A process; ``ticks`` are its own and those of the children that it waited for."""
-    folder = proc / str(pid)
-    folder.mkdir(exist_ok=True)
-    own, waited = ticks
-    words = [state, str(parent), *["0"] * 9, str(own), "0", "0", str(waited), *["0"] * 10]
-    (folder / "stat").write_text(f"{pid} (a (b) c) {' '.join(words)}\n")
-    (folder / "status").write_text(f"Name:\tx\nRssAnon:\t{megabytes * 1024} kB\nRssShmem:\t0 kB\n")
-    if proportional is not None:
-        (folder / "smaps_rollup").write_text(f"1-2 [rollup]\nPss_Anon:\t{proportional * 1024} kB\n")
+class Proc:
+    """A folder that looks like ``/proc``; ``threads`` ran and waited for ms, ``ticks`` are those of stat."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        (root / "self").mkdir()
+        (root / "self" / "schedstat").touch()
+        (root / "stat").write_text("".join(f"cpu{core} 1 1 1 1 1 1 1 1 0 0\n" for core in range(1024)))
+        self.reader = UseReader(root)
+        self.reader.sized.add("app")
+
+    def put(
+        self, pid: int, parent: int, ticks: int = 0, megabytes: float = 0, shares: float | None = None, *,
+        state: str = "S", session: int = 0, start: int = 1, threads: dict[int, tuple[int, int]] | None = None,
+    ) -> None:  # fmt: skip
+        self.end(pid)
+        folder = self.root / str(pid)
+        folder.mkdir()
+        words = [state, str(parent), "0", str(session), *["0"] * 7, str(ticks), "0", "0", "0", *["0"] * 4, str(start)]
+        (folder / "stat").write_text(f"{pid} (a (b) c) {' '.join(words)} 0\n")
+        (folder / "status").write_text(f"Name:\tx\nRssAnon:\t{int(megabytes * 1024)} kB\nRssFile:\t9000 kB\n")
+        if shares is not None:
+            (folder / "smaps_rollup").write_text(f"1-2 [rollup]\nPss:\t9000 kB\nPss_Anon:\t{int(shares * 1024)} kB\n")
+        for thread, (ran, waited) in (threads or {}).items():
+            (folder / "task" / str(thread)).mkdir(parents=True)
+            (folder / "task" / str(thread) / "schedstat").write_text(f"{ran * 1_000_000} {waited * 1_000_000} 7\n")
+
+    def end(self, pid: int) -> None:
+        shutil.rmtree(self.root / str(pid), ignore_errors=True)
+
+    def used(self, **services: int) -> Snapshot:
+        return self.reader.take({pid: "" if name == "sandbox" else name for name, pid in services.items()})
+
+    def ticks(self, **services: int) -> dict[str, int]:
+        return {name: round(used.processor_s / TICK) for name, used in self.used(**services).services.items()}
+
+    def waits(self, **services: int) -> dict[str, float]:
+        return {name: round(used.waited_s, 6) for name, used in self.used(**services).services.items()}
+
+    def megabytes(self) -> float:
+        return self.used(app=10).services["app"].memory / MB
 
 
-def end(proc: Path, pid: int) -> None:
-    for path in (proc / str(pid)).iterdir():
-        path.unlink()
-    (proc / str(pid)).rmdir()
+@pytest.fixture
+def proc(tmp_path: Path) -> Proc:
+    return Proc(tmp_path)
 
 
-def test_all_processes_of_a_service_add_up(tmp_path: Path) -> None:
-    put(tmp_path, 10, 1, (100, 50), 3)
-    put(tmp_path, 11, 10, (20, 0), 2)
-    put(tmp_path, 12, 11, (4, 0), 1)
-    put(tmp_path, 20, 1, (999, 0), 500)
-    found = UseReader(tmp_path).take({10: "app"})
-    assert found == {"app": Used(pytest.approx(174 * TICK), 6 * MB)}
+def test_all_processes_of_a_service_add_up(proc: Proc) -> None:
+    for pid, parent, ticks, megabytes in ((10, 1, 150, 3), (11, 10, 20, 2), (12, 11, 4, 1), (20, 1, 999, 500)):
+        proc.put(pid, parent, ticks, megabytes)
+    assert (proc.ticks(app=10), proc.megabytes()) == ({"app": 174}, 6)
+    proc.put(10, 1, 160, 3, state="Z")
+    proc.end(11)
+    assert proc.ticks(app=10) == {"app": 174}
+    proc.put(10, 1, 170, 3, state="Z")
+    assert (proc.ticks(app=10), proc.megabytes()) == ({"app": 184}, 0), "what has ended has no memory"
 
 
-def test_a_process_that_was_waited_for_counts_once(tmp_path: Path) -> None:
+def test_a_process_that_was_waited_for_counts_once(proc: Proc) -> None:
     """Whether or not its parent has already been told its time; also one that is not waited for."""
-    use = UseReader(tmp_path)
-    put(tmp_path, 10, 1, (100, 0))
-    put(tmp_path, 11, 10, (50, 0))
-    put(tmp_path, 12, 10, (7, 0))
-    assert use.take({10: "app"})["app"].processor_s == pytest.approx(157 * TICK)
-    put(tmp_path, 11, 10, (60, 0), state="Z")
-    assert use.take({10: "app"})["app"].processor_s == pytest.approx(167 * TICK)
-    end(tmp_path, 11)
-    put(tmp_path, 10, 1, (100, 60))
-    assert use.take({10: "app"})["app"].processor_s == pytest.approx(167 * TICK)
-    end(tmp_path, 12)
-    assert use.take({10: "app"})["app"].processor_s == pytest.approx(167 * TICK)
-    put(tmp_path, 10, 1, (110, 60))
-    assert use.take({10: "app"})["app"].processor_s == pytest.approx(177 * TICK)
+    proc.put(10, 1, 100)
+    proc.put(11, 10, 50)
+    proc.put(12, 10, 7)
+    assert proc.ticks(app=10) == {"app": 157}
+    proc.put(11, 10, 60, state="Z")
+    assert proc.ticks(app=10) == {"app": 167}
+    proc.end(11)
+    proc.put(10, 1, 160)
+    assert proc.ticks(app=10) == {"app": 167}
+    before = proc.used(app=10).changes
+    proc.end(12)
+    assert (proc.ticks(app=10), proc.used(app=10).changes - before) == ({"app": 167}, 1)
+    proc.put(10, 1, 170)
+    assert proc.ticks(app=10) == {"app": 177}
 
 
-def test_what_processes_share_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forks share what they have not written to; a small one has no say in that."""
-    put(tmp_path, 10, 1, megabytes=100, proportional=40)
-    put(tmp_path, 11, 10, megabytes=100, proportional=50)
-    put(tmp_path, 12, 10, megabytes=2)
-    assert UseReader(tmp_path).take({10: "app"})["app"].memory == pytest.approx(92 * MB, abs=2)
-    (tmp_path / "11" / "smaps_rollup").unlink()
-    assert UseReader(tmp_path).take({10: "app"})["app"].memory == 202 * MB, "not everybody may know"
-    sizes = iter((100, 100, 2, 100, 0))
-    monkeypatch.setattr(service_use, "resident", lambda *_: (next(sizes) * MB, 0))
-    assert UseReader(tmp_path).take({10: "app"})["app"].memory == 100 * MB, "one has ended meanwhile"
+def test_the_thread_that_runs_the_most_waits(proc: Proc) -> None:
+    proc.put(10, 1, threads={10: (100, 90), 11: (200, 80)})
+    proc.put(20, 10, threads={20: (1000, 0)})
+    proc.put(99, 1, threads={99: (5000, 5000)})
+    assert proc.waits(app=10) == {"app": 0.0}
+    proc.put(10, 1, threads={10: (101, 990), 11: (210, 120)})
+    assert proc.waits(app=10) == {"app": 0.04}
+    proc.end(20)
+    proc.put(20, 10, start=2, threads={20: (50, 20)})
+    assert proc.waits(app=10) == {"app": 0.06}
+    proc.put(20, 10, start=2, threads={20: (10, 5)})
+    assert proc.waits(app=10) == {"app": 0.065}, "a thread with the number of another"
 
 
-def test_new_forks_count_when_it_is_known_what_they_share(tmp_path: Path) -> None:
-    use = UseReader(tmp_path)
-    for pid in (10, 11):
-        put(tmp_path, pid, 1 if pid == 10 else 10, megabytes=100, proportional=50)
-    assert use.take({10: "app"})["app"].memory == 100 * MB
-    for pid in (12, 13):
-        put(tmp_path, pid, 10, megabytes=100, proportional=25)
-    use._look({10: "app"})
-    assert use.take({10: "app"})["app"].memory == 100 * MB
-    for pid in (10, 11):
-        put(tmp_path, pid, 1 if pid == 10 else 10, megabytes=1)
-    assert use.take({10: "app"})["app"].memory == 100 * MB, "one alone, until it is known"
+def test_orphans_stay_with_the_service_that_started_them(proc: Proc) -> None:
+    """By their session, where process 1 has collected them; else they belong to none."""
+    services = {"sandbox": 1, "app": 10, "camera": 11}
+    proc.put(1, 0, 9000)
+    proc.put(10, 1, 20, session=10)
+    proc.put(21, 1, 3, session=10)
+    assert proc.ticks(**services) == {"app": 23, "camera": 0}
+    proc.end(10)
+    proc.put(22, 1, 4, session=22)
+    assert proc.ticks(**services) == {"app": 23, "camera": 0, "": 4}
 
 
-def test_a_service_that_has_ended_keeps_its_time(tmp_path: Path) -> None:
-    use = UseReader(tmp_path)
-    put(tmp_path, 10, 1, (100, 5), 3)
-    use.take({10: "app"})
-    put(tmp_path, 10, 1, (130, 9), state="Z")
-    use.note_end(10, "app")
-    end(tmp_path, 10)
-    assert use.take({10: "app"})["app"] == Used(pytest.approx(139 * TICK), 0)
+def test_what_processes_share_counts_once(proc: Proc) -> None:
+    """Forks share what they have not written to; new ones at once."""
+    proc.put(10, 1, megabytes=100, shares=40)
+    proc.put(11, 10, megabytes=100, shares=50)
+    assert proc.megabytes() == pytest.approx(90, abs=1e-5)
+    for pid in (10, 11, 12, 13):
+        proc.put(pid, 10 if pid > 10 else 1, megabytes=100, shares=25)
+    assert proc.megabytes() == pytest.approx(100, abs=1e-5)
+    proc.end(13)
+    (proc.root / "12" / "smaps_rollup").unlink()
+    assert proc.megabytes() == pytest.approx(50, abs=1e-5), "one has ended meanwhile"
 
 
-@contextmanager
-def started(code: str) -> Iterator["subprocess.Popen[str]"]:
-    """A program that has printed a line and waits."""
-    words = [sys.executable, "-c", f"import os, sys, time\n{code}\nprint(1, flush=True)\nsys.stdin.read()"]
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        yield process
-        process.kill()
-
-
-BUSY = "end = time.process_time() + 0.3\nwhile time.process_time() < end: pass\n"
-
-
-@pytest.mark.parametrize(
-    ("code", "processor_s", "megabytes"),
-    [
-        ("", 0.0, 0),
-        (BUSY, 0.3, 0),
-        (f"if os.fork() == 0:\n    {BUSY.replace(chr(10), chr(10) + '    ')}\n    os._exit(0)\nos.wait()\n", 0.3, 0),
-        ("kept = bytearray(os.urandom(1 << 20)) * 64\n", 0.0, 64),
-        ("kept = bytearray(os.urandom(1 << 20)) * 64\nfor _ in range(3):\n    os.fork() or time.sleep(60)\n", 0.0, 64),
-    ],
-    ids=["quiet", "busy", "busy-child", "large", "forks"],
-)
-@pytest.mark.thorough
-def test_the_kernel_s_own(code: str, processor_s: float, megabytes: int) -> None:
-    with started("") as plain, started(code) as process:
-        time.sleep(0.05)  # forks go to sleep
-        use = UseReader().take({plain.pid: "plain", process.pid: "app"})
-        for child in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
-            os.kill(int(child), 9)
-    assert use["app"].processor_s - use["plain"].processor_s >= processor_s - 0.05
-    more = (use["app"].memory - use["plain"].memory) / MB
-    assert megabytes - 1 <= more <= megabytes + 16, "what forks write to is their own"
-
-
-CHILD_LATER = """
-import subprocess, sys
-input()
-code = "held = bytearray(b'x' * 50_000_000); print('held', flush=True); input()"
-subprocess.run([sys.executable, "-c", code])
-"""
-
-
-@pytest.mark.thorough
-def test_a_process_that_begins_after_the_first_look_counts_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sandbox that is looked at while it is set up has not started the application yet."""
-    monkeypatch.setattr(service_use, "_LOOK_S", 1e6)
-    words = [sys.executable, "-c", CHILD_LATER]
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdin is not None and process.stdout is not None
-        use = UseReader()
-        assert use.take({process.pid: "app"})["app"].memory < 50_000_000
-        process.stdin.write("\n")
-        process.stdin.flush()
-        assert process.stdout.readline() == "held\n"
-        assert use.take({process.pid: "app"})["app"].memory > 50_000_000
-        process.stdin.close()
-
-
-def test_system_v_memories_count_beside_what_is_mapped(tmp_path: Path) -> None:
-    put(tmp_path, 10, 1, megabytes=3)
-    (tmp_path / "sysvipc").mkdir()
-    rows = ((10, 0, 50), (10, 1, 7), (1, 0, 900))
+def test_system_v_memories_count_beside_what_is_mapped(proc: Proc, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the service that made them; those of a creator that has ended, in own namespaces."""
+    proc.put(10, 1, megabytes=3)
+    (proc.root / "sysvipc").mkdir()
+    rows = ((10, 0, 50), (10, 1, 7), (1, 0, 900), (77, 0, 9))
     text = "".join(f"{pid} {users} {size * MB} {MB}\n" for pid, users, size in rows)
-    (tmp_path / "sysvipc" / "shm").write_text(f"cpid nattch rss swap\n{text}")
-    assert UseReader(tmp_path).take({10: "app"})["app"].memory == 62 * MB
+    (proc.root / "sysvipc" / "shm").write_text(f"cpid nattch rss swap\n{text}")
+    (proc.root / "1").mkdir()
+    assert proc.megabytes() == 62
+    (proc.root / "loadavg").write_text("1 1 1 1/9 4711\n")
+    monkeypatch.setattr(os, "getpid", lambda: 1)
+    assert proc.megabytes() == 72
+
+
+def test_who_uses_more_memory_than_it_may(proc: Proc) -> None:
+    """With what it started, and exactly: shared pages count once."""
+    for pid, parent, shares in ((10, 1, 40), (11, 10, 40), (20, 1, 90), (30, 2, 90)):
+        proc.put(pid, parent, megabytes=90, shares=shares)
+    services = {10: "app", 20: "other"}
+    assert above({"app": 80 * MB, "other": 91 * MB}, services, proc.root) == {}
+    assert above({"app": 79 * MB, "other": 89 * MB}, services, proc.root) == {"app": 80 * MB, "other": 90 * MB}
+    assert above({"app": 1}, {77: "app"}, proc.root) == {}, "it has ended"
+
+
+STAT = "cpu  9 9\ncpu0 100 20 300 9999 9999 4 5 60 8888 7777\ncpu1 1 1 1 9999 9999 1 1 1 0 0\ncpu10 7 7 7\nintr 5\n"
+
+
+def test_cores_are_busy_with_whatever_keeps_others_off(proc: Proc) -> None:
+    """Neither idle nor waiting for disks; guests are in the user's time already."""
+    assert busy_s(STAT, [0]) == pytest.approx(489 * TICK)
+    assert busy_s(STAT, [0, 1]) == pytest.approx(495 * TICK)
+    assert (busy_s(STAT, [0, 2]), busy_s(STAT, [10]), busy_s("", [])) == (None, None, 0)
+    (proc.root / "self" / "schedstat").unlink()
+    assert proc.used().busy_s is None, "a kernel that does not count who waits"
+
+
+def test_snapshots_are_the_same_behind_json() -> None:
+    taken = Snapshot(1.5, {"app": Used(0.5, 0.25, 7)}, 2, 3.5)
+    assert msgspec.convert(json.loads(json.dumps(asdict(taken))), Snapshot) == taken
+
+
+def test_what_only_a_descriptor_holds_counts_once() -> None:
+    """By the kernel's own figures; what busy programs and forks use is in tests/run/process/test_resources.py."""
+    before, file = memory([os.getpid()], []), os.memfd_create("x")
+    copy = os.dup(file)
+    os.write(file, bytes(64 << 20))
+    assert 50 < (memory([os.getpid()], []) - before) / MB < 100
+    os.close(file)
+    os.close(copy)
+
+
+@pytest.mark.parametrize("is_counted", [True, False])
+def test_what_ended_is_the_applications(tmp_path: Path, is_counted: bool) -> None:
+    """With all that it waited for; where nobody counts the rest, what began and ended may be the application's."""
+    ended: list[str] = []
+    children = Children(lambda name, _: ended.append(name))
+    children._is_all_counted = is_counted
+    inner = "import time\nwhile time.process_time() < 0.1: pass"
+    code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {inner!r}])"
+    with (tmp_path / "log").open("w") as log:
+        children.start("app", [sys.executable, "-c", code], {}, str(tmp_path), log.fileno())
+    while not ended:
+        children.reap()
+    found = children.with_ended(Snapshot(1.0, {"app": Used(), "camera": Used(7.0)}, changes=3))
+    assert found.services["app"].processor_s > 0.1
+    assert (found.services["camera"].processor_s, found.changes) == (7.0, 0 if is_counted else 3)

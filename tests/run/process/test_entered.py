@@ -15,19 +15,18 @@ from tests.run.scripted import plan
 
 def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
     entered = Entered.with_own(12, tmp_path / "a b", Path("/tmp/../usr"))
-    assert Entered.among(["3", "network", "--forks", entered.word()]) == entered
+    assert Entered.of(entered.word()) == entered
     assert entered.process == 12
     assert Path(*tmp_path.parts[:3]) in entered.shown
     assert Entered.with_own(12, Path("/tmp"), Path("/tmp/a/b"), Path("/tmp/a")).shown.count(Path("/tmp/a")) == 1
     assert not [path for path in entered.shown if path.name == ".."]
-    assert Entered.among(["3", "network", "--forks"]) is None
 
 
 def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     """It may lie below ``/tmp``, which is another one there; what only the application names is not shown."""
     shown: list[Entered | None] = []
 
-    async def opened(_client: SandboxClient, _slot: Slot, _folder: Path, entered: Entered | None) -> None:
+    async def opened(_client: SandboxClient, _slot: Slot, _log: int, entered: Entered | None) -> None:
         shown.append(entered)
 
     monkeypatch.setattr(SandboxClient, "open", opened)

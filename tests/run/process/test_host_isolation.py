@@ -7,6 +7,7 @@ import re
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -153,7 +154,7 @@ def test_a_fork_server_answers_as_a_sandbox_of_its_own_does(lives: bool) -> None
     try:
         if not lives:
             server.kill()
-        assert isolation_refusal(server) == isolation_refusal()
+        assert asyncio.run(isolation_refusal(server)) == asyncio.run(isolation_refusal())
     finally:
         if lives:
             server.close()
@@ -171,30 +172,30 @@ BLAMES = re.compile("install bubblewrap|allow user namespaces|make namespaces")
         pytest.param("exit 7", "ended with: exit code 7", "", marks=pytest.mark.proof),
     ],
 )
-def test_only_what_is_missing_is_blamed(
-    bwrap: str, told: str, remedy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if bwrap:
-        (tmp_path / "bwrap").write_text(f"#!/bin/sh\n{bwrap}\n")
-        (tmp_path / "bwrap").chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    refusal = isolation_refusal()
+def test_only_what_is_missing_is_blamed(bwrap: str, told: str, remedy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
+        Path(folder).chmod(0o755)  # as the application's user starts it
+        if bwrap:
+            Path(folder, "bwrap").write_text(f"#!/bin/sh\n{bwrap}\n")
+            Path(folder, "bwrap").chmod(0o755)
+        monkeypatch.setenv("PATH", folder)
+        refusal = asyncio.run(isolation_refusal())
+        (finding,) = capabilities.namespaces()
     assert refusal is not None
-    assert (str(refusal)[-len(told) :], refusal.remedy) == (told, remedy)
-    (finding,) = capabilities.namespaces()
+    assert (refusal.why[-len(told) :], refusal.remedy) == (told, remedy)
     assert bool(BLAMES.search(finding.advice)) == bool(remedy)
 
 
 @pytest.mark.slow
 def test_where_the_kernel_refuses_namespaces_they_are_to_be_allowed() -> None:
     """In a user namespace that may have no further ones with mounts."""
-    script = "from dodo_dsl.run.process.host_isolation import isolation_refusal as r; print(r(), '|', r().remedy)"
+    script = "from dodo_dsl.run.process import host_isolation as h; print(h.asyncio.run(h.isolation_refusal()))"
     limits = 'echo 0 > /proc/sys/user/max_mnt_namespaces && exec "$@"'
     unshare = ["unshare", "--user", "--map-root-user", "sh", "-c", limits, "sh", sys.executable, "-c", script]
     done = subprocess.run(unshare, capture_output=True, text=True, check=False, cwd=ROOT)
     if done.stderr.startswith("unshare:"):
         pytest.skip(done.stderr)
-    assert done.stdout.startswith("the kernel refuses namespaces: unshare: "), done
+    assert "the kernel refuses namespaces: the test's sandbox does not start: unshare: " in done.stdout, done
     assert "to make namespaces" in done.stdout
 
 

@@ -9,14 +9,14 @@ import pytest
 
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.run.listeners import buses, listening, members
-from tests.run.load.test_thread_times import Proc
+from tests.run.load.test_service_use import Proc
 
 ROW = "  72: {local} 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 {inode} 2 0 0"
 
 
 def put(proc: Proc, pid: int, parent: int, sockets: dict[int, str]) -> None:
     """A process in a network of its own with sockets, by inode: the local address and port in hex."""
-    proc.put(pid, parent, {})
+    proc.put(pid, parent)
     folder = proc.root / str(pid)
     (folder / "fd").mkdir()
     (folder / "fd" / "0").symlink_to("/dev/null")

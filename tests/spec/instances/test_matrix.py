@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.source import Mapping, plain
-from dodo_dsl.spec.matrix import SLUG, choices, substitute
+from dodo_dsl.spec.matrix import PLACEHOLDERS, SLUG, choices
 from tests.source.nodes import mapping
 
 
@@ -33,7 +33,7 @@ def test_substitution() -> None:
         "matrix: {a: [1], b: [x]}\nwhole: ${matrix.a}\npart: ${matrix.a} ${matrix.b} ${matrix.c}\nkept: {d: [e]}\n"
     )
     (choice,), _ = choices(node)
-    found = substitute(node, choice)
+    found = PLACEHOLDERS.filled(node, dict(choice.values))
     assert isinstance(found, Mapping)
     assert plain(found)["whole"] == 1
     assert plain(found)["part"] == "1 x ${matrix.c}"

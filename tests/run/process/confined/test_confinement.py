@@ -7,23 +7,34 @@ from dataclasses import asdict
 from pathlib import Path
 
 import msgspec
+import pytest
 
 from dodo_dsl.run.process import confinement as module
-from dodo_dsl.run.process.confinement import Confinement, Mounts, confinement, sandbox_words
+from dodo_dsl.run.process.confinement import Confinement, as_data, confinement, sandbox_words
+from dodo_dsl.run.process.places import Places
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
-MOUNTS = Mounts(Path("/tmp/x/folder"), True, Path("/tmp/x/home"), {"/tmp": Path("/tmp/x/tmp")})
+
+class Made(Places):
+    """Places that nobody has made."""
+
+    def __init__(self, place: str = "/tmp", mounted: tuple[str, ...] = ()) -> None:
+        self.folder, self.writable, self.home = Path("/tmp/x/folder"), True, Path("/tmp/x/home")
+        self.shared, self.mounted, self.user = {place: Path("/tmp/x/tmp")}, mounted, None
+
+
+MOUNTS = Made()
 
 
 def test_paths_are_relative_to_its_folder_and_the_interpreter_is_there(tmp_path: Path) -> None:
     limits = SandboxLimits(reads=("../models", "/srv/ros"))
-    reads = confinement(tmp_path / "app", "network", 130, limits, ()).reads
+    reads = confinement(tmp_path / "app", limits, ()).reads
     assert {sys.prefix, sys.base_prefix, str(tmp_path / "models"), "/srv/ros"} <= set(reads)
 
 
 def test_what_is_hidden_lies_in_its_folder(tmp_path: Path) -> None:
     hidden = (tmp_path / "tests", tmp_path / ".git", tmp_path, tmp_path.parent / "elsewhere")
-    found = confinement(tmp_path, "network", 130, SandboxLimits(), hidden)
+    found = confinement(tmp_path, SandboxLimits(), hidden)
     assert found.hidden[:2] == (str(tmp_path / "tests"), str(tmp_path / ".git"))
     assert not {str(tmp_path), str(tmp_path.parent / "elsewhere")} & set(found.hidden)
 
@@ -41,27 +52,24 @@ def test_a_repository_where_every_application_sees_the_machine_is_hidden_around_
     folder, python = "/usr/share/doc", "/usr/share/common-licenses"
     inner, tests = f"{python}/{next(Path(python).iterdir()).name}", f"{folder}/bash"
     argv = sandbox_words(
-        Confinement(folder, "network", 1, (python,), ("/usr/share", inner, tests, "/usr/share/perl5")),
+        Confinement(folder, (python,), ("/usr/share", inner, tests, "/usr/share/perl5")),
         MOUNTS,
         "/usr/bin/x",
-        None,
-        5,
+        {},
     )
     order = [argv.index(word) for word in ("/usr/share", python, folder, inner, tests)]
     assert argv[order[0] - 1] == "--tmpfs"
-    assert max(order[1:3]) < argv.index(inner)
+    assert order[0] < min(order[1:3]) and order[1] < order[3] and order[2] < order[4]
     assert "/usr/share/perl5" not in argv
 
 
 def test_it_goes_to_the_sandbox_and_back() -> None:
-    one = Confinement(
-        "/app", "network", 130, ("/usr/x",), ("/app/tests",), SandboxLimits(memory=5, reads=("a",)), ("/dev/x",)
-    )
+    one = Confinement("/app", ("/usr/x",), ("/app/tests",), SandboxLimits(memory=5, reads=("a",)), ("/dev/x",))
     assert msgspec.convert(json.loads(json.dumps(asdict(one))), Confinement) == one
 
 
 def test_a_program_elsewhere_is_shown_and_its_folder_is_not() -> None:
-    argv = sandbox_words(Confinement("/app", "network", 130), MOUNTS, "/srv/bin/drive", None, 5)
+    argv = sandbox_words(Confinement("/app"), MOUNTS, "/srv/bin/drive", {})
     bound = [argv[n + 1] for n, word in enumerate(argv) if word == "--ro-bind-try"]
     assert "/srv/bin/drive" in bound
     assert not {"/srv", "/srv/bin", "/", "/home", "/var"} & set(bound)
@@ -69,7 +77,7 @@ def test_a_program_elsewhere_is_shown_and_its_folder_is_not() -> None:
 
 def test_what_gives_it_the_time_can_be_written_to_and_not_replaced() -> None:
     """Also where its user is DoDo's: the agent's FIFOs to the clock are not there."""
-    argv = sandbox_words(Confinement("/app", "network", 130, time="/dev/shm/t"), MOUNTS, "/usr/bin/true", None, 5)
+    argv = sandbox_words(Confinement("/app", time="/dev/shm/t"), MOUNTS, "/usr/bin/true", {})
     at = argv.index("/dev/shm/t")
     assert argv[at - 1 : at + 5] == ["--ro-bind", "/dev/shm/t", "/dev/shm/t", "--bind", *["/dev/shm/t/page"] * 2]
     assert argv[at + 5 : at + 11] == [
@@ -78,16 +86,17 @@ def test_what_gives_it_the_time_can_be_written_to_and_not_replaced() -> None:
     ]
 
 
-def test_as_root_another_user_starts_it() -> None:
-    argv = sandbox_words(Confinement("/app", "network", 130), MOUNTS, "/usr/bin/true", 64_130, 5)
-    assert argv[argv.index("setpriv") + 1 :][:2] == ["--reuid=64130", "--regid=64130"]
-    assert argv.index("setpriv") > argv.index("ALL")
-
-
 def test_on_the_host_it_sees_what_dodo_sees_in_a_process_namespace() -> None:
-    argv = sandbox_words(Confinement("/app", "host", 130), None, "/usr/bin/true", None, 5)
+    argv = sandbox_words(Confinement("/app"), None, "/usr/bin/true", {})
     assert "--unshare-pid" in argv
     assert argv[argv.index("--dev-bind") :][:3] == ["--dev-bind", "/", "/"]
+
+
+def test_no_variable_is_a_word_of_its_own() -> None:
+    argv = sandbox_words(Confinement("/app"), None, "/usr/bin/true", {"A": "--bind"})
+    assert argv[argv.index("--clearenv") :][:4] == ["--clearenv", "--setenv", "A", "--bind"]
+    with pytest.raises(ValueError, match="NUL"):
+        as_data(["--setenv", "A", "b\0--bind"])
 
 
 def test_nothing_is_mounted_in_what_is_hidden_but_what_may_be_read(tmp_path: Path) -> None:
@@ -96,13 +105,22 @@ def test_nothing_is_mounted_in_what_is_hidden_but_what_may_be_read(tmp_path: Pat
     for folder in (report, python):
         folder.mkdir(parents=True)
     hidden = (str(report), str(tests), str(tests))
-    argv = sandbox_words(
-        Confinement(str(tmp_path), "network", 1, (str(python),), hidden), MOUNTS, "/usr/bin/x", None, 5
-    )
+    argv = sandbox_words(Confinement(str(tmp_path), (str(python),), hidden), MOUNTS, "/usr/bin/x", {})
     assert [path for word, path in itertools.pairwise(argv) if word == "--tmpfs"] == [str(tests)]
-    inside = argv[argv.index("--bind", argv.index(str(MOUNTS.folder))) :]
-    inside = inside[inside.index(str(tests)) + 1 :]
-    assert inside[: inside.index("--remount-ro")] == [
-        *("--perms", "0755", "--dir", str(python.parent)),
-        *("--ro-bind-try", str(python), str(python)),
-    ]
+    inside = argv[argv.index(str(tests)) + 1 :]
+    assert inside[:3] == ["--ro-bind-try", str(python), str(python)]
+    assert str(tests) in argv[len(argv) - argv[::-1].index("--remount-ro") - 6 :]
+
+
+def test_what_may_be_read_in_the_folder_of_others_is_shown_and_nothing_else_there(tmp_path: Path) -> None:
+    """Of ``/tmp`` the application has another one, where its own and other folders are mounted."""
+    repository, venv, other = (tmp_path / name for name in ("repository", "venv", "other"))
+    for folder in (repository / "app", venv, other):
+        folder.mkdir(parents=True)
+    mounts = Made(str(tmp_path), tuple(map(str, (repository, venv, other))))
+    words = sandbox_words(Confinement(f"{repository}/app", (str(venv),)), mounts, "/bin/x", {})
+    places = [tmp_path, other, repository, repository / "app", venv]
+    before = [words[words.index(str(path)) - (1 if path in (other, repository) else 2)] for path in places[:3]]
+    assert before == ["--bind", "--tmpfs", "--tmpfs"]
+    assert [words.index(str(path)) for path in places] == sorted(words.index(str(path)) for path in places)
+    assert words[words.index(str(venv)) - 1] == "--ro-bind-try"

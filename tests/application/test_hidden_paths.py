@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import compiler
-from dodo_dsl.plan import hidden_paths
+from dodo_dsl.application import hidden_paths
 from dodo_dsl.plan.test_files import FilesError
 
 SPEC = """\
