@@ -202,7 +202,8 @@ class Compose:
 
     def document(self) -> dict[str, Any]:
         """A compose file with the application, and where DoDo's services meet on this host; raises OSError."""
-        hidden, empty = self._hidden(), self.folder / _EMPTY_FILE
+        meeting = [Path(os.path.realpath(self.channel))] if self.channel else []  # in /tmp, which programs of cars mount
+        hidden, empty = [*self._hidden(), *meeting], self.folder / _EMPTY_FILE
         if any(path.is_file() for path in hidden):
             empty.touch()
         meets = {"volumes": [{"type": "bind", "source": escaped(self.channel), "target": CHANNEL}]}
