@@ -6,6 +6,7 @@ A service has a name and a program; together they have cycles of dependencies, a
 import difflib
 import os
 import re
+import shlex
 from collections.abc import Collection, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -216,12 +217,15 @@ def _missing_program(service: ComposeService, folder: Path) -> Iterator[Diagnost
     word = words[is_script] if len(words) > is_script else None
     if word is None or "$" in word.text or word.text.startswith("-"):
         return
-    own = folder / word.text
-    is_here = own.is_file() and (is_script or os.access(own, os.X_OK))
-    if is_script and not is_here:
-        message = f"there is no file '{word.text}' for {words[0].text} to run"
+    own, name = folder / word.text, word.text
+    message = hint = ""
+    if is_script and not own.is_file():
+        message = f"there is no file '{name}' for {words[0].text} to run"
         hint = "without it the application starts in containers only"
+    elif not is_script and "/" in name and own.is_file() and not os.access(own, os.X_OK):
+        message, hint = f"'{name}' is not executable", f"run: chmod +x {shlex.quote(shown_path(str(own)))}"
+    elif not is_script and {"/", " "} & {*name} and not own.exists() and "build" not in service.node.entries:
+        message = f"there is no program '{name}'"
+        hint = f"a program is one word: write [{', '.join(name.split())}]" if " " in name else "build it first"
+    if message:
         yield Diagnostic(word.span, "application-file", message, hint, "warning")
-    elif {"/", " "} & {*word.text} and not is_here and "build" not in service.node.entries:
-        hint = f"a program is one word, without its arguments; build it first, or run: chmod +x {word.text}"
-        yield Diagnostic(word.span, "application-file", f"there is no program '{word.text}'", hint, "warning")

@@ -158,6 +158,6 @@ def test_a_run_shows_a_warning_of_two_tests_once(repository: Path) -> None:
     said, words = StringIO(), Namespace(test=["good", "better"], level=[], application=[], backend="docker")
     compile_tests(words, Settings(), repository / "out", said)
     assert [line for line in said.getvalue().splitlines() if "matrix-unused" in line] == [
-        "tests/better/better.dodo.yml:7:32: warning[matrix-unused]: nothing uses ${matrix.x}, so its instances are all"
-        " the same (in better and good)"
+        "tests/better/better.dodo.yml:7:32: warning[matrix-unused]: nothing uses ${matrix.x}, so that its"
+        " values change nothing (in better and good)"
     ]

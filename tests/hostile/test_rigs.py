@@ -330,7 +330,7 @@ def test_places_come_from_the_operator_and_not_from_variables(
         ("dodo: 1\n", 0o666, "expected a file of root that only root can write"),
         ("dodo: 1\n", 0o664, "expected a file of root that only root can write"),
         ("", 0o644, "is empty"),
-        ("dodo: 2\n", 0o644, "reads 1"),
+        ("dodo: 2\n", 0o644, "expected 1"),
         ("dodo: 1\nrigs: {a: {}}\n", 0o644, "has no key 'devices'"),
         ("dodo: 1\nrigs: {a: {devices: [/dev/null], limits: {x: 1_0 m}}}\n", 0o644, "not a quantity"),
         ("dodo: 1\nrigs: {a: {devices: [/dev/null], limits: {x: 1}}}\n", 0o644, "has no unit"),
