@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dodo_dsl import source
 from dodo_dsl.application.host_paths import HostPaths
-from dodo_dsl.application.interpolation import dotenv, escaped, filled, literal, slip_in
+from dodo_dsl.application.interpolation import dotenv, escaped, filled, literal, slip_in, without_default
 from dodo_dsl.application.merge import Place, changed, normal, rebased, relocated
 from dodo_dsl.application.secret_variables import holds_secret, is_steering
 from dodo_dsl.diagnostics import Diagnostic, Span
@@ -54,6 +54,8 @@ class ComposeFiles:
         """The variables of the file that is being included, which those that are known come before."""
         self.secrets: dict[str, Path] = {}
         self.written: dict[Span, str] = {}
+        self.unset: dict[Span, set[str]] = {}
+        """Variables without a default by their places, but for those that the included file has by itself."""
         self._read: dict[Path, source.Mapping | None] = {}
         self._documents: dict[tuple[Path, Path, frozenset[tuple[str, str]]], source.Mapping | None] = {}
         self._nodes = 0
@@ -137,6 +139,7 @@ class ComposeFiles:
             problem = Diagnostic(word.span, "application-file", *slip)
             self.problems += [problem] if problem not in self.problems else []
         self.written[word.span] = text
+        self.unset[word.span] = without_default(text) - self.included.keys()
         key = place[2] if place[0] == "services" and len(place) > 2 else ""
         if key in TEST_FILLED or key.startswith("x-"):
             return self._of_include(text)

@@ -18,7 +18,7 @@ from dodo_dsl.application.compose_files import TEST_FILLED, ComposeFiles
 from dodo_dsl.application.construction import Construction, Setting
 from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
-from dodo_dsl.application.interpolation import names, without_default
+from dodo_dsl.application.interpolation import names
 from dodo_dsl.application.load import as_item, load, unread
 from dodo_dsl.application.merge import joined
 from dodo_dsl.application.model import (
@@ -215,8 +215,8 @@ def _withheld(application: ApplicationSource, files: ComposeFiles) -> Iterator[D
 
 def _unset(span: Span, files: ComposeFiles) -> list[str]:
     """The variables in what is written at a place that have no value there, and are not DoDo's own."""
-    known = {*files.known, *files.included, *files.secrets, *files.passed, *os.environ, *_OF_FOLDER}
-    return sorted(without_default(files.written.get(span, "")) - known)
+    known = {*files.known, *files.secrets, *files.passed, *os.environ, *_OF_FOLDER}
+    return sorted(files.unset.get(span, set()) - known)
 
 
 def _explained(problems: Sequence[Diagnostic], document: Node, files: ComposeFiles) -> Iterator[Diagnostic]:

@@ -6,6 +6,7 @@ time then.
 """
 
 import argparse
+import contextlib
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -135,11 +136,10 @@ def _deployment(stdout: TextIO) -> Deployment:
 
 def _usable(report: Path, slugs: Sequence[str]) -> Path:
     """The report's folder, made, and then left out of git; a folder with files of others and no report is refused."""
-    is_new = not report.exists()
     try:
-        report.mkdir(parents=True, exist_ok=True)
-        if is_new:
-            atomic.write_text(report / ".gitignore", "*\n")
+        if not report.exists():
+            with contextlib.suppress(FileExistsError), atomic.new_folder(report) as stage:  # two runs may begin at once
+                (stage / ".gitignore").write_text("*\n")
         is_ours = not any(report.iterdir()) or any(
             map(_is_written_by_dodo, (report / ".gitignore", report / FILE_NAME))
         )

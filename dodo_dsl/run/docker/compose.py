@@ -90,8 +90,7 @@ class Compose:
         copies = self.plan.application.copies.items()
         from_host = {"volumes": [{"type": "bind", "source": path, "target": f"/from/{name}"} for name, path in copies]}
         mounting = {**self.services, **({FILES: from_host} if copies else {})}
-        volumes = self._application.get("volumes") or {}
-        self._binds = {name: list(binds(each, volumes, self.folder)) for name, each in mounting.items()}
+        self._binds = {name: list(binds(each, self.folder)) for name, each in mounting.items()}
         self._require_own()
 
     async def require_plugin(self) -> str:

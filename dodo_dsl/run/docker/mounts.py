@@ -24,8 +24,8 @@ def whole(path: str, folder: Path) -> str:
     return os.path.normpath(folder / os.path.expanduser(path.replace("$$", "$")))  # noqa: PTH111  (it never raises)
 
 
-def binds(service: Mapping[str, Any], volumes: Mapping[str, Any], folder: Path) -> Iterator[Bind]:
-    """What a service of a test compiled into ``folder`` mounts, also by way of the test's ``volumes``."""
+def binds(service: Mapping[str, Any], folder: Path) -> Iterator[Bind]:
+    """What a service of a test compiled into ``folder`` mounts."""
     for mount in service.get("volumes") or ():
         if isinstance(mount, dict):
             source, kind = str(mount.get("source", "")), mount["type"]
@@ -33,10 +33,7 @@ def binds(service: Mapping[str, Any], volumes: Mapping[str, Any], folder: Path) 
         else:
             source, sign, _ = mount.partition(":")
             kind, is_required = ("bind" if sign and is_path(source) else "volume"), False
-        options = (volumes.get(source) or {}).get("driver_opts") or {} if kind == "volume" else {}
-        if "bind" in str(options.get("o", "")):
-            yield Bind(whole(options["device"], folder), target_of(mount), True)
-        elif kind == "bind":
+        if kind == "bind":
             yield Bind(whole(source, folder), target_of(mount), is_required)
 
 
@@ -63,8 +60,7 @@ def long_form(mount: str | Mapping[str, Any], folder: Path) -> str | Mapping[str
         if not is_path(source) or not rest or options not in ("", "ro"):
             return mount
         made = {"type": "bind", "source": source, "target": target, "read_only": options == "ro"}
-    is_there = made["type"] == "bind" and os.path.lexists(whole(made["source"], folder))
-    if not is_there or "selinux" in made.get("bind", {}):
+    if made["type"] != "bind" or not os.path.lexists(whole(made["source"], folder)):
         return mount
     return {**made, "bind": {"create_host_path": False}}
 

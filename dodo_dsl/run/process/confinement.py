@@ -17,7 +17,7 @@ from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 INTERPRETER = tuple(dict.fromkeys((sys.prefix, sys.base_prefix)))
-"""The folders of this Python, which starts the application's programs."""
+"""The folders of this Python, which may run the application's programs."""
 SYSTEM = ("/usr", "/etc", "/opt", "/sys/devices/system")
 """What every application sees of the machine."""
 
