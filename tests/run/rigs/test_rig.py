@@ -95,8 +95,9 @@ def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place, killed
 
 def test_what_a_killed_runner_leaves_misses_it_and_stops_the_rig(place: Place, cid: int, tmp_path: Path) -> None:
     """As containers do, which nothing ends when `dodo run` is killed."""
-    live = "import asyncio\nfrom pathlib import Path\nfrom dodo_dsl.run.announce import heartbeat\n"
-    live += f"async def main():\n async with heartbeat({cid}, Path({str(tmp_path)!r})):\n  await asyncio.sleep(60)\nasyncio.run(main())\n"
+    live = "import asyncio\nfrom pathlib import Path\nfrom dodo_dsl.run.announce import heartbeat\nasync def main():\n"
+    folder = f"Path({str(tmp_path)!r})"
+    live += f" async with heartbeat({cid}, {folder}):\n  await asyncio.sleep(60)\nasyncio.run(main())\n"
     runner = subprocess.Popen([sys.executable, "-c", live])
     place.rig.at = [0.0, 0.0, 0.0]
     flags = f"--cid={cid}", f"--serial={place.rig.path}", "--limits=y=1"
