@@ -116,10 +116,11 @@ class ServiceOutput:
         if self._skipping:
             self._skipping = False
             return True
+        if not line.strip():
+            return True
         if self._on_line(line):
             return False
-        if line.strip():
-            self._tail.append(line)
+        self._tail.append(line)
         return True
 
     def _finish(self) -> None:

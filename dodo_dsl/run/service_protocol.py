@@ -35,13 +35,13 @@ def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
         return None
     try:
         said = _decoder.decode(b'{"service":%s,%s' % (json.dumps(service).encode(), text[1:]))
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        return Malformed(service, str(error)) if is_verdict else None
-    match said:
-        case GivenVerdict():
+        if isinstance(said, GivenVerdict):
             checks = tuple(with_margin(msgspec.to_builtins(check)) for check in said.checks)
             is_good = said.outcome == "passed"
             return VerdictEvent(service, is_good, said.reason, checks, said.evidence, said.silent)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
+        return Malformed(service, str(error)) if is_verdict else None
+    match said:
         case Noted(text=note):
             return Noted(f"service '{service}': {note}")
         case Late() if said.late > said.updates:
