@@ -79,8 +79,8 @@ class DockerBackend:
         self.lines = PrintedLines(plan, folder, lambda text: self._events.put_nowait(Noted(text)))
         """What the application's containers print."""
         self._relay: ContainerRelay | None = None
-        self._reports = Reports(plan, report / "logs", self._events.put_nowait)
         self._outputs: dict[str, ServiceOutput] = {}
+        self._reports = Reports(plan, report / "logs", self._events.put_nowait, self._outputs)
         self._out_of_memory: set[str] = set()
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()

@@ -75,8 +75,8 @@ class ProcessBackend:
         self._commands = Commands(plan, folder, report, slot)
         self._events: asyncio.Queue[Event] = asyncio.Queue() if events is None else events
         self._lines = PrintedLines(plan, folder, self._note)
-        self._reports = Reports(plan, report / "logs", self._events.put_nowait)
         self._outputs: dict[str, ServiceOutput] = {}
+        self._reports = Reports(plan, report / "logs", self._events.put_nowait, self._outputs)
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._conditions = Conditions(plan.application.services, has_health=False)
@@ -339,6 +339,9 @@ class ProcessBackend:
 
     def _kept(self, pid: int) -> list[str]:
         outputs = [output.hand_over() for output in self._outputs.values() if not output.done.is_set()]
+        for output in self._outputs.values():
+            if output.done.is_set():
+                output.close()
         self._sandbox.keep((*(reader for reader, _ in outputs), *(log for _, log in outputs)))
         look = f"ps -f --ppid {pid}"
         if self.isolation == "network":
