@@ -49,8 +49,9 @@ class ContainerRelay:
 
     def _await_start(self) -> None:
         data = b""
-        while not data.endswith(b"\n") and (header := self._stream.recv(_HEADER_BYTES, socket.MSG_WAITALL)):
-            data += self._stream.recv(int.from_bytes(header[4:], "big"), socket.MSG_WAITALL)
+        with self._stream.makefile("rb") as answers:  # as a TLS socket does not wait for all that is asked for
+            while not data.endswith(b"\n") and (header := answers.read(_HEADER_BYTES)):
+                data += answers.read(int.from_bytes(header[4:], "big"))
         said = " ".join(data.decode("utf-8", "replace").split())
         if said != "ready":
             raise ValueError(f"the program that sends it says '{said[:200]}'")
