@@ -1,6 +1,6 @@
 """What a backend is, and the events that it reports to the engine while a test runs."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Protocol
 
@@ -11,6 +11,8 @@ from dodo_dsl.run.machine_load.service_use import Snapshot
 
 MOST_TEXT = 2000
 """Characters that a report can show."""
+Say = Callable[[str], None]
+"""Shows a sentence while a test or a run goes on."""
 Sentence = Annotated[str, Meta(min_length=1, max_length=MOST_TEXT)]
 
 

@@ -1,6 +1,5 @@
 """Containers of an application start in the order of their ``depends_on``, on a real engine."""
 
-import asyncio
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,12 +9,8 @@ import pytest
 
 from dodo_dsl.plan.model import ApplicationService
 from dodo_dsl.run import start_order
-from dodo_dsl.run.backends import Backends, Job
-from dodo_dsl.run.docker.containers import Containers
-from dodo_dsl.run.mixed import Mixed
-from dodo_dsl.run.runner import Policy, Runner
-from dodo_dsl.run.schedule import schedule
-from tests.docker.compose import SUBNETS, Crate, changed
+from dodo_dsl.run.backends import Job
+from tests.docker.compose import Crate, changed
 from tests.run.helpers import BEGUN, PASS, READY, STARTED, WAIT
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
@@ -96,7 +91,6 @@ def waiting(crate: Crate, slug: str, others: Mapping[str, tuple[str, str, dict[s
     return changed(job, replace(job.plan, application=made))
 
 
-BACKENDS = {"docker": Containers(SUBNETS), "mixed": Mixed(Containers(SUBNETS), ())}
 NOT_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container")
 
 
@@ -117,7 +111,5 @@ def test_conditions(backend: str, names: tuple[str, ...], crate: Crate, monkeypa
         monkeypatch.setattr(start_order, "LONGEST_S", 9.0)
     chosen = {name: TABLE[name] for name in names}
     jobs = [waiting(crate, slug, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]
-    backends: Backends = BACKENDS[backend]
-    runner = Runner(crate.progress, backends, schedule(4, lambda job: 1.0), Policy())
-    found = {o.slug.removeprefix(f"{crate.mark}-"): (o.outcome, o.reason) for o in asyncio.run(runner.run(jobs))}
+    found = {slug: (o.outcome, o.reason) for slug, o in crate.run(*jobs, backend=backend).items()}
     assert found == {slug: row[1:] for slug, row in chosen.items()}

@@ -1,35 +1,30 @@
-"""The docker backend: the containers that ``docker compose`` creates, watched by the engine's events."""
+"""The side of a test whose services are containers: ``docker compose`` creates them, the engine's events watch them."""
 
 import asyncio
 import contextlib
-import ipaddress
 import os
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
-from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
-from dodo_dsl.run import service_protocol
-from dodo_dsl.run.announce import begin_frame, hearers
+from dodo_dsl.plan.model import HEALTHY, READY_S
 from dodo_dsl.run.application_time import PAGE_DESTROYED
-from dodo_dsl.run.docker import shared_files
+from dodo_dsl.run.docker import beside_processes, shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
 from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, copy_into
-from dodo_dsl.run.docker.pulls import Pulls, Say
+from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Snapshot
-from dodo_dsl.run.printed_lines import PrintedLines
-from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
-from dodo_dsl.run.service_output import ServiceOutput
-from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, one_off, optional
+from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Say, Unstartable
+from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
+from dodo_dsl.run.start_order import LONGEST_S
 from dodo_dsl.spec.model import VIRTUAL
 
 _KILLED = 128 + signal.SIGKILL
@@ -41,62 +36,39 @@ _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
 _HOST_TURNS, _HOST_TURN_S = 20, 0.05
 """How often, and how long each time, a container's process is looked for on this machine."""
+_OUTPUT_S = 2.0
 
 
-class DockerBackend:
-    """One test as its own compose project; ``subnets`` are tried in turn until the engine accepts one."""
-
-    name = "docker"
-    compose_kind: type[Compose] = Compose
+class ContainerSide:
+    """One test's compose project; ``subnets`` are tried in turn until the engine accepts one."""
 
     def __init__(
-        self,
-        plan: Plan,
-        folder: Path,
-        report: Path,
-        client: Any,
-        pulls: Pulls,
-        project: str,
-        subnets: Iterable[str],
-        say: Say,
-        channel: str = "",
+        self, watched: WatchedServices, compose: Compose, client: Any, pulls: Pulls, subnets: Iterable[str], say: Say
     ) -> None:
-        """``channel`` is the folder where services meet, if they and the runner are on this host."""
-        self.plan = plan
-        self.cid = plan.cid
-        self.report = report
-        self.project = project
-        self._folder = folder
+        self._watched = watched
+        self._plan = watched.plan
+        self._compose = compose
         self._client = client
         self._pulls = pulls
         self._subnets = subnets
         self._say = say
-        self._events: asyncio.Queue[Event] = asyncio.Queue()
-        self._compose = self.compose_kind(plan, folder, report, project, say, channel)
-        self._application = tuple(service.name for service in plan.application.services)
+        self._application = tuple(service.name for service in self._plan.application.services)
         self._containers: dict[str, Any] = {}
         self._use = ContainerUse({})
-        self.lines = PrintedLines(plan, folder, lambda text: self._events.put_nowait(Noted(text)))
-        """What the application's containers print."""
         self._relay: ContainerRelay | None = None
-        self._outputs: dict[str, ServiceOutput] = {}
         self._out_of_memory: set[str] = set()
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
-        self._watch = EventWatch(self._take, lambda why: self._events.put_nowait(Lost(why)))
+        self._events = EventWatch(self._take, lambda why: watched.tell(Lost(why)))
         self._copied, self._copy_problem = asyncio.Event(), ""
-        self._conditions = Conditions(plan.application.services)
-        self._may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
-        self._turns: set[asyncio.Task[None]] = set()
-        """The services of the application that wait for others."""
         self.left_behind = False
 
     @property
-    def is_on_host(self) -> bool:
-        return self.plan.isolation == "host"
+    def _is_on_host(self) -> bool:
+        return self._plan.isolation == "host"
 
-    async def open(self) -> None:
-        if self.plan.clock == VIRTUAL and self.is_on_host:
+    async def open(self, entered: int = 0) -> int:
+        if self._plan.clock == VIRTUAL and self._is_on_host:
             raise BackendError(
                 "clock: virtual needs a network of the test's own where the application runs in containers: "
                 "remove 'isolation: host', or run with --backend process"
@@ -107,20 +79,23 @@ class DockerBackend:
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets)
         await self._start_watching()
+        if self._compose.layers:
+            return 0
+        return await asyncio.to_thread(beside_processes.entered, self._containers, self._application)
 
     async def _require_files(self) -> None:
         """Raises BackendError where the engine does not see what the test mounts; once for all tests of a run."""
         await self._pulls.once(shared_files.IMAGE, self._provide_empty_image)
         paths = self._compose.mounted()
-        others = [str(path) for path in paths if not path.is_relative_to(self._folder)]
-        await self._pulls.once(f"files {self._folder.parent} {others}", lambda: self._look_for(paths))
+        others = [str(path) for path in paths if not path.is_relative_to(self._watched.folder)]
+        await self._pulls.once(f"files {self._watched.folder.parent} {others}", lambda: self._look_for(paths))
 
     async def _provide_empty_image(self) -> str:
         await asyncio.to_thread(shared_files.provide_image, self._client)
         return ""
 
     async def _look_for(self, paths: Sequence[Path]) -> str:
-        missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self.project)
+        missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self._compose.project)
         if missing:
             raise BackendError(": ".join(shared_files.problem(missing)))
         return ""
@@ -132,7 +107,7 @@ class DockerBackend:
             self._containers = await asyncio.to_thread(self._find_containers)
             self._use = ContainerUse(self._containers, self._application)
             self._require_health()
-            await asyncio.to_thread(self._watch.begin, self._client, self.project)
+            await asyncio.to_thread(self._events.begin, self._client, self._compose.project)
             for name in (SANDBOX, FILES):
                 if name in self._containers:
                     await asyncio.to_thread(self._start_container, name)
@@ -140,12 +115,12 @@ class DockerBackend:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
     def _find_containers(self) -> dict[str, Any]:
-        found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self.project}"})
+        found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self._compose.project}"})
         return {c.labels[SERVICE_LABEL]: c for c in found}
 
     def _require_health(self) -> None:
         """Raises BackendError where a service waits for the health of another one that has no health check."""
-        for service in self.plan.application.services:
+        for service in self._plan.application.services:
             for other, condition in service.after.items():
                 if condition == HEALTHY and other in self._containers and not healthcheck(self._containers[other]):
                     raise BackendError(
@@ -157,27 +132,27 @@ class DockerBackend:
         if self._is_closing:
             code = int(attributes.get("exitCode", 0)) if action == "die" else 0
             if code > 128 and code != _KILLED:  # process 1 may not hear SIGTERM, and miss a world that has ended
-                self._events.put_nowait(Exited(name, code))
+                self._watched.tell(Exited(name, code))
         elif action == "oom":
             self._take_memory_kill(name)
         elif name == FILES:
             self._take_of_copies(action)
         elif action == "health_status: healthy":
-            self._conditions.healthy(name)
-            self._events.put_nowait(Ready(name))
+            self._watched.conditions.healthy(name)
+            self._watched.tell(Ready(name))
         elif action == "health_status: unhealthy":
-            self._conditions.unhealthy(name)
-        elif action == "die" and name in self._outputs:
+            self._watched.conditions.unhealthy(name)
+        elif action == "die" and name in self._watched.outputs:
             task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
             task.add_done_callback(lambda t: t.exception())
         elif action == "die" and name == SANDBOX and attributes.get("exitCode") == str(PAGE_DESTROYED):
             pass  # the clock says it
         elif action == "die":
-            self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+            self._watched.tell(Lost(f"the test's {name} ended unexpectedly"))
 
     def _take_memory_kill(self, name: str) -> None:
         """Ends a service of which the kernel killed a process for memory, because it may have been a child."""
-        if name in self._outputs and name not in self._out_of_memory:
+        if name in self._watched.outputs and name not in self._out_of_memory:
             self._kills.add(asyncio.ensure_future(asyncio.to_thread(self._kill, name)))
         self._out_of_memory.add(name)
 
@@ -218,10 +193,8 @@ class DockerBackend:
         await asyncio.to_thread(self._kill, FILES)
 
     async def _died(self, name: str, code: int) -> None:
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
-        self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
-        self._conditions.ended(name, code)
+        await self._watched.last_output(name, _OUTPUT_S)
+        self._watched.ended(name, code, await self._was_out_of_memory(name, code))
 
     async def _was_out_of_memory(self, name: str, code: int) -> bool:
         for _ in range(_MEMORY_TURNS):
@@ -241,93 +214,61 @@ class DockerBackend:
         return False
 
     async def start(self, layer: str) -> dict[str, bool]:
-        names = [s.name for s in self.plan.layer(layer)]
-        if layer == "application":
-            names = [name for name in self._application if name in self._containers]
-            await asyncio.gather(self._wait_for_copies(), self._connect())
-        evaluators = {s.name for s in self.plan.services if s.judge}
-        for name in names:
-            self._outputs[name] = ServiceOutput(
-                self.report / "logs" / f"{layer}.{name}.log",
-                self._line_reader(layer, name, evaluators),
-                is_cooked=self._prints(name),
-            )
-        waiting = [name for name in names if self._conditions.of(name)]
-        await asyncio.gather(*(self._start(name) for name in names if name not in waiting))
-        self._turns |= {in_turn(self._start_in_turn(name), partial(self._not_started, name)) for name in waiting}
-        reports = {name for name in names if layer != "application" or self._compose.has_healthcheck(name)}
-        ready = ({*waiting} | reports) - self._may_be_ill
-        return {name: name in ready for name in names}
+        names = [service.name for service in self._watched.of(layer)]
+        reports = names
+        if layer == APPLICATION:
+            names = [name for name in names if name in self._containers]
+            reports = [name for name in names if self._compose.has_healthcheck(name)]
+            await self._wait_for_copies()
 
-    async def _connect(self) -> None:
-        """Lets the runner send to services, and on the test's bus; raises BackendError."""
+        async def start(name: str) -> None:
+            await self._start(layer, name)
+
+        return await self._watched.start(names, start, reports, self._patience)
+
+    def _patience(self, name: str) -> dict[str, float]:
+        after = self._watched.conditions.of(name)
+        return {other: health_patience_s(self._containers[other]) for other in after if other in self._containers}
+
+    async def connect(self) -> Send:
         from docker.errors import DockerException
 
         try:
-            own = self._containers.get(RECORDER) or self._containers[self.plan.services[0].name]
-            self._relay = await asyncio.to_thread(ContainerRelay, own, self.cid)
+            own = self._containers.get(RECORDER) or self._containers[self._plan.services[0].name]
+            self._relay = await asyncio.to_thread(ContainerRelay, own, self._plan.cid)
         except (DockerException, OSError, ValueError) as error:
             raise BackendError(f"nothing can be sent to the test's services: {engine_error(error)}") from error
-        self.lines.connect(self._relay.send)
+        return self._relay.send
 
-    def _prints(self, name: str) -> bool:
-        """Whether what a container prints becomes messages."""
-        return name in self.lines.services
-
-    async def _start_in_turn(self, name: str) -> None:
-        """Starts a service of the application when what it waits for is so, and then waits for its own health."""
-        after = self._conditions.of(name)
-        patience = {other: health_patience_s(self._containers[other]) for other in after if other in self._containers}
-        try:
-            why = await self._conditions.unmet(name, patience, lambda text: self._events.put_nowait(Noted(text)))
-        except asyncio.CancelledError:
-            self._outputs[name].release_writer()
-            raise
-        if why:
-            self._not_started(name, why)
-            return
-        await self._start(name)
-        if not self._compose.has_healthcheck(name):
-            self._events.put_nowait(Ready(name))
-            return
-        why = await self._conditions.ill(name, health_patience_s(self._containers[name]))
-        if why and name not in self._may_be_ill:
-            self._events.put_nowait(Unstartable(name, why))
-
-    def _not_started(self, name: str, why: str) -> None:
-        self._outputs[name].release_writer()
-        self._events.put_nowait(Unstartable(name, why))
-        self._conditions.failed(name)
-
-    def _line_reader(self, layer: str, name: str, evaluators: set[str]) -> Callable[[bytes], bool]:
-        def on_line(line: bytes) -> bool:
-            if layer == "application" and self._prints(name):
-                self.lines.take(name, line)
-            event = None if layer == "application" else service_protocol.read_line(name, name in evaluators, line)
-            if event is not None:
-                self._events.put_nowait(event)
-            return event is not None
-
-        return on_line
-
-    async def _start(self, name: str) -> None:
+    async def _start(self, layer: str, name: str) -> None:
+        """Starts a service; where it waited for others, its own health is awaited, too."""
         from docker.errors import DockerException
 
+        output = self._watched.output(layer, name, is_cooked=self._watched.prints(name))
         try:
             stream = await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
-            self._not_started(name, engine_error(error))
+            output.release_writer()
+            self._watched.not_started(name, engine_error(error))
             return
-        self._conditions.started(name)
+        self._watched.conditions.started(name)
         follow, source = (self._follow, self._containers[name]) if stream is None else (copy_into, stream)
-        threading.Thread(target=follow, args=(source, self._outputs[name].writer), daemon=True).start()
+        threading.Thread(target=follow, args=(source, output.writer), daemon=True).start()
+        if not self._watched.conditions.of(name):
+            return
+        if not self._compose.has_healthcheck(name):
+            self._watched.tell(Ready(name))
+            return
+        why = await self._watched.conditions.ill(name, health_patience_s(self._containers[name]))
+        if why and name not in self._watched.may_be_ill:
+            self._watched.tell(Unstartable(name, why))
 
     def _start_container(self, name: str, again: bool = False) -> Any:
         """Starts a container, if need be twice; what it prints, where that becomes messages."""
         from docker.errors import APIError
 
         # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
-        stream = attached(self._containers[name]) if self._prints(name) else None
+        stream = attached(self._containers[name]) if self._watched.prints(name) else None
         try:
             self._containers[name].start()
         except APIError as error:
@@ -349,27 +290,19 @@ class DockerBackend:
         with contextlib.suppress(OSError):
             os.close(writer)
 
-    async def next_event(self) -> Event:
-        return await self._events.get()
-
     async def listeners(self) -> Collection[str] | None:
-        return await asyncio.to_thread(self._use.listeners, self._application, self.cid)
+        return await asyncio.to_thread(self._use.listeners, self._application, self._plan.cid)
 
-    async def require_own_host(self) -> None:
-        """Raises BackendError where the test is on the network of a host that is not this machine.
+    async def beginning(self) -> Collection[int]:
+        """None are told: DoDo's services do not see them. On the network of a host that is not this machine it raises.
 
         The engine shows a service that has just ended as a process that is not here, so it is asked again.
         """
         for _ in range(_HOST_TURNS):
-            if not self.is_on_host or await self.application() is not None:
-                return
+            if not self._is_on_host or await self.application() is not None:
+                return ()
             await asyncio.sleep(_HOST_TURN_S)
         raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
-
-    async def begin(self) -> None:
-        await self.require_own_host()
-        assert self._relay is not None, "the application was started"
-        self._relay.send(begin_frame(self.plan.seed), hearers(self.plan))
 
     async def use(self) -> Snapshot | None:
         return await asyncio.to_thread(self._use.take)
@@ -379,44 +312,33 @@ class DockerBackend:
 
     async def close(self, keep: bool) -> list[str]:
         self._is_closing = True
-        for turn in self._turns:
-            turn.cancel()
-        await asyncio.gather(*self._turns, return_exceptions=True)
         kept = []
         if keep and self._containers:
             kept = self._kept()
         else:
             await asyncio.to_thread(self._take_down)
-        self._watch.close()
+        self._events.close()
         if self._relay is not None:
             self._relay.close()
-        for output in self._outputs.values():
-            output.close()
+        self._watched.close(self._watched.outputs.keys() & self._containers.keys())
         return kept
 
     def _take_down(self) -> None:
-        report = (writers(self.plan), self.report)
-        self.left_behind = not take_down(self._client, self.project, self._containers, report, self._note)
+        report = (writers(self._plan), self._watched.report)
+        self.left_behind = not take_down(self._client, self._compose.project, self._containers, report, self._note)
 
     def _note(self, text: str) -> None:
         """Reports a sentence at once, and with the outcome; may be called from any thread."""
         self._say(text)
-        self._watch.call_in_loop(self._events.put_nowait, Noted(text))
+        self._events.call_in_loop(self._watched.note, text)
 
     def _kept(self) -> list[str]:
-        compose = f"docker compose -p {self.project}"
+        compose = f"docker compose -p {self._compose.project}"
         return [
-            f"{self.plan.slug} is kept running as compose project {self.project}",
+            f"{self._plan.slug} is kept running as compose project {self._compose.project}",
             f"look inside:  {compose} ps;  {compose} logs camera;  {compose} exec {SANDBOX} bash",
             f"take it down: {compose} down -v",
         ]
-
-    def tail(self, service: str) -> list[str]:
-        output = self._outputs.get(service)
-        return output.tail() if output else []
-
-    def unmatched(self) -> tuple[Unmatched, ...]:
-        return self.lines.unmatched({name: output.unfinished for name, output in self._outputs.items()})
 
 
 def healthcheck(container: Any) -> dict[str, Any]:
@@ -431,16 +353,3 @@ def health_patience_s(container: Any) -> float:
     interval, timeout = (((check.get(key) or 0) / 1e9) or 30.0 for key in ("Interval", "Timeout"))
     tries = (check.get("StartPeriod") or 0) / 1e9 + (check.get("Retries") or 3) * (interval + timeout)
     return min(tries + READY_S, LONGEST_S)
-
-
-def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
-    """The planned subnet, then the rest of the deployment's of the same size."""
-    yield first
-    length = int(first.partition("/")[2]) if first else 32
-    seen = {first}
-    for text in all_subnets:
-        network = ipaddress.IPv4Network(text)
-        same = str(network.supernet(new_prefix=length)) if length < network.prefixlen else text
-        if same not in seen:
-            seen.add(same)
-            yield same

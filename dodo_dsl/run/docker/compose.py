@@ -25,12 +25,15 @@ from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
+from dodo_dsl.run.docker.beside_processes import with_holder
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
 from dodo_dsl.run.docker.mounts import Bind, absent, binds, long_form, masks, over, whole
-from dodo_dsl.run.docker.pulls import Pulls, Say, image_hints
+from dodo_dsl.run.docker.pulls import Pulls, image_hints
 from dodo_dsl.run.hidden_paths import hidden_paths
-from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.process.commands import needed_paths
+from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.permission import known_ports
+from dodo_dsl.run.sides import APPLICATION
 
 
 def traced(plan: Plan, text: str) -> str:
@@ -58,14 +61,27 @@ _OVERLAP = "overlaps"
 _YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already run
 
 
+OWN_LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
+
+
 class Compose:
-    """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``."""
+    """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``.
 
-    layers: Sequence[str] = [layer for layer in LAYERS if layer != "application"]
-    """Those whose compiled files have a part in it."""
+    ``layers`` are those of DoDo's that have a part in it; without any, DoDo's services are processes beside it.
+    """
 
-    def __init__(self, plan: Plan, folder: Path, report: Path, project: str, say: Say, channel: str = "") -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        folder: Path,
+        report: Path,
+        project: str,
+        say: Say,
+        channel: str = "",
+        layers: Sequence[str] = OWN_LAYERS,
+    ) -> None:
         """``channel`` is the folder where services meet, if they and the runner are on this host."""
+        self.layers = layers
         self.plan = plan
         self.folder = folder
         self.report = report
@@ -158,6 +174,8 @@ class Compose:
             await pulls.once(key, lambda: self._build(built))
 
     def _own_images(self) -> set[str]:
+        if not self.layers:
+            return set()
         sandbox = {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else ()
         return {service.image for service in self.plan.services}.union(sandbox)
 
@@ -206,7 +224,7 @@ class Compose:
         if any(path.is_file() for path in hidden):
             empty.touch()
         meets = {"volumes": [{"type": "bind", "source": escaped(self.channel), "target": CHANNEL}]}
-        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel}
+        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel and self.layers}
         for name, mounted in self._binds.items():
             lie_over = masks(mounted, hidden, empty) + absent(mounted, self._paths, always=name == FILES)
             service = {key: value for key, value in self.services.get(name, {}).items() if key != "build"}
@@ -214,7 +232,11 @@ class Compose:
             services[name] = service | ({"volumes": volumes} if volumes else {})
             if name in self.services:
                 services[name]["image"] = escaped(service["image"])
-        return {**self._application, "services": services}
+        made = {**self._application, "services": services}
+        if self.layers:
+            return made
+        needed = [*needed_paths(self.plan, self.folder, self.report), Path(self.channel)]
+        return with_holder(made, self.plan, self.folder, needed)
 
     async def run(
         self, *words: str, files: Sequence[str] = (), subnet: str = "", log: Path | None = None, project: str = ""

@@ -13,10 +13,9 @@ from typing import Any
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.process.commands import own_module
-from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.spec.deployment import build_command
 
-Say = Callable[[str], None]
 _UNKNOWN = "unknown"
 """Of an image that does not say what it is for."""
 _SMALLER = {"amd64": "386", "arm64": "arm"}

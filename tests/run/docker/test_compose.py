@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,8 @@ import pytest
 import yaml
 
 from dodo_dsl.plan.model import ApplicationService, Plan
-from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.docker.compose import OWN_LAYERS, Compose
 from dodo_dsl.run.docker.pulls import Pulls
-from dodo_dsl.run.mixed import ApplicationCompose
 from dodo_dsl.run.protocol import BackendError
 from tests.run.docker.test_pulls import EmptyEngine
 from tests.run.scripted import plan
@@ -51,8 +51,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "generated" / "t"
 
 
-def read(made: Plan, folder: Path, kind: type[Compose] = Compose) -> Compose:
-    test = kind(made, folder, folder.parents[1] / "dodo-report" / "t", "project", lambda _: None)
+def read(made: Plan, folder: Path, layers: Sequence[str] = OWN_LAYERS) -> Compose:
+    report = folder.parents[1] / "dodo-report" / "t"
+    test = Compose(made, folder, report, "project", lambda _: None, "", layers)
     test.read()
     return test
 
@@ -193,7 +194,7 @@ def test_nothing_waits_for_services_that_are_processes(folder: Path) -> None:
     (folder / "environment.compose.yml").write_text(yaml.safe_dump(compiled))
     services = {"app": {"image": "a", "depends_on": {"track": on, "sandbox": on, "db": on}}, "db": {"image": "d"}}
     made = planned(services, copies={"files-0": "../../gone"}, volumes={"files-0": {}})
-    document = read(made, folder, ApplicationCompose).document()
+    document = read(made, folder, ()).document()
     assert document["services"].keys() == {"app", "db", "sandbox", "dodo-files"}
     assert document["services"]["app"]["depends_on"] == {"sandbox": on, "db": on}
     assert document["services"]["sandbox"]["entrypoint"][1:] == ["infinity"]

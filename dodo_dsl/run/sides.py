@@ -1,0 +1,214 @@
+"""One test on a backend: DoDo's services on one side, the application's on the other, or all of them on the same.
+
+Services report to one queue, whichever side has them; all of them start in the same order.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+from dodo_dsl.opendlv.relay import BUS
+from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
+from dodo_dsl.run import service_protocol
+from dodo_dsl.run.announce import begin_frame, hearers
+from dodo_dsl.run.machine_load.service_use import Snapshot
+from dodo_dsl.run.printed_lines import PrintedLines
+from dodo_dsl.run.protocol import Event, Exited, Noted, Unmatched, Unstartable
+from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
+
+APPLICATION = "application"
+"""The layer that is not DoDo's."""
+
+
+class WatchedServices:
+    """What becomes of a test's services, on whichever side they run: events, output, and who waits for whom."""
+
+    def __init__(self, plan: Plan, folder: Path, report: Path, has_health: bool = True) -> None:
+        """``folder`` is the compiled test's, ``report`` takes logs; ``has_health`` is as for ``Conditions``."""
+        self.plan, self.folder, self.report = plan, folder, report
+        self.events: asyncio.Queue[Event] = asyncio.Queue()
+        self.lines = PrintedLines(plan, folder, self.note)
+        self.outputs: dict[str, ServiceOutput] = {}
+        self.conditions = Conditions(plan.application.services, has_health)
+        self.may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
+        self.turns: set[asyncio.Task[None]] = set()
+        """The services of the application that wait for others."""
+        self._evaluators = {service.name for service in plan.services if service.judge}
+
+    def of(self, layer: str) -> tuple[PlannedService | ApplicationService, ...]:
+        """The services of a layer."""
+        return self.plan.application.services if layer == APPLICATION else self.plan.layer(layer)
+
+    def tell(self, event: Event) -> None:
+        self.events.put_nowait(event)
+
+    def note(self, text: str) -> None:
+        self.tell(Noted(text))
+
+    def not_started(self, name: str, why: str) -> None:
+        self.tell(Unstartable(name, why))
+        self.conditions.failed(name)
+
+    def ended(self, name: str, code: int, out_of_memory: bool) -> None:
+        self.tell(Exited(name, code, out_of_memory))
+        self.conditions.ended(name, code)
+
+    async def start(
+        self,
+        names: Collection[str],
+        start: Callable[[str], Awaitable[None]],
+        reports: Iterable[str],
+        patience: Callable[[str], Mapping[str, float]] = lambda _: {},
+    ) -> dict[str, bool]:
+        """Starts services, those of the application when what they wait for is so; who will report to be ready.
+
+        Those do that wait, and those in ``reports``. ``patience`` of a service is as for ``Conditions.unmet``.
+        """
+
+        async def when_met(name: str) -> None:
+            if why := await self.conditions.unmet(name, patience(name), self.note):
+                self.not_started(name, why)
+            else:
+                await start(name)
+
+        waiting = [name for name in names if self.conditions.of(name)]
+        await asyncio.gather(*(start(name) for name in names if name not in waiting))
+        self.turns |= {in_turn(when_met(name), partial(self.not_started, name)) for name in waiting}
+        ready = {*waiting, *reports} - self.may_be_ill
+        return {name: name in ready for name in names}
+
+    def prints(self, name: str) -> bool:
+        """Whether what a service prints becomes messages."""
+        return name in self.lines.services
+
+    def output(self, layer: str, name: str, take: Callable[[Event], None] | None = None, **kind: bool) -> ServiceOutput:
+        """Where a service that is started writes; raises OSError for a terminal.
+
+        ``take`` gets what its lines say, instead of the queue; ``kind`` is as for ``ServiceOutput``.
+        """
+        tell = take or self.tell
+
+        def on_line(line: bytes) -> bool:
+            if layer == APPLICATION:
+                if self.prints(name):
+                    self.lines.take(name, line)
+                return False
+            event = service_protocol.read_line(name, name in self._evaluators, line)
+            if event is not None:
+                tell(event)
+            return event is not None
+
+        log = self.report / "logs" / f"{layer}.{name}.log"
+        self.outputs[name] = ServiceOutput(log, on_line, **kind)
+        return self.outputs[name]
+
+    async def last_output(self, name: str, patience_s: float) -> None:
+        """Returns when all is read that a service wrote, so that no verdict follows its end."""
+        if name in self.outputs:
+            with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
+                await asyncio.wait_for(self.outputs[name].done.wait(), patience_s)
+
+    def tail(self, service: str) -> list[str]:
+        return self.outputs[service].tail() if service in self.outputs else []
+
+    def close(self, names: Iterable[str]) -> None:
+        """Reads what is there of the output of services, and no more."""
+        for name in names:
+            self.outputs[name].close()
+
+
+class Send(Protocol):
+    """Sends a datagram to a test's services by their names, or on its bus."""
+
+    def __call__(self, data: bytes, to: Sequence[str] = (BUS,)) -> None: ...
+
+
+class Side(Protocol):
+    """Processes or containers of one test. ``open`` and ``connect`` raise BackendError, the rest reports events."""
+
+    async def open(self, entered: int = 0) -> int:
+        """In the network, IPC namespace and ``/tmp`` of a process; returns the one whose the other side shares.
+
+        0 stands for own namespaces, or the host's.
+        """
+        ...
+
+    async def start(self, layer: str) -> dict[str, bool]:
+        """As of ``Backend``."""
+        ...
+
+    async def connect(self) -> Send:
+        """What sends to DoDo's services, which this side has, and on the bus."""
+        ...
+
+    async def beginning(self) -> Collection[int]:
+        """The application's processes as DoDo's services see them; raises BackendError where the test cannot begin."""
+        ...
+
+    async def listeners(self) -> Collection[str] | None: ...
+
+    async def use(self) -> Snapshot | None: ...
+
+    async def application(self) -> Collection[int] | None: ...
+
+    async def close(self, keep: bool) -> list[str]: ...
+
+
+class Sides:
+    """The backend of one test; ``own`` is DoDo's side, which may be the ``application``'s, too."""
+
+    def __init__(
+        self, name: str, cid: int, is_on_host: bool, watched: WatchedServices, own: Side, application: Side
+    ) -> None:
+        self.name, self.cid, self.is_on_host = name, cid, is_on_host
+        self._watched, self._own, self._application = watched, own, application
+        self._send: Send | None = None
+        self.tail, self.next_event = watched.tail, watched.events.get
+        self.listeners, self.application = application.listeners, application.application
+
+    @property
+    def _both(self) -> list[Side]:
+        return [self._own] if self._own is self._application else [self._own, self._application]
+
+    async def open(self) -> None:
+        process = await self._application.open()
+        if self._own is not self._application:
+            await self._own.open(process)
+
+    async def start(self, layer: str) -> dict[str, bool]:
+        if layer != APPLICATION:
+            return await self._own.start(layer)
+        self._send = await self._own.connect()
+        self._watched.lines.connect(self._send)
+        return await self._application.start(layer)
+
+    async def begin(self) -> None:
+        processes = await self._application.beginning()
+        assert self._send is not None, "the application was started"
+        self._send(begin_frame(self._watched.plan.seed, processes), hearers(self._watched.plan))
+
+    async def use(self) -> Snapshot | None:
+        """What all have used; the load of the machine is measured if both sides know it."""
+        own, *others = await asyncio.gather(*(side.use() for side in self._both))
+        if not others:
+            return own
+        application = others[0]
+        if own is None or application is None:
+            return application and replace(application, busy_s=None)
+        busy_s = None if application.busy_s is None else own.busy_s
+        return replace(own, services={**own.services, **application.services}, busy_s=busy_s)
+
+    async def close(self, keep: bool) -> list[str]:
+        for turn in self._watched.turns:
+            turn.cancel()
+        await asyncio.gather(*self._watched.turns, return_exceptions=True)
+        kept = await asyncio.gather(*(side.close(keep) for side in self._both))
+        return [line for lines in kept for line in lines]
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        return self._watched.lines.unmatched({n: out.unfinished for n, out in self._watched.outputs.items()})
