@@ -134,9 +134,10 @@ class CombinedBackends:
         isolation = "host" if plan.is_real else self.isolation or plan.isolation
         self._refuse(plan, isolation)
         watched = WatchedServices(plan, job.folder, job.report, has_health=self._containers is not None)
-        in_volume = self._kinds.own == CONTAINERS and isolation == "network"
         async with contextlib.AsyncExitStack() as stack:
-            channel = "" if in_volume else stack.enter_context(meeting_place(job.work, keep))
+            channel = stack.enter_context(meeting_place(job.work, keep))
+            if self._kinds.own == CONTAINERS:
+                Path(channel).chmod(0o777)  # for users of images; the folder around it is closed
             slot = await stack.enter_async_context(self._slot(plan, isolation, channel, say, keep))
             sides: list[Side] = []
             if self._processes is not None:
@@ -155,7 +156,6 @@ class CombinedBackends:
         alone, cids = is_fixed or host_isolation.runs_alone(plan), () if is_fixed or plan.is_real else self.cids
         if self._kinds.own == CONTAINERS:
             keep = False  # nobody of it could hold the leases
-            Path(channel).chmod(0o777)  # for users of images; the folder around it is closed
         async with (
             self._alone if alone else contextlib.nullcontext(),
             host_isolation.host_slot(plan, cids, say, keep, alone=alone) as leased,

@@ -13,12 +13,12 @@ from typing import Protocol
 
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.protocol import Event, Exited, Noted, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
 
 APPLICATION = "application"
@@ -33,12 +33,12 @@ class WatchedServices:
         self.plan, self.folder, self.report = plan, folder, report
         self.events: asyncio.Queue[Event] = asyncio.Queue()
         self.lines = PrintedLines(plan, folder, self.note)
+        self.reports = Reports(plan, report / "logs", self.tell)
         self.outputs: dict[str, ServiceOutput] = {}
         self.conditions = Conditions(plan.application.services, has_health)
         self.may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
         self.turns: set[asyncio.Task[None]] = set()
         """The services of the application that wait for others."""
-        self._evaluators = {service.name for service in plan.services if service.judge}
 
     def of(self, layer: str) -> tuple[PlannedService | ApplicationService, ...]:
         """The services of a layer."""
@@ -86,32 +86,27 @@ class WatchedServices:
         """Whether what a service prints becomes messages."""
         return name in self.lines.services
 
-    def output(self, layer: str, name: str, take: Callable[[Event], None] | None = None, **kind: bool) -> ServiceOutput:
+    def output(self, layer: str, name: str, take: Callable[[bytes], bool] | None = None, **kind: bool) -> ServiceOutput:
         """Where a service that is started writes; raises OSError for a terminal.
 
-        ``take`` gets what its lines say, instead of the queue; ``kind`` is as for ``ServiceOutput``.
+        ``take`` gets its lines instead, and ``kind`` is as for ``ServiceOutput``.
         """
-        tell = take or self.tell
 
         def on_line(line: bytes) -> bool:
-            if layer == APPLICATION:
-                if self.prints(name):
-                    self.lines.take(name, line)
-                return False
-            event = service_protocol.read_line(name, name in self._evaluators, line)
-            if event is not None:
-                tell(event)
-            return event is not None
+            if self.prints(name):
+                self.lines.take(name, line)
+            return layer != APPLICATION and self.reports.take(name, line)
 
         log = self.report / "logs" / f"{layer}.{name}.log"
-        self.outputs[name] = ServiceOutput(log, on_line, **kind)
+        self.outputs[name] = ServiceOutput(log, take or on_line, **kind)
         return self.outputs[name]
 
     async def last_output(self, name: str, patience_s: float) -> None:
-        """Returns when all is read that a service wrote, so that no verdict follows its end."""
+        """Returns when all is read that a service said and wrote, so that no verdict follows its end."""
         if name in self.outputs:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
                 await asyncio.wait_for(self.outputs[name].done.wait(), patience_s)
+        await self.reports.ended(name)
 
     def tail(self, service: str) -> list[str]:
         return self.outputs[service].tail() if service in self.outputs else []
@@ -184,6 +179,7 @@ class Sides:
         if layer != APPLICATION:
             return await self._own.start(layer)
         self._send = await self._own.connect()
+        self._watched.reports.stop_listening()
         self._watched.lines.connect(self._send)
         return await self._application.start(layer)
 
@@ -208,6 +204,7 @@ class Sides:
             turn.cancel()
         await asyncio.gather(*self._watched.turns, return_exceptions=True)
         kept = await asyncio.gather(*(side.close(keep) for side in self._both))
+        self._watched.reports.close()
         return [line for lines in kept for line in lines]
 
     def unmatched(self) -> tuple[Unmatched, ...]:

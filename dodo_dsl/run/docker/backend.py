@@ -76,6 +76,7 @@ class ContainerSide:
         await asyncio.to_thread(self._compose.read)
         await self._pulls.once("docker compose", self._compose.require_plugin)
         await self._require_files()
+        await self._open_channel()
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets)
         await self._start_watching()
@@ -89,6 +90,20 @@ class ContainerSide:
         paths = self._compose.mounted()
         others = [str(path) for path in paths if not path.is_relative_to(self._watched.folder)]
         await self._pulls.once(f"files {self._watched.folder.parent} {others}", lambda: self._look_for(paths))
+
+    async def _open_channel(self) -> None:
+        """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
+        folder = Path(self._compose.channel)
+        if not self._compose.layers:  # DoDo's services are no containers
+            return
+        try:
+            if not self._is_on_host:
+                await self._pulls.once(f"folder {folder.parent}", lambda: self._look_for([folder]))
+            self._watched.reports.listen(folder)
+        except BackendError:
+            self._compose.channel = ""
+        except OSError as error:
+            raise BackendError(f"services cannot reach the runner: {error}") from error
 
     async def _provide_empty_image(self) -> str:
         await asyncio.to_thread(shared_files.provide_image, self._client)

@@ -80,7 +80,7 @@ class Compose:
         channel: str = "",
         layers: Sequence[str] = OWN_LAYERS,
     ) -> None:
-        """``channel`` is the folder where services meet, if they and the runner are on this host."""
+        """``channel`` is the folder where services and runner meet, empty if that is a volume."""
         self.layers = layers
         self.plan = plan
         self.folder = folder

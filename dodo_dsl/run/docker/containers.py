@@ -52,7 +52,7 @@ class Containers:
     def side(self, watched: WatchedServices, say: Say, channel: str) -> Iterator[ContainerSide]:
         """One with its own project, and the project's lease.
 
-        ``channel`` is the folder where services meet, if they and the runner are on this host.
+        ``channel`` is the folder where services and runner meet, if the engine sees it.
         """
         assert self._pulls is not None, "there is no problem"
         plan = watched.plan

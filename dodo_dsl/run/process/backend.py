@@ -26,12 +26,14 @@ from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
-from dodo_dsl.run.protocol import BackendError, Event, Lost, Ready
+from dodo_dsl.run.protocol import BackendError, Lost, Ready
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
 from dodo_dsl.spec.model import VIRTUAL
 
 LOG = "sandbox.log"
+TIME_READY = b'{"dodo": "ready"}'
+"""What gives the application the test's time prints when it does."""
 USE_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
@@ -69,6 +71,7 @@ class ProcessSide:
         self._sandbox = SandboxClient(self._take, lambda why: watched.tell(Lost(why)), fork_server)
 
     async def open(self, entered: int = 0) -> int:
+        self._watched.reports.listen(Path(self._slot.channel))
         needed = [*needed_paths(self._plan, self._folder, self._report), Path(self._slot.channel)]
         if self._plan.clock == VIRTUAL:
             time = await asyncio.to_thread(application_time.built)
@@ -159,11 +162,10 @@ class ProcessSide:
         if self._time is not None and not self._time.done():
             self._time.set_result(has_time)
 
-    def _take_of_time(self, event: Event) -> None:
-        if isinstance(event, Ready):
+    def _take_of_time(self, line: bytes) -> bool:
+        if is_ready := line == TIME_READY:
             self._decide_time(True)
-        else:
-            self._watched.tell(event)
+        return is_ready
 
     async def connect(self) -> Send:
         if not await self._ask("relay", cid=self._slot.cid, folder=self._slot.channel):
