@@ -23,22 +23,15 @@ if TYPE_CHECKING:
     from dodo_dsl.run.docker.containers import Containers
 
 PROCESSES, CONTAINERS = "processes", "containers"
-
-
-@dataclass(frozen=True)
-class Combination:
-    """How DoDo's side runs, and how the application's."""
-
-    own: str
-    application: str
-
-
 COMBINATIONS = {
-    "process": Combination(PROCESSES, PROCESSES),
-    "docker": Combination(CONTAINERS, CONTAINERS),
-    "mixed": Combination(PROCESSES, CONTAINERS),
+    "process": (PROCESSES, PROCESSES),
+    "docker": (CONTAINERS, CONTAINERS),
+    "mixed": (PROCESSES, CONTAINERS),
 }
-"""By the name of the backend. Containers of DoDo's cannot enter the network of an application's processes."""
+"""What DoDo's side is, and the application's, by the name of the backend.
+
+Containers of DoDo's cannot enter the network of an application's processes.
+"""
 
 
 @dataclass(frozen=True)
@@ -100,14 +93,14 @@ class CombinedBackends:
     """A queue without time limit for tests of this run that need the machine for themselves."""
 
     def __post_init__(self) -> None:
-        self._kinds = COMBINATIONS[self.name]
-        if self._kinds.own == PROCESSES:
-            has_application = self._kinds.application == PROCESSES
+        self._own, self._application = COMBINATIONS[self.name]
+        if self._own == PROCESSES:
+            has_application = self._application == PROCESSES
             self._processes = Processes(self.isolation, self.descriptors, self.loaded, has_application)
-        if self._kinds.application == CONTAINERS:
+        if self._application == CONTAINERS:
             from dodo_dsl.run.docker.containers import Containers
 
-            self._containers = Containers(self.subnets, has_own=self._kinds.own == CONTAINERS)
+            self._containers = Containers(self.subnets, has_own=self._own == CONTAINERS)
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
         if self._containers is not None:
@@ -133,10 +126,10 @@ class CombinedBackends:
         plan = self.session.at_home(job.plan) if self.session else job.plan
         isolation = "host" if plan.is_real else self.isolation or plan.isolation
         self._refuse(plan, isolation)
-        watched = WatchedServices(plan, job.folder, job.report, has_health=self._containers is not None)
+        watched = WatchedServices(plan, job.folder, job.report)
         async with contextlib.AsyncExitStack() as stack:
             channel = stack.enter_context(meeting_place(job.work, keep))
-            if self._kinds.own == CONTAINERS:
+            if self._own == CONTAINERS:
                 Path(channel).chmod(0o777)  # for users of images; the folder around it is closed
             slot = await stack.enter_async_context(self._slot(plan, isolation, channel, say, keep))
             sides: list[Side] = []
@@ -152,9 +145,9 @@ class CombinedBackends:
         if isolation == "network":
             yield Slot(plan.cid, descriptors=self.descriptors, channel=channel)
             return
-        is_fixed = self._kinds.application == CONTAINERS
+        is_fixed = self._application == CONTAINERS
         alone, cids = is_fixed or host_isolation.runs_alone(plan), () if is_fixed or plan.is_real else self.cids
-        if self._kinds.own == CONTAINERS:
+        if self._own == CONTAINERS:
             keep = False  # nobody of it could hold the leases
         async with (
             self._alone if alone else contextlib.nullcontext(),

@@ -16,7 +16,7 @@ from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import PrintedLines
-from dodo_dsl.run.protocol import Event, Exited, Noted, Unmatched, Unstartable
+from dodo_dsl.run.protocol import Event, Exited, Noted, Running, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
@@ -28,14 +28,14 @@ APPLICATION = "application"
 class WatchedServices:
     """What becomes of a test's services, on whichever side they run: events, output, and who waits for whom."""
 
-    def __init__(self, plan: Plan, folder: Path, report: Path, has_health: bool = True) -> None:
-        """``folder`` is the compiled test's, ``report`` takes logs; ``has_health`` is as for ``Conditions``."""
+    def __init__(self, plan: Plan, folder: Path, report: Path) -> None:
+        """``folder`` is the compiled test's, ``report`` takes logs."""
         self.plan, self.folder, self.report = plan, folder, report
         self.events: asyncio.Queue[Event] = asyncio.Queue()
         self.lines = PrintedLines(plan, folder, self.note)
         self.reports = Reports(plan, report / "logs", self.tell)
         self.outputs: dict[str, ServiceOutput] = {}
-        self.conditions = Conditions(plan.application.services, has_health)
+        self.conditions = Conditions(plan.application.services)
         self.may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
         self.turns: set[asyncio.Task[None]] = set()
         """The services of the application that wait for others."""
@@ -123,35 +123,23 @@ class Send(Protocol):
     def __call__(self, data: bytes, to: Sequence[str] = (BUS,)) -> None: ...
 
 
-class Side(Protocol):
-    """Processes or containers of one test. ``open`` and ``connect`` raise BackendError, the rest reports events."""
+class Side(Running, Protocol):
+    """Processes or containers of one test."""
 
     async def open(self, entered: int = 0) -> int:
         """In the network, IPC namespace and ``/tmp`` of a process; returns the one whose the other side shares.
 
-        0 stands for own namespaces, or the host's.
+        0 stands for own namespaces, or the host's. Raises BackendError.
         """
         ...
 
-    async def start(self, layer: str) -> dict[str, bool]:
-        """As of ``Backend``."""
-        ...
-
     async def connect(self) -> Send:
-        """What sends to DoDo's services, which this side has, and on the bus."""
+        """What sends to DoDo's services, which this side has, and on the bus; raises BackendError."""
         ...
 
     async def beginning(self) -> Collection[int]:
         """The application's processes as DoDo's services see them; raises BackendError where the test cannot begin."""
         ...
-
-    async def listeners(self) -> Collection[str] | None: ...
-
-    async def use(self) -> Snapshot | None: ...
-
-    async def application(self) -> Collection[int] | None: ...
-
-    async def close(self, keep: bool) -> list[str]: ...
 
 
 class Sides:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import os
 import signal
 import threading
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -19,7 +18,7 @@ from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch
-from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, copy_into
+from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Say, Unstartable
@@ -29,9 +28,8 @@ from dodo_dsl.spec.model import VIRTUAL
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
-_MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
-"""How often, and how long each time, the engine's word is awaited that it was for memory: it may come late."""
-
+_MEMORY_S = 1.0
+"""How long the engine's word is awaited that it was for memory: it may come late."""
 _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
 _HOST_TURNS, _HOST_TURN_S = 20, 0.05
@@ -60,7 +58,8 @@ class ContainerSide:
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
         self._events = EventWatch(self._take, lambda why: watched.tell(Lost(why)))
-        self._copied, self._copy_problem = asyncio.Event(), ""
+        self._copied = asyncio.get_running_loop().create_future()
+        """Whether the application has its own copies of the repository's files."""
         self.left_behind = False
 
     @property
@@ -80,7 +79,7 @@ class ContainerSide:
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets)
         await self._start_watching()
-        if self._compose.layers:
+        if self._compose.has_own:
             return 0
         return await asyncio.to_thread(beside_processes.entered, self._containers, self._application)
 
@@ -94,7 +93,7 @@ class ContainerSide:
     async def _open_channel(self) -> None:
         """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
         folder = Path(self._compose.channel)
-        if not self._compose.layers:  # DoDo's services are no containers
+        if not self._compose.has_own:  # DoDo's services are no containers
             return
         try:
             if not self._is_on_host:
@@ -125,7 +124,7 @@ class ContainerSide:
             await asyncio.to_thread(self._events.begin, self._client, self._compose.project)
             for name in (SANDBOX, FILES):
                 if name in self._containers:
-                    await asyncio.to_thread(self._start_container, name)
+                    close(await asyncio.to_thread(self._start_container, name))
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
@@ -151,7 +150,8 @@ class ContainerSide:
         elif action == "oom":
             self._take_memory_kill(name)
         elif name == FILES:
-            self._take_of_copies(action)
+            if action in ("health_status: healthy", "die") and not self._copied.done():
+                self._copied.set_result(action != "die")
         elif action == "health_status: healthy":
             self._watched.conditions.healthy(name)
             self._watched.tell(Ready(name))
@@ -177,56 +177,33 @@ class ContainerSide:
         with contextlib.suppress(DockerException, OSError):  # it has ended
             self._containers[name].kill()
 
-    def _take_of_copies(self, action: str) -> None:
-        if action == "health_status: healthy":
-            self._copied.set()
-        elif action == "die" and not self._copied.is_set():
-            task = asyncio.ensure_future(self._not_copied())
-            task.add_done_callback(lambda t: t.exception())
-
-    async def _not_copied(self) -> None:
-        from docker.errors import DockerException
-
-        said = b""
-        with contextlib.suppress(DockerException, OSError):
-            said = await asyncio.to_thread(self._containers[FILES].logs, tail=1)
-        why = said.decode("utf-8", "replace").strip() or "the program that copies them ended"
-        self._copy_problem = f"the application's files cannot be copied: {why}"
-        self._copied.set()
-
     async def _wait_for_copies(self) -> None:
         """Until the application has its own copies of the repository's files; raises BackendError."""
         if FILES not in self._containers:
             return
-        try:
-            await asyncio.wait_for(self._copied.wait(), _COPY_S)
-        except TimeoutError:
+        await asyncio.wait([self._copied], timeout=_COPY_S)
+        if not self._copied.done():
             hint = "mount large folders read-only (:ro)"
-            raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}") from None
-        if self._copy_problem:
-            raise BackendError(self._copy_problem)
+            raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}")
+        if not self._copied.result():
+            said = await asyncio.to_thread(_last_line, self._containers[FILES])
+            raise BackendError(f"the application's files cannot be copied: {said or 'the program that does it ended'}")
         await asyncio.to_thread(self._kill, FILES)
 
     async def _died(self, name: str, code: int) -> None:
         await self._watched.last_output(name, _OUTPUT_S)
-        self._watched.ended(name, code, await self._was_out_of_memory(name, code))
+        if code == _KILLED and name not in self._out_of_memory:
+            await asyncio.sleep(_MEMORY_S)
+            await asyncio.to_thread(self._ask_for_memory_kill, name)
+        self._watched.ended(name, code, name in self._out_of_memory)
 
-    async def _was_out_of_memory(self, name: str, code: int) -> bool:
-        for _ in range(_MEMORY_TURNS):
-            if code != _KILLED or name in self._out_of_memory:
-                break
-            await asyncio.sleep(_MEMORY_TURN_S)
-        else:
-            return await asyncio.to_thread(self._was_killed_for_memory, name)
-        return name in self._out_of_memory
-
-    def _was_killed_for_memory(self, name: str) -> bool:
+    def _ask_for_memory_kill(self, name: str) -> None:
         from docker.errors import DockerException
 
         with contextlib.suppress(DockerException, OSError):
             self._containers[name].reload()
-            return bool(self._containers[name].attrs["State"].get("OOMKilled"))
-        return False
+            if self._containers[name].attrs["State"].get("OOMKilled"):
+                self._out_of_memory.add(name)
 
     async def start(self, layer: str) -> dict[str, bool]:
         names = [service.name for service in self._watched.of(layer)]
@@ -261,14 +238,14 @@ class ContainerSide:
 
         output = self._watched.output(layer, name, is_cooked=self._watched.prints(name))
         try:
-            stream = await asyncio.to_thread(self._start_container, name)
+            printed = await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
             output.release_writer()
             self._watched.not_started(name, engine_error(error))
             return
         self._watched.conditions.started(name)
-        follow, source = (self._follow, self._containers[name]) if stream is None else (copy_into, stream)
-        threading.Thread(target=follow, args=(source, output.writer), daemon=True).start()
+        arguments = printed, self._watched.prints(name), output.writer
+        threading.Thread(target=copy_into, args=arguments, daemon=True).start()
         if not self._watched.conditions.of(name):
             return
         if not self._compose.has_healthcheck(name):
@@ -279,31 +256,19 @@ class ContainerSide:
             self._watched.tell(Unstartable(name, why))
 
     def _start_container(self, name: str, again: bool = False) -> Any:
-        """Starts a container, if need be twice; what it prints, where that becomes messages."""
+        """Starts a container, if need be twice; what it prints."""
         from docker.errors import APIError
 
-        # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
-        stream = attached(self._containers[name]) if self._watched.prints(name) else None
+        printed = attached(self._containers[name])  # before its start, because it may end at once
         try:
             self._containers[name].start()
         except APIError as error:
+            close(printed)
             if again or not TOO_SLOW.search(engine_error(error)):
                 raise
             self._note(f"the container of '{name}' is started once more: {engine_error(error)}")
             return self._start_container(name, again=True)
-        return stream
-
-    @staticmethod
-    def _follow(container: Any, writer: int) -> None:
-        """Copies a container's output into the pipe of its Output; runs in its own thread.
-
-        It ends with the container, or when nobody reads the pipe any more.
-        """
-        with contextlib.suppress(Exception), contextlib.closing(container.logs(stream=True, follow=True)) as chunks:
-            for chunk in chunks:
-                os.write(writer, chunk)
-        with contextlib.suppress(OSError):
-            os.close(writer)
+        return printed
 
     async def listeners(self) -> Collection[str] | None:
         return await asyncio.to_thread(self._use.listeners, self._application, self._plan.cid)
@@ -354,6 +319,14 @@ class ContainerSide:
             f"look inside:  {compose} ps;  {compose} logs camera;  {compose} exec {SANDBOX} bash",
             f"take it down: {compose} down -v",
         ]
+
+
+def _last_line(container: Any) -> str:
+    from docker.errors import DockerException
+
+    with contextlib.suppress(DockerException, OSError):
+        return str(container.logs(tail=1).decode("utf-8", "replace").strip())
+    return ""
 
 
 def healthcheck(container: Any) -> dict[str, Any]:

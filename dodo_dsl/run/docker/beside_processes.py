@@ -4,19 +4,15 @@ Both share a network, an IPC namespace and ``/tmp``. A container holds these: it
 image.
 """
 
-import os
 import secrets
-import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from dodo_dsl.application.interpolation import escaped
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import TIME
-from dodo_dsl.plan.model import LAYERS, Plan
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import application_time
 from dodo_dsl.run.docker.container_use import ELSEWHERE, first_process
 from dodo_dsl.run.docker.mounts import over
@@ -29,49 +25,37 @@ from dodo_dsl.spec.model import VIRTUAL
 _SEEN = ("/bin", "/lib", "/lib64", "/usr")
 """Folders of this machine that hold the program and its libraries."""
 _TMP = "tmp"
+_NOBODY = "containers-of-dodo"
+"""A profile that compose is not asked for."""
 
 
-def with_holder(made: dict[str, Any], plan: Plan, folder: Path, needed: Iterable[Path]) -> dict[str, Any]:
-    """The application's compose file with the containers that DoDo adds; nothing waits for DoDo's services.
+def without_own(made: dict[str, Any], plan: Plan, needed: Iterable[Path]) -> dict[str, Any]:
+    """The compose file over the compiled ones with no container of DoDo's services, for which nothing waits.
 
-    Those have programs of this machine. ``folder`` is the compiled test's, ``needed`` is what DoDo's processes find in
-    ``/tmp``. Mounts lie over the folders in ``/tmp`` where these have theirs: so no container removes them.
+    Containers that DoDo adds have programs of this machine. ``needed`` is what DoDo's processes find in ``/tmp``.
+    Mounts lie over the folders in ``/tmp`` where these have theirs: so no container removes them.
     """
-    compiled = yaml.load((folder / f"{LAYERS[0]}.compose.yml").read_bytes(), yaml.CSafeLoader)
-    services, own = dict(made["services"]), dict[str, Any]()
-    if (files := services.pop(FILES, None)) is not None:
-        copies = compiled["services"][FILES]
-        shell, *words = copies["entrypoint"]
-        copies = {**copies, "volumes": over(copies["volumes"], files.get("volumes", ()))}
-        own[FILES] = _on_machine(copies, _program(shell), *words)
+    machine = [
+        {"type": "bind", "source": folder, "target": folder, "read_only": True} for folder in _SEEN
+        if Path(folder).is_dir()
+    ]  # fmt: skip
+    services: dict[str, Any] = {service.name: {"profiles": [_NOBODY]} for service in plan.services}
     volumes, shown = dict(made.get("volumes") or {}), tuple[Path, ...]()
     if plan.isolation == "network":
         shown = Entered.with_own(0, *needed).shown
-        waits = compiled["services"][SANDBOX]["command"] if plan.clock == VIRTUAL else [_program("sleep"), "infinity"]
-        own[SANDBOX] = {**_on_machine(compiled["services"][SANDBOX], *waits), "user": "65534:65534"}
-        volumes[_TMP] = compiled["volumes"][_TMP]
+        services[SANDBOX] = {"image": IMAGE, "user": "65534:65534", "volumes": machine}
         if plan.clock == VIRTUAL:  # with what this machine has built, the holder lets the application's time go on
             place = escaped(str(application_time.built().library.parent))
             volumes[TIME] = {"driver_opts": {"type": "none", "o": "bind", "device": place}}
     mounts = covers(shown)
-    for service in services.values():
-        after = service.get("depends_on") or {}
-        service["depends_on"] = {name: how for name, how in after.items() if name in services or name in own}
-        service["volumes"] = over(mounts, service.get("volumes", ()))
-    networks = {"networks": compiled["networks"]} if "networks" in compiled else {}
-    return {**made, **networks, "services": {**services, **own}, "volumes": volumes}
-
-
-def _on_machine(compiled: dict[str, Any], *words: str) -> dict[str, Any]:
-    """A container as it is ``compiled``, which does what the ``words`` say with this machine's programs."""
-    kept = {key: value for key, value in compiled.items() if key not in ("command", "depends_on")}
-    seen = [folder for folder in _SEEN if Path(folder).is_dir()]
-    folders = [{"type": "bind", "source": folder, "target": folder, "read_only": True} for folder in seen]
-    return {**kept, "image": IMAGE, "entrypoint": [*words], "volumes": [*compiled["volumes"], *folders]}
-
-
-def _program(name: str) -> str:
-    return shutil.which(name, path=os.defpath) or f"/bin/{name}"
+    for name, service in made["services"].items():
+        own = service.get("volumes", ())
+        if name == FILES:
+            services[name] = {"image": IMAGE, "volumes": [*machine, *own]}
+        else:
+            kept = {key: value for key, value in service.items() if key != "depends_on"}
+            services[name] = {**kept, "volumes": over(mounts, own)}
+    return {**made, "services": services, "volumes": volumes}
 
 
 def covers(shown: Iterable[Path]) -> list[dict[str, Any]]:

@@ -25,7 +25,7 @@ from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
-from dodo_dsl.run.docker.beside_processes import with_holder
+from dodo_dsl.run.docker.beside_processes import without_own
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
 from dodo_dsl.run.docker.mounts import Bind, absent, binds, long_form, masks, over, whole
 from dodo_dsl.run.docker.pulls import Pulls, image_hints
@@ -61,13 +61,13 @@ _OVERLAP = "overlaps"
 _YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already run
 
 
-OWN_LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
+_LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
 
 
 class Compose:
     """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``.
 
-    ``layers`` are those of DoDo's that have a part in it; without any, DoDo's services are processes beside it.
+    With ``has_own``, DoDo's services are containers of it; without, they are processes beside it.
     """
 
     def __init__(
@@ -78,10 +78,10 @@ class Compose:
         project: str,
         say: Say,
         channel: str = "",
-        layers: Sequence[str] = OWN_LAYERS,
+        has_own: bool = True,
     ) -> None:
         """``channel`` is the folder where services and runner meet, empty if that is a volume."""
-        self.layers = layers
+        self.has_own = has_own
         self.plan = plan
         self.folder = folder
         self.report = report
@@ -147,7 +147,7 @@ class Compose:
         """What containers mount of this machine; what is compiled stands as one file."""
         sources = {Path(bind.source) for each in self._binds.values() for bind in each}
         reads_files = self.plan.messages or any(f.kind == "path" for s in self.plan.services for f in s.flags)
-        own = [self.folder / PLAN_FILE] if self.layers and reads_files else []
+        own = [self.folder / PLAN_FILE] if self.has_own and reads_files else []
         return [*own, *sorted(path for path in sources if path.exists())]
 
     def has_healthcheck(self, name: str) -> bool:
@@ -174,7 +174,7 @@ class Compose:
             await pulls.once(key, lambda: self._build(built))
 
     def _own_images(self) -> set[str]:
-        if not self.layers:
+        if not self.has_own:
             return set()
         sandbox = {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else ()
         return {service.image for service in self.plan.services}.union(sandbox)
@@ -209,7 +209,7 @@ class Compose:
         with tempfile.TemporaryDirectory(prefix="dodo-compose-") as folder:
             own = Path(folder) / "application.compose.json"
             _write(own, document)
-            files = [*(f"{layer}.compose.yml" for layer in self.layers), str(own)]
+            files = [*(f"{layer}.compose.yml" for layer in _LAYERS), str(own)]
             for subnet in subnets:
                 code, _, problem = await self.run("create", "--no-build", "--pull", "never", files=files, subnet=subnet)
                 if not code or _OVERLAP not in problem:
@@ -224,7 +224,7 @@ class Compose:
         if any(path.is_file() for path in hidden):
             empty.touch()
         meets = {"volumes": [{"type": "bind", "source": escaped(self.channel), "target": CHANNEL}]}
-        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel and self.layers}
+        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel and self.has_own}
         for name, mounted in self._binds.items():
             lie_over = masks(mounted, hidden, empty) + absent(mounted, self._paths, always=name == FILES)
             service = {key: value for key, value in self.services.get(name, {}).items() if key != "build"}
@@ -233,10 +233,10 @@ class Compose:
             if name in self.services:
                 services[name]["image"] = escaped(service["image"])
         made = {**self._application, "services": services}
-        if self.layers:
+        if self.has_own:
             return made
         needed = [*needed_paths(self.plan, self.folder, self.report), Path(self.channel)]
-        return with_holder(made, self.plan, self.folder, needed)
+        return without_own(made, self.plan, needed)
 
     async def run(
         self, *words: str, files: Sequence[str] = (), subnet: str = "", log: Path | None = None, project: str = ""

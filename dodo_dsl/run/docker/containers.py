@@ -12,7 +12,7 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.docker import cleanup
 from dodo_dsl.run.docker.backend import ContainerSide
 from dodo_dsl.run.docker.client import connect
-from dodo_dsl.run.docker.compose import OWN_LAYERS, Compose
+from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.sides import WatchedServices
@@ -59,8 +59,7 @@ class Containers:
         project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
         lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"
-        layers = OWN_LAYERS if self._has_own else ()
-        compose = Compose(plan, watched.folder, watched.report, project, say, channel, layers)
+        compose = Compose(plan, watched.folder, watched.report, project, say, channel, self._has_own)
         subnets = other_subnets(plan.subnet, self._subnets)
         side = ContainerSide(watched, compose, self._client, self._pulls, subnets, say)
         try:

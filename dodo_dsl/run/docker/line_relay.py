@@ -4,7 +4,7 @@ import contextlib
 import os
 import socket
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, BinaryIO
 
 from dodo_dsl.opendlv.relay import BUS
 
@@ -16,17 +16,17 @@ _HEADER_BYTES = 8
 
 
 def attached(container: Any) -> Any:
-    """What a container with a terminal prints, from its start on; raises DockerException and OSError."""
+    """What a container prints from its start on, to be closed; raises DockerException and OSError."""
     return container.attach_socket(params={"stdout": 1, "stderr": 1, "stream": 1})
 
 
-def copy_into(answer: Any, writer: int) -> None:
+def copy_into(answer: Any, is_terminal: bool, writer: int) -> None:
     """Copies output into a pipe, until the container ends or nobody reads the pipe; then closes both."""
-    with contextlib.suppress(OSError):
-        while data := _socket(answer).recv(_CHUNK):
+    with contextlib.suppress(OSError), _socket(answer).makefile("rb") as output:
+        while data := output.read1(_CHUNK) if is_terminal else _piece(output):
             while data:
                 data = data[os.write(writer, data) :]
-    _close(answer)
+    close(answer)
     with contextlib.suppress(OSError):
         os.close(writer)
 
@@ -51,9 +51,9 @@ class ContainerRelay:
 
     def _await_start(self) -> None:
         data = b""
-        with self._stream.makefile("rb") as answers:  # as a TLS socket does not wait for all that is asked for
-            while not data.endswith(b"\n") and (header := answers.read(_HEADER_BYTES)):
-                data += answers.read(int.from_bytes(header[4:], "big"))
+        with self._stream.makefile("rb") as output:
+            while not data.endswith(b"\n") and (piece := _piece(output)):
+                data += piece
         said = " ".join(data.decode("utf-8", "replace").split())
         if said != "ready":
             raise ValueError(f"the program that sends it says '{said[:200]}'")
@@ -64,7 +64,7 @@ class ContainerRelay:
             self._stream.sendall(" ".join([*to, f"{data.hex()}\n"]).encode())
 
     def close(self) -> None:
-        _close(self._answer)
+        close(self._answer)
 
 
 def _socket(answer: Any) -> socket.socket:
@@ -74,7 +74,12 @@ def _socket(answer: Any) -> socket.socket:
     return inner
 
 
-def _close(answer: Any) -> None:
+def close(answer: Any) -> None:
     """Closes the socket of an answer of the engine, and the response, which holds it open."""
     _socket(answer).close()
     answer._response.close()
+
+
+def _piece(output: BinaryIO) -> bytes:
+    """Of what a program without a terminal prints; empty at its end."""
+    return output.read(int.from_bytes(output.read(_HEADER_BYTES)[4:], "big"))

@@ -86,6 +86,7 @@ class ProcessSide:
         if name := message.get("started"):
             self._pids[name].set_result(message["pid"])
             self._watched.conditions.started(name)
+            self._watched.conditions.healthy(name)  # as nothing asks for its health
             if self._watched.conditions.of(name):
                 self._watched.tell(Ready(name))
         elif name := message.get("unstartable"):

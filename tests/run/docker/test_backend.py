@@ -1,6 +1,7 @@
 """What the backend makes of the ends of containers."""
 
 import asyncio
+import socket
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -42,8 +43,10 @@ class Container:
         if self.problems:
             raise APIError("", None, self.problems.pop(0))
 
-    def logs(self, **_: object) -> Any:
-        return SimpleNamespace(__iter__=lambda: iter(()), close=lambda: None)
+    def attach_socket(self, **_: object) -> Any:
+        ours, theirs = socket.socketpair()
+        theirs.close()
+        return SimpleNamespace(_sock=ours, _response=ours)
 
 
 def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] = (), **others: Container) -> Any:
