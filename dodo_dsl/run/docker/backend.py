@@ -85,7 +85,7 @@ class ContainerSide:
 
     async def _require_files(self) -> None:
         """Raises BackendError where the engine does not see what the test mounts; once for all tests of a run."""
-        await self._pulls.once(shared_files.IMAGE, self._provide_empty_image)
+        await self._pulls.once(shared_files.IMAGE, lambda: asyncio.to_thread(shared_files.provide_image, self._client))
         paths = self._compose.mounted()
         others = [str(path) for path in paths if not path.is_relative_to(self._watched.folder)]
         await self._pulls.once(f"files {self._watched.folder.parent} {others}", lambda: self._look_for(paths))
@@ -104,21 +104,18 @@ class ContainerSide:
         except OSError as error:
             raise BackendError(f"services cannot reach the runner: {error}") from error
 
-    async def _provide_empty_image(self) -> str:
-        await asyncio.to_thread(shared_files.provide_image, self._client)
-        return ""
-
-    async def _look_for(self, paths: Sequence[Path]) -> str:
+    async def _look_for(self, paths: Sequence[Path]) -> None:
         missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self._compose.project)
         if missing:
             raise BackendError(": ".join(shared_files.problem(missing)))
-        return ""
 
     async def _start_watching(self) -> None:
         from docker.errors import DockerException
 
         try:
-            self._containers = await asyncio.to_thread(self._find_containers)
+            label = {"label": f"{PROJECT_LABEL}={self._compose.project}"}
+            found = await asyncio.to_thread(self._client.containers.list, all=True, filters=label)
+            self._containers = {container.labels[SERVICE_LABEL]: container for container in found}
             self._use = ContainerUse(self._containers, self._application)
             self._require_health()
             await asyncio.to_thread(self._events.begin, self._client, self._compose.project)
@@ -127,10 +124,6 @@ class ContainerSide:
                     close(await asyncio.to_thread(self._start_container, name))
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
-
-    def _find_containers(self) -> dict[str, Any]:
-        found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self._compose.project}"})
-        return {c.labels[SERVICE_LABEL]: c for c in found}
 
     def _require_health(self) -> None:
         """Raises BackendError where a service waits for the health of another one that has no health check."""

@@ -109,12 +109,11 @@ class Compose:
         self._binds = {name: list(binds(each, self.folder)) for name, each in mounting.items()}
         self._require_own()
 
-    async def require_plugin(self) -> str:
-        """Raises BackendError where the docker command cannot compose; else nothing is to be said."""
-        code, _, _ = await self.run("version")
+    async def require_plugin(self) -> None:
+        """Raises BackendError where the docker command cannot compose."""
+        code, _ = await self.run("version")
         if code:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
-        return ""
 
     def _require_own(self) -> None:
         """Raises BackendError if a path of the application leads elsewhere than when the test was compiled."""
@@ -179,7 +178,7 @@ class Compose:
         sandbox = {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else ()
         return {service.image for service in self.plan.services}.union(sandbox)
 
-    async def _build(self, services: Mapping[str, Any]) -> str:
+    async def _build(self, services: Mapping[str, Any]) -> None:
         """Builds images in a project that all tests have in common, from folders without what is hidden."""
         self._say(f"building {', '.join(services)}")
         log = self.report / "logs" / "build.log"
@@ -193,11 +192,10 @@ class Compose:
             file = copies / "builds.compose.json"
             secrets = self._application.get("secrets") or {}
             _write(file, {"services": builds, "secrets": secrets})
-            code, _, problem = await self.run("build", files=[str(file)], log=log, project=_BUILD_PROJECT)
+            code, problem = await self.run("build", files=[str(file)], log=log, project=_BUILD_PROJECT)
         if code:
             where = f"{log.parent.name}/{log.name} of the test in the report"
             raise BackendError(f"the application's images cannot be built: {problem}; see {where}")
-        return ""
 
     async def create(self, subnets: Iterable[str]) -> None:
         """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError."""
@@ -211,7 +209,7 @@ class Compose:
             _write(own, document)
             files = [*(f"{layer}.compose.yml" for layer in _LAYERS), str(own)]
             for subnet in subnets:
-                code, _, problem = await self.run("create", "--no-build", "--pull", "never", files=files, subnet=subnet)
+                code, problem = await self.run("create", "--no-build", "--pull", "never", files=files, subnet=subnet)
                 if not code or _OVERLAP not in problem:
                     break
         if code:
@@ -240,8 +238,8 @@ class Compose:
 
     async def run(
         self, *words: str, files: Sequence[str] = (), subnet: str = "", log: Path | None = None, project: str = ""
-    ) -> tuple[int, str, str]:
-        """Exit code, standard output and the last line of standard error of a compose command."""
+    ) -> tuple[int, str]:
+        """Exit code and the last line of standard error of a compose command."""
         own = {"COMPOSE_PROGRESS": "plain", "COMPOSE_PROJECT_NAME": project or self.project, RUNNER_VARIABLE: "dodo"}
         environment = {**secret_variables.of_client(os.environ), **self._outside, **own}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_ENV_FILES"):
@@ -264,4 +262,4 @@ class Compose:
         if log is not None:
             atomic.write_bytes(log, out + err)
         errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
-        return process.returncode or 0, out.decode("utf-8", "replace"), errors[-1].strip() if errors else ""
+        return process.returncode or 0, errors[-1].strip() if errors else ""

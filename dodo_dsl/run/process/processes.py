@@ -3,6 +3,7 @@
 import asyncio
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation, leftovers
@@ -23,35 +24,31 @@ def may_enter() -> bool:
     return os.geteuid() == 0
 
 
+@dataclass
 class Processes:
-    """Each test's are in a sandbox; with ``has_application``, the application's services are among them."""
+    """Each test's are in a sandbox; with ``has_application``, the application's services are among them.
 
-    def __init__(
-        self,
-        isolation: str | None,
-        descriptors: tuple[int, ...],
-        loaded: Callable[[], ForkServer | None],
-        has_application: bool,
-    ) -> None:
-        """All but the last are as for the backends of a combination."""
-        self._isolation = isolation
-        self._descriptors = descriptors
-        self._loaded = loaded
-        self._has_application = has_application
-        self._fork_server: ForkServer | None = None
-        self.problem = ""
-        """Why tests with a network of their own cannot run here."""
-        self._is_apart = True
+    The others are as for the backends of a combination.
+    """
+
+    isolation: str | None
+    descriptors: tuple[int, ...]
+    loaded: Callable[[], ForkServer | None]
+    has_application: bool
+    problem: str = ""
+    """Why tests with a network of their own cannot run here."""
+    _fork_server: ForkServer | None = None
+    _is_apart: bool = True
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
         for left in leftovers.reap():
             note(f"removed what a killed run left: {left}")
-        forked = [plan for plan in plans if (self._isolation or plan.isolation) == "network"]
-        self._fork_server = serving(self._loaded(), own_modules(forked) if forked else None, self._descriptors)
-        if not self._has_application:
+        forked = [plan for plan in plans if (self.isolation or plan.isolation) == "network"]
+        self._fork_server = serving(self.loaded(), own_modules(forked) if forked else None, self.descriptors)
+        if not self.has_application:
             self.problem = "" if may_enter() else NOT_ROOT
             return
-        is_needed = self._isolation is None and forked
+        is_needed = self.isolation is None and forked
         if is_needed and (refusal := await host_isolation.isolation_refusal(self._fork_server)):
             remedy = f"{refusal.remedy}; " if refusal.remedy else ""
             way_out = f"{remedy}an application that you trust runs with --isolation host"
