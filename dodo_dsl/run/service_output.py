@@ -65,12 +65,18 @@ class ServiceOutput:
         self._write_times()
         return self._reader, self._log.fileno()
 
+    def add(self, line: str) -> None:
+        """Writes a line of the runner's into the log."""
+        self._write(line.encode("utf-8", "replace") + b"\n")
+
     def close(self) -> None:
         """Reads the rest that is there already, and stops."""
         while not self.done.is_set() and self._read():
             pass
         if not self.done.is_set():
             self._finish()
+        self._log.close()
+        self._write_times()
 
     def _read(self) -> bool:
         """Reads once; whether there was something to read."""
@@ -116,10 +122,11 @@ class ServiceOutput:
         if self._skipping:
             self._skipping = False
             return True
+        if not line.strip():
+            return True
         if self._on_line(line):
             return False
-        if line.strip():
-            self._tail.append(line)
+        self._tail.append(line)
         return True
 
     def _finish(self) -> None:
@@ -127,8 +134,6 @@ class ServiceOutput:
         os.close(self._reader)
         if self._rest and self._take(self._rest):
             self._write(self._rest)
-        self._log.close()
-        self._write_times()
         self.done.set()
 
     def _write_times(self) -> None:

@@ -1,13 +1,13 @@
 """What services tell the runner: JSON over the channel of a test, or lines of output where they do not reach it.
 
-Such a line begins with ``{"dodo": ``; everything else that services print is log.
+Such a line is an object with the key ``dodo``; everything else that services print is log.
 """
 
 import asyncio
 import contextlib
 import json
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import msgspec
@@ -17,7 +17,21 @@ from dodo_dsl.log_times import JUDGED_SUFFIX
 from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection, Listener
 from dodo_dsl.outcome import with_margin
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.protocol import Event, GivenVerdict, Late, Malformed, Message, Noted, VerdictEvent
+from dodo_dsl.run.protocol import (
+    Event,
+    Foreign,
+    GivenVerdict,
+    InputEnded,
+    Late,
+    Malformed,
+    MemoryTaken,
+    Message,
+    Noted,
+    Ready,
+    Stopped,
+    VerdictEvent,
+)
+from dodo_dsl.run.service_output import ServiceOutput
 
 JUDGED = b'{"dodo": "judged"'
 _MAX_RECORD = 16 << 20
@@ -28,20 +42,20 @@ _decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
 def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
     """The event that a message is, or None; only evaluators give verdicts."""
     text = message.strip()
-    if not text.startswith(b'{"dodo":') or text.startswith(JUDGED):
+    if not text.startswith(b"{") or b'"dodo"' not in text or text.startswith(JUDGED):
         return None
     is_verdict = b'"verdict"' in text
     if is_verdict and not is_evaluator:
         return None
     try:
         said = _decoder.decode(b'{"service":%s,%s' % (json.dumps(service).encode(), text[1:]))
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        return Malformed(service, str(error)) if is_verdict else None
-    match said:
-        case GivenVerdict():
+        if isinstance(said, GivenVerdict):
             checks = tuple(with_margin(msgspec.to_builtins(check)) for check in said.checks)
             is_good = said.outcome == "passed"
             return VerdictEvent(service, is_good, said.reason, checks, said.evidence, said.silent)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
+        return Malformed(service, str(error)) if is_verdict else None
+    match said:
         case Noted(text=note):
             return Noted(f"service '{service}': {note}")
         case Late() if said.late > said.updates:
@@ -49,12 +63,31 @@ def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
     return said
 
 
-class Reports:
-    """Takes what a test's services say; ``put`` gets each event, and what evaluators judged goes next to the logs."""
+def _words(event: Event) -> str:
+    """What the log of a service has of what it said; empty for what comes again and again."""
+    match event:
+        case Ready():
+            return "ready"
+        case InputEnded():
+            return "end-of-input"
+        case VerdictEvent():
+            return f"verdict: {'passed' if event.passed else 'failed'}: {event.reason}"
+        case Stopped() | Foreign():
+            return event.reason
+        case Noted() | MemoryTaken():
+            return event.text
+    return ""
 
-    def __init__(self, plan: Plan, logs: Path, put: Callable[[Event], None]) -> None:
+
+class Reports:
+    """Takes what a test's services say, also into their logs; what evaluators judged goes into files next to these."""
+
+    def __init__(
+        self, plan: Plan, logs: Path, put: Callable[[Event], None], outputs: Mapping[str, ServiceOutput]
+    ) -> None:
+        """``put`` gets each event."""
         self._services = {service.name: service for service in plan.services}
-        self._logs, self._put = logs, put
+        self._logs, self._put, self._outputs = logs, put, outputs
         self._recorded = Counter[str]()
         self._listener: Listener | None = None
         self._open: dict[str, tuple[Connection, asyncio.Event]] = {}
@@ -96,9 +129,13 @@ class Reports:
         if is_evaluator and message.startswith(JUDGED):
             self._record(name, message)
             return True
-        if (event := read(name, is_evaluator, message)) is not None:
-            self._put(event)
-        return event is not None
+        event = read(name, is_evaluator, message)
+        if event is None:
+            return False
+        self._put(event)
+        if (words := _words(event)) and name in self._outputs:
+            self._outputs[name].add(words)
+        return True
 
     def _record(self, name: str, line: bytes) -> None:
         self._recorded[name] += len(line)

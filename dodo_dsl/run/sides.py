@@ -33,8 +33,8 @@ class WatchedServices:
         self.plan, self.folder, self.report = plan, folder, report
         self.events: asyncio.Queue[Event] = asyncio.Queue()
         self.lines = PrintedLines(plan, folder, self.note)
-        self.reports = Reports(plan, report / "logs", self.tell)
         self.outputs: dict[str, ServiceOutput] = {}
+        self.reports = Reports(plan, report / "logs", self.tell, self.outputs)
         self.conditions = Conditions(plan.application.services)
         self.may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
         self.turns: set[asyncio.Task[None]] = set()
@@ -97,6 +97,8 @@ class WatchedServices:
                 self.lines.take(name, line)
             return layer != APPLICATION and self.reports.take(name, line)
 
+        if name in self.outputs:  # it is started once more
+            self.outputs[name].close()
         log = self.report / "logs" / f"{layer}.{name}.log"
         self.outputs[name] = ServiceOutput(log, take or on_line, **kind)
         return self.outputs[name]
@@ -111,10 +113,11 @@ class WatchedServices:
     def tail(self, service: str) -> list[str]:
         return self.outputs[service].tail() if service in self.outputs else []
 
-    def close(self, names: Iterable[str]) -> None:
-        """Reads what is there of the output of services, and no more."""
-        for name in names:
-            self.outputs[name].close()
+    def close(self) -> None:
+        """Reads what is there of what services said and wrote, and no more."""
+        self.reports.close()
+        for output in self.outputs.values():
+            output.close()
 
 
 class Send(Protocol):
@@ -192,7 +195,7 @@ class Sides:
             turn.cancel()
         await asyncio.gather(*self._watched.turns, return_exceptions=True)
         kept = await asyncio.gather(*(side.close(keep) for side in self._both))
-        self._watched.reports.close()
+        self._watched.close()
         return [line for lines in kept for line in lines]
 
     def unmatched(self) -> tuple[Unmatched, ...]:

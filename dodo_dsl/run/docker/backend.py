@@ -293,7 +293,6 @@ class ContainerSide:
         self._events.close()
         if self._relay is not None:
             self._relay.close()
-        self._watched.close(self._watched.outputs.keys() & self._containers.keys())
         return kept
 
     def _take_down(self) -> None:

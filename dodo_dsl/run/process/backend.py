@@ -261,7 +261,6 @@ class ProcessSide:
         if keep and (pid := self._sandbox.pid):
             return self._kept(pid)
         await self._sandbox.close()
-        self._watched.close(self._starts)
         await asyncio.gather(*self._exits, return_exceptions=True)
         log = self._report / LOG
         if log.is_file() and log.stat().st_size == 0:
@@ -269,9 +268,10 @@ class ProcessSide:
         return []
 
     def _kept(self, pid: int) -> list[str]:
-        own = [self._watched.outputs[name] for name in self._starts]
-        outputs = [output.hand_over() for output in own if not output.done.is_set()]
-        self._sandbox.keep((*(reader for reader, _ in outputs), *(log for _, log in outputs)))
+        running = [name for name in self._starts if not self._watched.outputs[name].done.is_set()]
+        outputs = [self._watched.outputs.pop(name) for name in running]
+        handed = [output.hand_over() for output in outputs]
+        self._sandbox.keep((*(reader for reader, _ in handed), *(log for _, log in handed)))
         look = f"ps -f --ppid {pid}"
         if not self._is_on_host:
             user = "" if os.getuid() == 0 else "-U --preserve-credentials "
