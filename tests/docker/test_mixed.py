@@ -12,26 +12,13 @@ import pytest
 
 from tests.docker.compose import Crate, changed
 from tests.docker.test_started_anywhere import WITHOUT_COLON
-from tests.faults import Book
 from tests.run.desk import ROOT
-from tests.run.faults import Fault, as_told, faults_on
+from tests.run.faults import MARKS
 from tests.run.helpers import AFTER_START, PASS, READY, WAIT
 
 TEST = "sil-closed-straight"
 
-pytestmark = [
-    pytest.mark.engine,
-    pytest.mark.usefixtures("images"),
-    pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container"),
-]
-
-
-@pytest.mark.parametrize("faults", faults_on("mixed"))
-def test_faults_beside_processes_of_dodo(faults: dict[str, Fault], crate: Crate, book: Book) -> None:
-    """Those that the other backends show, too, are for ``make proof``."""
-    jobs = [crate.job(slug, f.judge, f.application, f.environment, **f.app) for slug, f in faults.items()]
-    as_told(faults, crate.run(*jobs, backend="mixed"), "mixed", book)
-    assert "memory video0.argb" in crate.log("neighbour")
+pytestmark = [*MARKS["mixed"], pytest.mark.usefixtures("images")]
 
 
 TAKES = """

@@ -65,6 +65,7 @@ def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] 
         await asyncio.sleep(0)  # for what is called when they are done
         events = [await watched.events.get() for _ in range(watched.events.qsize())]
         await side.close(keep=True)
+        watched.close()
         return waits, events
 
     return asyncio.run(asyncio.wait_for(started(), 20.0))

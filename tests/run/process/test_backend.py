@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run import engine, start_order
+from dodo_dsl.run import engine
 from tests.run.desk import processes_with
 from tests.run.helpers import AFTER_START, BEGUN, PASS, READY, STARTED, WAIT, Bench
 
@@ -73,49 +73,6 @@ def test_what_processes_do_decides(host: Bench) -> None:
         assert (outcomes[slug].outcome, outcomes[slug].reason[: len(reason)]) == (expected, reason)
     assert outcomes["application-crashes"].last_lines == ("cone lost",)
     assert host.log(plans[1], "application.app") == "cone lost\n"
-
-
-IN_TURN = {
-    "in-turn": ("pass", "passed", "it drove"),
-    "not-in-turn": (
-        "raise SystemExit(3)",
-        "failed",
-        "application service 'init' ended with exit code 3 during set-up, before the test was decided; 'app' waits "
-        "for it to end with exit code 0",
-    ),
-    "optional": ("raise SystemExit(3)", "passed", "it drove"),
-    "never": (
-        WAIT,
-        "error",
-        "service 'app' could not be started: it waits for 'init' to end with exit code 0 (depends_on), and it did not "
-        "within 2 s",
-    ),
-}
-
-
-def test_services_start_when_those_for_which_they_wait_have_ended(host: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(start_order, "LONGEST_S", 2.0)
-    plans = []
-    for slug, (last, _, _) in IN_TURN.items():
-        mark = host.folder / f"{slug}-mark"
-        app = f"assert os.path.exists({str(mark)!r}), 'too early'\n" + STARTED + WAIT
-        plan = host.plan(application=app, judge=READY + BEGUN + PASS, slug=slug)
-        script = host.script(f"{slug}-init", f"import time; time.sleep(0.5); open({str(mark)!r}, 'w').close(); {last}")
-        (service,) = plan.application.services
-        services = (
-            replace(
-                service,
-                after={"other": "service_healthy", "init": "service_completed_successfully"},
-                optional=("init",) if slug == "optional" else (),
-            ),
-            ApplicationService("init", script),
-            ApplicationService("other", host.script(f"{slug}-other", WAIT)),
-        )
-        plans.append(replace(plan, application=replace(plan.application, services=services)))
-    outcomes = {outcome.slug: outcome for outcome in host.run(*plans)}
-    assert {slug: (o.outcome, o.reason) for slug, o in outcomes.items()} == {k: v[1:] for k, v in IN_TURN.items()}
-    told = "it waits for 'init' to end with exit code 0 (depends_on, required: false), which ended with exit code 3"
-    assert f"service 'app' starts all the same: {told}" in outcomes["optional"].notes
 
 
 GONE = """#!/bin/sh
