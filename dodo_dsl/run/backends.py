@@ -87,56 +87,41 @@ class CombinedBackends:
     roots: Sequence[Path] = ()
     loaded: Callable[[], ForkServer | None] = lambda: None
     session: RigSession | None = None
-    _processes: Processes | None = None
-    _containers: "Containers | None" = None
+    _kinds: "list[Processes | Containers]" = field(default_factory=list)
     _alone: asyncio.Lock = field(default_factory=asyncio.Lock)
     """A queue without time limit for tests of this run that need the machine for themselves."""
 
     def __post_init__(self) -> None:
         self._own, self._application = COMBINATIONS[self.name]
+        is_whole = self._own == self._application
         if self._own == PROCESSES:
-            has_application = self._application == PROCESSES
-            self._processes = Processes(self.isolation, self.descriptors, self.loaded, has_application)
+            self._kinds.append(Processes(self.isolation, self.descriptors, self.loaded, is_whole))
         if self._application == CONTAINERS:
             from dodo_dsl.run.docker.containers import Containers
 
-            self._containers = Containers(self.subnets, has_own=self._own == CONTAINERS)
+            self._kinds.append(Containers(self.subnets, is_whole))
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        if self._containers is not None:
-            await self._containers.prepare(plans, note)
-        if self._processes is not None:
-            await self._processes.prepare(plans, note)
+        for kind in self._kinds:
+            await kind.prepare(plans, note)
 
     def close(self) -> None:
-        if self._processes is not None:
-            self._processes.close()
-
-    def _refuse(self, plan: Plan, isolation: str) -> None:
-        """Raises BackendError for a test that cannot run here."""
-        refuse_unattended(plan)
-        problem = self._containers.problem(plan) if self._containers is not None else ""
-        if self._processes is not None and isolation == "network":
-            problem = problem or self._processes.problem
-        if problem:
-            raise BackendError(problem)
+        for kind in self._kinds:
+            kind.close()
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
         plan = self.session.at_home(job.plan) if self.session else job.plan
         isolation = "host" if plan.is_real else self.isolation or plan.isolation
-        self._refuse(plan, isolation)
+        refuse_unattended(plan)
+        for kind in self._kinds:
+            if problem := kind.problem(plan, isolation):
+                raise BackendError(problem)
         watched = WatchedServices(plan, job.folder, job.report)
         async with contextlib.AsyncExitStack() as stack:
             channel = stack.enter_context(meeting_place(job.work, keep))
-            if self._own == CONTAINERS:
-                Path(channel).chmod(0o777)  # for users of images; the folder around it is closed
             slot = await stack.enter_async_context(self._slot(plan, isolation, channel, say, keep))
-            sides: list[Side] = []
-            if self._processes is not None:
-                sides.append(self._processes.side(watched, slot, isolation))
-            if self._containers is not None:
-                sides.append(stack.enter_context(self._containers.side(watched, say, channel)))
+            sides: list[Side] = [stack.enter_context(kind.side(watched, slot, isolation, say)) for kind in self._kinds]
             yield Sides(self.name, slot.cid, isolation == "host", watched, sides[0], sides[-1])
 
     @contextlib.asynccontextmanager

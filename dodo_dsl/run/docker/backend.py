@@ -79,7 +79,7 @@ class ContainerSide:
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets)
         await self._start_watching()
-        if self._compose.has_own:
+        if self._compose.is_whole:
             return 0
         return await asyncio.to_thread(beside_processes.entered, self._containers, self._application)
 
@@ -93,7 +93,7 @@ class ContainerSide:
     async def _open_channel(self) -> None:
         """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
         folder = Path(self._compose.channel)
-        if not self._compose.has_own:  # DoDo's services are no containers
+        if not self._compose.is_whole:  # DoDo's services are no containers
             return
         try:
             if not self._is_on_host:

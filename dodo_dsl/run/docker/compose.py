@@ -67,7 +67,7 @@ _LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
 class Compose:
     """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``.
 
-    With ``has_own``, DoDo's services are containers of it; without, they are processes beside it.
+    If it ``is_whole``, DoDo's services are containers of it, else processes beside it.
     """
 
     def __init__(
@@ -78,10 +78,10 @@ class Compose:
         project: str,
         say: Say,
         channel: str = "",
-        has_own: bool = True,
+        is_whole: bool = True,
     ) -> None:
         """``channel`` is the folder where services and runner meet, empty if that is a volume."""
-        self.has_own = has_own
+        self.is_whole = is_whole
         self.plan = plan
         self.folder = folder
         self.report = report
@@ -146,7 +146,7 @@ class Compose:
         """What containers mount of this machine; what is compiled stands as one file."""
         sources = {Path(bind.source) for each in self._binds.values() for bind in each}
         reads_files = self.plan.messages or any(f.kind == "path" for s in self.plan.services for f in s.flags)
-        own = [self.folder / PLAN_FILE] if self.has_own and reads_files else []
+        own = [self.folder / PLAN_FILE] if self.is_whole and reads_files else []
         return [*own, *sorted(path for path in sources if path.exists())]
 
     def has_healthcheck(self, name: str) -> bool:
@@ -173,7 +173,7 @@ class Compose:
             await pulls.once(key, lambda: self._build(built))
 
     def _own_images(self) -> set[str]:
-        if not self.has_own:
+        if not self.is_whole:
             return set()
         sandbox = {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else ()
         return {service.image for service in self.plan.services}.union(sandbox)
@@ -222,7 +222,7 @@ class Compose:
         if any(path.is_file() for path in hidden):
             empty.touch()
         meets = {"volumes": [{"type": "bind", "source": escaped(self.channel), "target": CHANNEL}]}
-        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel and self.has_own}
+        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel and self.is_whole}
         for name, mounted in self._binds.items():
             lie_over = masks(mounted, hidden, empty) + absent(mounted, self._paths, always=name == FILES)
             service = {key: value for key, value in self.services.get(name, {}).items() if key != "build"}
@@ -231,7 +231,7 @@ class Compose:
             if name in self.services:
                 services[name]["image"] = escaped(service["image"])
         made = {**self._application, "services": services}
-        if self.has_own:
+        if self.is_whole:
             return made
         needed = [*needed_paths(self.plan, self.folder, self.report), Path(self.channel)]
         return without_own(made, self.plan, needed)

@@ -5,6 +5,7 @@ import contextlib
 import ipaddress
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 from dodo_dsl.plan.model import Plan
@@ -14,19 +15,20 @@ from dodo_dsl.run.docker.backend import ContainerSide
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.pulls import Pulls
+from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError, Say
-from dodo_dsl.run.sides import WatchedServices
+from dodo_dsl.run.sides import Side, WatchedServices
 from dodo_dsl.spec.rig import CAMERA_SOURCE, RPICAM
 
 _FLAG = CAMERA_SOURCE.rpartition(".")[2]
 
 
 class Containers:
-    """Each test's are a compose project; with ``has_own``, DoDo's services are among them."""
+    """Each test's are a compose project; if it ``is_whole``, DoDo's services are among them."""
 
-    def __init__(self, subnets: Sequence[str], has_own: bool) -> None:
+    def __init__(self, subnets: Sequence[str], is_whole: bool) -> None:
         self._subnets = subnets
-        self._has_own = has_own
+        self._is_whole = is_whole
         self._client: Any = None
         self._pulls: Pulls | None = None
         self._problem = ""
@@ -44,22 +46,24 @@ class Containers:
         for left in reaped.left:
             note(f"what a killed run left cannot be removed: {left}")
 
-    def problem(self, plan: Plan) -> str:
+    def close(self) -> None:
+        """Does nothing: only the tests' own containers run, and each test removes them."""
+
+    def problem(self, plan: Plan, _isolation: str) -> str:
         """Why a test cannot run here, in a sentence; empty if it can."""
-        return (unfit_camera(plan) if self._has_own else "") or self._problem
+        return (unfit_camera(plan) if self._is_whole else "") or self._problem
 
     @contextlib.contextmanager
-    def side(self, watched: WatchedServices, say: Say, channel: str) -> Iterator[ContainerSide]:
-        """One with its own project, and the project's lease.
-
-        ``channel`` is the folder where services and runner meet, if the engine sees it.
-        """
+    def side(self, watched: WatchedServices, slot: Slot, _isolation: str, say: Say) -> Iterator[Side]:
+        """One with its own project, and the project's lease."""
+        if self._is_whole:
+            Path(slot.channel).chmod(0o777)  # for users of images; the folder around it is closed
         assert self._pulls is not None, "there is no problem"
         plan = watched.plan
         project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
         lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"
-        compose = Compose(plan, watched.folder, watched.report, project, say, channel, self._has_own)
+        compose = Compose(plan, watched.folder, watched.report, project, say, slot.channel, self._is_whole)
         subnets = other_subnets(plan.subnet, self._subnets)
         side = ContainerSide(watched, compose, self._client, self._pulls, subnets, say)
         try:

@@ -101,8 +101,9 @@ class ProcessSide:
     async def _exited(self, exited: str, code: int, used: int, failed: bool) -> None:
         await self._watched.last_output(exited, _OUTPUT_S)
         if exited == TIME:
-            self._decide_time(False)
-            if self._has_time and code not in (0, application_time.PAGE_DESTROYED):  # which the clock says
+            if self._time and not self._time.done():
+                self._time.set_result(False)
+            elif code not in (0, application_time.PAGE_DESTROYED):  # which the clock says
                 self._watched.tell(Lost(f"what gives the application the test's time {how_it_ended(code)}"))
             return
         if failed:
@@ -159,13 +160,9 @@ class ProcessSide:
     def _has_time(self) -> bool:
         return self._time is not None and self._time.done() and self._time.result()
 
-    def _decide_time(self, has_time: bool) -> None:
-        if self._time is not None and not self._time.done():
-            self._time.set_result(has_time)
-
     def _take_of_time(self, line: bytes) -> bool:
-        if is_ready := line == TIME_READY:
-            self._decide_time(True)
+        if is_ready := line == TIME_READY and self._time is not None and not self._time.done():
+            self._time.set_result(True)
         return is_ready
 
     async def connect(self) -> Send:

@@ -49,9 +49,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "generated" / "t"
 
 
-def read(made: Plan, folder: Path, has_own: bool = True) -> Compose:
+def read(made: Plan, folder: Path, is_whole: bool = True) -> Compose:
     report = folder.parents[1] / "dodo-report" / "t"
-    test = Compose(made, folder, report, "project", lambda _: None, has_own=has_own)
+    test = Compose(made, folder, report, "project", lambda _: None, is_whole=is_whole)
     test.read()
     return test
 
@@ -186,7 +186,7 @@ def test_nothing_waits_for_services_that_are_processes(folder: Path) -> None:
     on = {"condition": "service_started"}
     services = {"app": {"image": "a", "depends_on": {"track": on, "sandbox": on}}}
     made = planned(services, copies={"files-0": "../../gone"}, volumes={"files-0": {}})
-    found = read(made, folder, has_own=False).document()["services"]
+    found = read(made, folder, is_whole=False).document()["services"]
     assert [name for name, service in found.items() if "profiles" not in service] == ["sandbox", "app", "dodo-files"]
     assert "depends_on" not in found["app"]
     assert {"type": "tmpfs", "target": "/from/files-0", "read_only": True} in found["dodo-files"]["volumes"]
