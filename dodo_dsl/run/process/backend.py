@@ -71,7 +71,6 @@ class ProcessSide:
         self._sandbox = SandboxClient(self._take, lambda why: watched.tell(Lost(why)), fork_server)
 
     async def open(self, entered: int = 0) -> int:
-        self._watched.reports.listen(Path(self._slot.channel))
         needed = [*needed_paths(self._plan, self._folder, self._report), Path(self._slot.channel)]
         if self._plan.clock == VIRTUAL:
             time = await asyncio.to_thread(application_time.built)
@@ -80,6 +79,7 @@ class ProcessSide:
         namespaces = None if self._is_on_host else Entered.with_own(entered, *needed)
         with atomic.appended(self._report / LOG) as log:
             await self._sandbox.open(self._slot, log.fileno(), namespaces)
+        self._watched.reports.listen(Path(self._slot.channel))
         return 0
 
     def _take(self, message: dict[str, Any]) -> None:
