@@ -10,6 +10,7 @@ import pytest
 from dodo_dsl.run.process.backend import ProcessSide
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
+from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.sides import WatchedServices
 from tests.run.scripted import plan
 
@@ -23,7 +24,7 @@ def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert not [path for path in entered.shown if path.name == ".."]
 
 
-def test_a_sandbox_shows_what_its_test_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     """It may lie below ``/tmp``, which is another one there; what only the application names is not shown."""
     shown: list[Entered | None] = []
 
@@ -31,6 +32,7 @@ def test_a_sandbox_shows_what_its_test_needs(tmp_path: Path, monkeypatch: pytest
         shown.append(entered)
 
     monkeypatch.setattr(SandboxClient, "open", opened)
+    monkeypatch.setattr(Reports, "listen", lambda *_: None)
     folder = Path("/tmp/dodo-a/repository/generated/test")
     one = plan(import_paths=("../../../../dodo-b",))
     (app,) = one.application.services
@@ -39,14 +41,9 @@ def test_a_sandbox_shows_what_its_test_needs(tmp_path: Path, monkeypatch: pytest
     one = replace(one, application=replace(one.application, services=(app,)))
     monkeypatch.setenv("SSH_AUTH_SOCK", "/tmp/dodo-agent/socket")
     monkeypatch.setenv("LD_LIBRARY_PATH", f"/usr/lib{os.pathsep}/dev/shm/dodo-d/lib")
-
-    async def entered_by(container: int) -> None:
-        watched = WatchedServices(one, folder, Path("/tmp/dodo-c/report"))
-        await ProcessSide(watched, Slot(130, channel=str(tmp_path)), "network").open(container)
-        watched.close()
-
     for container in (0, 12):
-        asyncio.run(entered_by(container))
+        watched = WatchedServices(one, folder, Path("/tmp/dodo-c/report"))
+        asyncio.run(ProcessSide(watched, Slot(130), "network").open(container))
         entered = shown.pop()
         assert entered is not None and entered.process == container
         names = {path.name for path in entered.shown}
