@@ -93,7 +93,7 @@ class ContainerSide:
     async def _open_channel(self) -> None:
         """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
         folder = Path(self._compose.channel)
-        if not self._compose.is_whole:  # DoDo's services are no containers
+        if not self._compose.is_whole:  # DoDo's services are processes
             return
         try:
             if not self._is_on_host:
@@ -267,7 +267,7 @@ class ContainerSide:
         return await asyncio.to_thread(self._use.listeners, self._application, self._plan.cid)
 
     async def beginning(self) -> Collection[int]:
-        """None are told: DoDo's services do not see them. On the network of a host that is not this machine it raises.
+        """None, as DoDo's services do not see them; raises on the network of a host that is not this machine.
 
         The engine shows a service that has just ended as a process that is not here, so it is asked again.
         """
