@@ -112,6 +112,14 @@ FAULTS = {
         {"process": SHORT, "docker": LONG},
         judge=READY + BEGUN + PASS + FAIL,
     ),
+    "own-verdict": Fault(
+        "",
+        "passed",
+        "it drove",
+        {"process": SHORT, "docker": LONG, "mixed": LONG},
+        judge=DRIVES,
+        application=FAIL + WAIT,
+    ),
     "malformed": Fault(
         "An evaluator gives a malformed verdict",
         "error",
@@ -146,7 +154,7 @@ FAULTS = {
         "",
         "failed",
         "application service 'app' ended with exit code 7",
-        {"docker": LONG},
+        {"process": SHORT, "docker": LONG},
         application="sys.exit(7)\n",
     ),
     "no-program": Fault(

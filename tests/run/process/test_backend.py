@@ -31,26 +31,6 @@ def bench(request: pytest.FixtureRequest, host: Bench) -> Bench:
     return host
 
 
-DECISIONS = {
-    "passes": ({}, "passed", "it drove"),
-    "application-crashes": (
-        {"application": "print('cone lost'); raise SystemExit(7)", "judge": READY + WAIT},
-        "failed",
-        "application service 'app' ended with exit code 7 after",
-    ),
-    "service-is-killed": (
-        {"environment": READY + "os.kill(os.getpid(), 9)", "judge": READY + WAIT},
-        "error",
-        "service 'camera' of layer environment was killed by SIGKILL",
-    ),
-    "application-says-that-it-passed": (
-        {"application": PASS + WAIT, "judge": READY + WAIT, "timeout_s": 0.5},
-        "error",
-        "evaluator 'judge' gave no verdict within the timeout of 0.5 s",
-    ),
-}
-
-
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="this kernel counts no waits")
 def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
     """The application's part is that of a process which it has started, and which has ended before the test does."""
@@ -63,16 +43,6 @@ def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
     assert (outcome.outcome, load.cores) == ("passed", len(os.sched_getaffinity(0)))
     assert (load.application.longest, load.services.longest in ("camera", "judge")) == ("app", True)
     assert load.application.ran_s > 0.2 > load.services.ran_s > 0.0
-
-
-def test_what_processes_do_decides(host: Bench) -> None:
-    """Exits, signals and lines of output reach the engine; all tests at once."""
-    plans = [host.plan(**parts, slug=slug) for slug, (parts, _, _) in DECISIONS.items()]
-    outcomes = {outcome.slug: outcome for outcome in host.run(*plans)}
-    for slug, (_, expected, reason) in DECISIONS.items():
-        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(reason)]) == (expected, reason)
-    assert outcomes["application-crashes"].last_lines == ("cone lost",)
-    assert host.log(plans[1], "application.app") == "cone lost\n"
 
 
 GONE = """#!/bin/sh
