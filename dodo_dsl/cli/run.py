@@ -30,7 +30,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import Drawings, next_report
 from dodo_dsl.report.repetitions import Repeated, repeated
 from dodo_dsl.report.results import Circumstances
-from dodo_dsl.run.backends import Backends, CombinedBackends, Job
+from dodo_dsl.run.backends import COMBINATIONS, Backends, CombinedBackends, Job
 from dodo_dsl.run.process.processes import may_enter
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
@@ -127,7 +127,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--backend",
-        choices=("process", "docker", "mixed"),
+        choices=tuple(COMBINATIONS),
         help="where services run; mixed: the application in containers, DoDo's own as processes (default: process, if "
         "the application allows it; else mixed on a rig, or where DoDo's images are missing; else docker)",
     )
