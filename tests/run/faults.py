@@ -134,6 +134,7 @@ FAULTS = {
         {"process": SHORT, "docker": LONG},
         judge=READY + BEGUN + "time.sleep(2)\n" + PASS,
         application=LINES_A_SECOND,
+        app={"tty": True},
     ),
     "long-line": Fault(
         "The application logs a line of 5 MB",

@@ -229,7 +229,8 @@ class ContainerSide:
         """Starts a service; where it waited for others, its own health is awaited, too."""
         from docker.errors import DockerException
 
-        output = self._watched.output(layer, name, is_cooked=self._watched.prints(name))
+        has_terminal = bool(self._containers[name].attrs.get("Config", {}).get("Tty"))
+        output = self._watched.output(layer, name, is_cooked=has_terminal)
         try:
             printed = await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
@@ -237,7 +238,7 @@ class ContainerSide:
             self._watched.not_started(name, engine_error(error))
             return
         self._watched.conditions.started(name)
-        arguments = printed, self._watched.prints(name), output.writer
+        arguments = printed, has_terminal, output.writer
         threading.Thread(target=copy_into, args=arguments, daemon=True).start()
         if not self._watched.conditions.of(name):
             return
