@@ -15,11 +15,11 @@ from dodo_dsl import atomic
 from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
+from dodo_dsl.plan.model import LAYERS
 from dodo_dsl.run import application_time
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
 from dodo_dsl.run.machine_load.service_use import Snapshot
-from dodo_dsl.run.outcomes import how_it_ended
 from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
 from dodo_dsl.run.process.environment import own_environment
@@ -32,11 +32,10 @@ from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
 from dodo_dsl.spec.model import VIRTUAL
 
 LOG = "sandbox.log"
-TIME_READY = b'{"dodo": "ready"}'
+_TIME_READY = b'{"dodo": "ready"}'
 """What gives the application the test's time prints when it does."""
 USE_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
-TIME_PATIENCE_S = 10.0
 _OUTPUT_S = 1.0
 _NO_PROGRAM = "bwrap: execvp "
 """How bubblewrap says that it cannot start the application's program."""
@@ -52,19 +51,22 @@ class ProcessSide:
         isolation: str,
         fork_server: ForkServer | None = None,
         is_apart: bool = True,
+        is_whole: bool = True,
     ) -> None:
-        """``is_apart`` means that on the host, too, the application gets its own process namespace."""
+        """``is_apart`` means that on the host, too, the application gets its own process namespace.
+
+        If it ``is_whole``, the application's services run here.
+        """
         self._watched = watched
         self._plan, self._folder, self._report = watched.plan, watched.folder, watched.report
         self._slot = slot
         self._is_on_host, self._is_apart = isolation == "host", is_apart
+        self._gives_time, self._has_time = is_whole and self._plan.clock == VIRTUAL, False
         self._commands = Commands(self._plan, self._folder, self._report, slot)
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._starts: dict[str, list[Command]] = {}
         """The commands by which each service was started, several where a mount went meanwhile."""
-        self._time: asyncio.Future[bool] | None = None
-        """Whether the application has the test's time: what gives it is ready, or has ended before."""
         self._exits: list[asyncio.Future[None]] = []
         self._asked: dict[str, asyncio.Future[Any]] = {}
         """What the sandbox is to answer, by what it is asked to do."""
@@ -72,10 +74,11 @@ class ProcessSide:
 
     async def open(self, entered: int = 0) -> int:
         needed = [*needed_paths(self._plan, self._folder, self._report), Path(self._slot.channel)]
-        if self._plan.clock == VIRTUAL:
+        if self._gives_time:
             time = await asyncio.to_thread(application_time.built)
             self._commands = replace(self._commands, time=time)
             needed += [time.library.parent, time.agent.parent]
+            self._require_time()
         namespaces = None if self._is_on_host else Entered.with_own(entered, *needed)
         with atomic.appended(self._report / LOG) as log:
             await self._sandbox.open(self._slot, log.fileno(), namespaces)
@@ -100,11 +103,7 @@ class ProcessSide:
 
     async def _exited(self, exited: str, code: int, used: int, failed: bool) -> None:
         await self._watched.last_output(exited, _OUTPUT_S)
-        if exited == TIME:
-            if self._time and not self._time.done():
-                self._time.set_result(False)
-            elif code not in (0, application_time.PAGE_DESTROYED):  # which the clock says
-                self._watched.tell(Lost(f"what gives the application the test's time {how_it_ended(code)}"))
+        if self._has_time and exited == TIME and code in (0, application_time.PAGE_DESTROYED):  # which the clock says
             return
         if failed:
             said = " ".join(self._watched.tail(exited)[-1:])
@@ -124,9 +123,9 @@ class ProcessSide:
         self._watched.ended(exited, code, out_of_memory=used > 0)
 
     async def start(self, layer: str) -> dict[str, bool]:
-        if layer == APPLICATION and self._plan.clock == VIRTUAL:
-            await self._start_time()
         commands = {}
+        if self._gives_time and layer == LAYERS[0]:
+            commands[TIME] = self._commands.of_time(self._is_on_host)
         for service in self._watched.of(layer):
             try:
                 commands[service.name] = self._commands.of(service)
@@ -138,8 +137,8 @@ class ProcessSide:
 
         return await self._watched.start(commands, start, () if layer == APPLICATION else commands)
 
-    async def _start_time(self) -> None:
-        """Starts what gives the application the test's time; raises BackendError."""
+    def _require_time(self) -> None:
+        """Raises BackendError where the application cannot be given the test's time."""
         if not self._is_confined:
             raise BackendError(
                 "clock: virtual needs process namespaces, which this machine refuses: dodo doctor says why"
@@ -149,21 +148,13 @@ class ProcessSide:
                 command = self._commands.of(service)
                 if why := application_time.refusal(service.name, command.argv[0], command.environment, command.folder):
                     raise BackendError(why)
-        self._time = asyncio.get_running_loop().create_future()
-        self._start(self._commands.of_time(self._is_on_host))
-        await asyncio.wait([self._time], timeout=TIME_PATIENCE_S)
-        if not self._has_time:
-            said = " ".join(self._watched.tail(TIME)[-1:]) or f"{TIME} does not start"
-            raise BackendError(f"the application cannot be given the test's time: {said}")
-
-    @property
-    def _has_time(self) -> bool:
-        return self._time is not None and self._time.done() and self._time.result()
 
     def _take_of_time(self, line: bytes) -> bool:
-        if is_ready := line == TIME_READY and self._time is not None and not self._time.done():
-            self._time.set_result(True)
-        return is_ready
+        if line != _TIME_READY:
+            return False
+        self._has_time = True
+        self._watched.tell(Ready(TIME))
+        return True
 
     async def connect(self) -> Send:
         if not await self._ask("relay", cid=self._slot.cid, folder=self._slot.channel):
@@ -212,7 +203,7 @@ class ProcessSide:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
         confined = confinement(command.folder, limits, hidden)
         confined = replace(confined, channel=self._slot.channel if self._is_on_host else "")
-        if self._has_time:
+        if self._gives_time:
             confined = replace(confined, time=self._commands.time_folder)
         return asdict(replace(confined, masked=command.masked))
 

@@ -70,4 +70,4 @@ class Processes:
     @contextlib.contextmanager
     def side(self, watched: WatchedServices, slot: Slot, isolation: str, _say: Say) -> Iterator[Side]:
         fork_server = self._fork_server if isolation == "network" else None
-        yield ProcessSide(watched, slot, isolation, fork_server, self._is_apart)
+        yield ProcessSide(watched, slot, isolation, fork_server, self._is_apart, self.is_whole)
