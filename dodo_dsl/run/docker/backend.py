@@ -21,7 +21,7 @@ from dodo_dsl.run.docker.events import EventWatch
 from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Snapshot
-from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Say, Unstartable
+from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Unstartable
 from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
 from dodo_dsl.run.start_order import LONGEST_S
 from dodo_dsl.spec.model import VIRTUAL
@@ -41,7 +41,7 @@ class ContainerSide:
     """One test's compose project; ``subnets`` are tried in turn until the engine accepts one."""
 
     def __init__(
-        self, watched: WatchedServices, compose: Compose, client: Any, pulls: Pulls, subnets: Iterable[str], say: Say
+        self, watched: WatchedServices, compose: Compose, client: Any, pulls: Pulls, subnets: Iterable[str]
     ) -> None:
         self._watched = watched
         self._plan = watched.plan
@@ -49,7 +49,6 @@ class ContainerSide:
         self._client = client
         self._pulls = pulls
         self._subnets = subnets
-        self._say = say
         self._application = tuple(service.name for service in self._plan.application.services)
         self._containers: dict[str, Any] = {}
         self._use = ContainerUse({})
@@ -302,7 +301,7 @@ class ContainerSide:
 
     def _note(self, text: str) -> None:
         """Reports a sentence at once, and with the outcome; may be called from any thread."""
-        self._say(text)
+        self._compose.say(text)
         self._events.call_in_loop(self._watched.note, text)
 
     def _kept(self) -> list[str]:

@@ -12,6 +12,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -64,35 +65,28 @@ _YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already
 _LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
 
 
+@dataclass
 class Compose:
     """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``.
 
-    If it ``is_whole``, DoDo's services are containers of it, else processes beside it.
+    If it ``is_whole``, DoDo's services are containers of it, else processes beside it. ``channel`` is the folder where
+    services and runner meet, empty if that is a volume.
     """
 
-    def __init__(
-        self,
-        plan: Plan,
-        folder: Path,
-        report: Path,
-        project: str,
-        say: Say,
-        channel: str = "",
-        is_whole: bool = True,
-    ) -> None:
-        """``channel`` is the folder where services and runner meet, empty if that is a volume."""
-        self.is_whole = is_whole
-        self.plan = plan
-        self.folder = folder
-        self.report = report
-        self.project = project
-        self.services: dict[str, Any] = {}
-        self.channel = channel
-        self._application = plan.application.compose
-        self._say = say
-        self._paths = application_paths(plan.application, folder)
-        self._binds: dict[str, list[Bind]] = {}
-        self._outside: dict[str, str] = {}
+    plan: Plan
+    folder: Path
+    report: Path
+    project: str
+    say: Say
+    channel: str = ""
+    is_whole: bool = True
+    services: dict[str, Any] = field(init=False)
+    _binds: dict[str, list[Bind]] = field(init=False)
+    _outside: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._application = self.plan.application.compose
+        self._paths = application_paths(self.plan.application, self.folder)
 
     def read(self) -> None:
         """Fills ``services``; raises BackendError."""
@@ -163,8 +157,8 @@ class Compose:
             for s in self.plan.application.services
             if s.name in self.services and not s.process
         }
-        for note in await pulls.provide(self._own_images(), foreign, self._say, ways | image_hints(self.plan)):
-            self._say(note)
+        for note in await pulls.provide(self._own_images(), foreign, self.say, ways | image_hints(self.plan)):
+            self.say(note)
         for name, image in private.items():
             self.services[name]["image"] = image
         built = {name: service for name, service in self.services.items() if is_built(service)}
@@ -180,7 +174,7 @@ class Compose:
 
     async def _build(self, services: Mapping[str, Any]) -> None:
         """Builds images in a project that all tests have in common, from folders without what is hidden."""
-        self._say(f"building {', '.join(services)}")
+        self.say(f"building {', '.join(services)}")
         log = self.report / "logs" / "build.log"
         self.report.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".build-", dir=self.report) as name:

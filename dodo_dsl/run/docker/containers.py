@@ -65,7 +65,7 @@ class Containers:
         assert lease is not None, "a fresh name is free"
         compose = Compose(plan, watched.folder, watched.report, project, say, slot.channel, self._is_whole)
         subnets = other_subnets(plan.subnet, self._subnets)
-        side = ContainerSide(watched, compose, self._client, self._pulls, subnets, say)
+        side = ContainerSide(watched, compose, self._client, self._pulls, subnets)
         try:
             yield side
         finally:

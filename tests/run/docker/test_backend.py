@@ -22,7 +22,7 @@ NOBODY: Any = None
 def test_a_crash_upon_the_end_is_reported(tmp_path: Path) -> None:
     async def ends() -> list[Event]:
         watched = WatchedServices(plan("t"), tmp_path, tmp_path)
-        side = ContainerSide(watched, NOBODY, NOBODY, NOBODY, [], print)
+        side = ContainerSide(watched, NOBODY, NOBODY, NOBODY, [])
         side._is_closing = True
         for code in (0, 1, 134, 137, 139, 143):
             side._take(f"app{code}", "die", {"exitCode": str(code)})
@@ -55,8 +55,8 @@ def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] 
 
     async def started() -> tuple[dict[str, bool], list[Event]]:
         watched = WatchedServices(plan("t", application=Application(".", services)), folder, folder)
-        has_check = SimpleNamespace(has_healthcheck=lambda _: True, project="dodo-t")
-        side = ContainerSide(watched, cast(Compose, has_check), NOBODY, NOBODY, [], print)
+        has_check = SimpleNamespace(has_healthcheck=lambda _: True, project="dodo-t", say=print)
+        side = ContainerSide(watched, cast(Compose, has_check), NOBODY, NOBODY, [])
         side._containers = {"app": Container(), "db": Container(), **others}
         waits = await side.start("application")
         for name, status in statuses:

@@ -82,7 +82,7 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
 
     async def begin() -> None:
         plan = replace(Bench(tmp_path).plan(), isolation=isolation)
-        side = ContainerSide(WatchedServices(plan, tmp_path, tmp_path), NOBODY, NOBODY, NOBODY, (), print)
+        side = ContainerSide(WatchedServices(plan, tmp_path, tmp_path), NOBODY, NOBODY, NOBODY, ())
         side._use = ContainerUse({"app": Changing("c0ffee", 0)}, proc=proc.root)
         await side.beginning()
 
