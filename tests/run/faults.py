@@ -144,13 +144,6 @@ FAULTS = {
         judge=READY + LONG_LINE + BEGUN + PASS,
         application=LONG_LINE + 'print("after")\n' + WAIT,
     ),
-    "ends": Fault(
-        "",
-        "failed",
-        "application service 'app' ended with exit code 0",
-        {"docker": LONG},
-        application="sys.exit(0)\n",
-    ),
     "ends-early": Fault(
         "",
         "failed",

@@ -1,7 +1,6 @@
 """Faults around tests on each backend: the outcome, its sentence, nothing left, and an unharmed neighbour."""
 
 import re
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from tests.docker.compose import Crate
 from tests.docker.conftest import crate, images  # noqa: F401
 from tests.faults import Book
 from tests.images.conftest import base_image, built  # noqa: F401
+from tests.run.desk import gone
 from tests.run.faults import MARKS, Fault, as_told, by_backend, whole_logs
 from tests.run.helpers import STARTED, WAIT, Bench
 
@@ -56,33 +56,15 @@ def nothing_left(bench: Bench) -> None:
     memories = re.findall(r"^memory (\S+)$", logs, re.MULTILINE)
     assert [name for name in memories if Path("/tmp", name).exists()] == []
     assert list((bench.folder / "leases").glob("*.json")) == []
-    deadline = time.monotonic() + 5
-    while left := scripts_running(bench.folder):
-        assert time.monotonic() < deadline, left
-        time.sleep(0.05)
-
-
-def scripts_running(folder: Path) -> list[str]:
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            text = path.read_bytes()
-        except OSError:
-            continue
-        if f"{folder}/".encode() in text and b".py\0" in text:
-            found.append(text.replace(b"\0", b" ").decode())
-    return found
+    assert gone(f"{bench.folder}/", 5.0)
 
 
 @pytest.mark.parametrize(("backend", "faults"), by_backend())
 def test_faults_at_once(backend: str, faults: dict[str, Fault], run: Run, bench: Bench, book: Book) -> None:
     as_told(faults, run(backend, faults), backend, book)
-    logs = {
-        path.parts[-3].rpartition("fault-")[2]: path for path in bench.folder.glob("report/*/logs/application.app.log")
-    }
 
     def log(slug: str) -> str:
-        return next(path.read_text() for name, path in logs.items() if name.endswith(slug))
+        return next(bench.folder.glob(f"report/*{slug}/logs/application.app.log")).read_text()
 
     assert re.search(r"^memory \S*video0.argb$", log("neighbour"), re.MULTILINE)
     whole_logs(faults, log)
@@ -95,9 +77,7 @@ def test_faults_at_once(backend: str, faults: dict[str, Fault], run: Run, bench:
         pytest.param("docker", marks=[*MARKS["docker"], pytest.mark.proof]),
     ],
 )
-def test_service_that_never_gets_ready(
-    backend: str, run: Run, book: Book, monkeypatch: pytest.MonkeyPatch
-) -> None:  # of faults
+def test_service_that_never_gets_ready(backend: str, run: Run, book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "READY_PATIENCE_S", 2.0)
     faults = {"never-ready": NEVER_READY}
     as_told(faults, run(backend, faults), backend, book)
