@@ -77,7 +77,8 @@ def _socket(answer: Any) -> socket.socket:
 def close(answer: Any) -> None:
     """Closes the socket of an answer of the engine, and the response, which holds it open."""
     _socket(answer).close()
-    answer._response.close()
+    if (response := getattr(answer, "_response", None)) is not None:
+        response.close()
 
 
 def _piece(output: BinaryIO) -> bytes:
