@@ -30,7 +30,7 @@ REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"
 
 WORDS = {
-    "engine": ("mark.engine",),
+    "engine": ("mark.engine", "MARKS"),
     "realtime": ("realtime", "firmware"),
     "slow": ("slow", "engine", "realtime", "firmware", "proof"),
     "proof": ("proof",),

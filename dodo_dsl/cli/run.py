@@ -30,7 +30,8 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.report.next_report import Drawings, next_report
 from dodo_dsl.report.repetitions import Repeated, repeated
 from dodo_dsl.report.results import Circumstances
-from dodo_dsl.run.backends import Backends, Job, Processes
+from dodo_dsl.run.backends import COMBINATIONS, Backends, CombinedBackends, Job
+from dodo_dsl.run.process.processes import may_enter
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
 from dodo_dsl.run.schedule import schedule
@@ -74,8 +75,6 @@ def choose_backend(plans: Sequence[Plan]) -> BackendName:
     by_application = default_backend(plans)
     if by_application == "process":
         return by_application
-    from dodo_dsl.run.mixed import may_enter
-
     if any(plan.is_real for plan in plans) or (may_enter() and _lacks_images(plans)):
         return "mixed"
     return by_application
@@ -128,7 +127,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--backend",
-        choices=("process", "docker", "mixed"),
+        choices=tuple(COMBINATIONS),
         help="where services run; mixed: the application in containers, DoDo's own as processes (default: process, if "
         "the application allows it; else mixed on a rig, or where DoDo's images are missing; else docker)",
     )
@@ -216,22 +215,19 @@ def runner_of(
 def _backends(
     options: argparse.Namespace, backend: str, plans: Sequence[Plan], deployment: Deployment, load: Loading
 ) -> Backends:
-    roots = _roots(options, deployment)
-    if backend != "process":
-        from dodo_dsl.run.docker.containers import Containers
-        from dodo_dsl.run.mixed import Mixed
-
-        if options.compiled and any(options.isolation not in (None, plan.isolation) for plan in plans):
-            raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
-        containers = Containers(subnets(deployment.subnets), roots)
-        return containers if backend == "docker" else Mixed(containers, (load.descriptor,), roots, load.take)
-    without = sorted({s.name for p in plans for s in p.application.services if not s.process})
-    if without:
-        advice = "add for example 'x-dodo-process: [python, main.py]', or run with --backend mixed or docker"
-        raise UsageError(
-            f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
-        )
-    return Processes(deployment.cids, options.isolation, (load.descriptor,), roots, load.take)
+    if backend == "process":
+        without = sorted({s.name for p in plans for s in p.application.services if not s.process})
+        if without:
+            advice = "add for example 'x-dodo-process: [python, main.py]', or run with --backend mixed or docker"
+            raise UsageError(
+                f"application service '{without[0]}' has no 'x-dodo-process', which the process backend needs; {advice}"
+            )
+    elif options.compiled and any(options.isolation not in (None, plan.isolation) for plan in plans):
+        raise UsageError(f"this test is compiled for isolation {plans[0].isolation}; compile it again for another")
+    return CombinedBackends(
+        backend, deployment.cids, subnets(deployment.subnets), options.isolation, (load.descriptor,),
+        _roots(options, deployment), load.take,
+    )  # fmt: skip
 
 
 def _roots(options: argparse.Namespace, deployment: Deployment) -> list[Path]:

@@ -18,7 +18,7 @@ from dodo_dsl.cli.progress import about, count
 from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors
 from dodo_dsl.diagnostics import has_errors, ordered, told_once
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.run.backends import Processes
+from dodo_dsl.run.backends import CombinedBackends
 from dodo_dsl.run.rigs.session import RigSession
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.schedule import schedule
@@ -71,9 +71,11 @@ class SearchSession:
 
     def _machine(self, study: Study) -> DriveHost:
         deployment, options, rigs = study.checked.deployment, self.options, RigSession()
-        descriptors, roots = (self.load.descriptor,), [deployment.root]
-        processes = Processes(deployment.cids, options.isolation, descriptors, roots, self.load.take, rigs)
-        return DriveHost(KeptBackends(processes), schedule(options.jobs, expectation(processes.name)), self.work, rigs)
+        backends = CombinedBackends(
+            options.backend, deployment.cids, isolation=options.isolation, descriptors=(self.load.descriptor,),
+            roots=[deployment.root], loaded=self.load.take, session=rigs,
+        )  # fmt: skip
+        return DriveHost(KeptBackends(backends), schedule(options.jobs, expectation(backends.name)), self.work, rigs)
 
 
 @contextmanager

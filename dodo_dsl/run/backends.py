@@ -1,4 +1,4 @@
-"""Where tests run: each kind of backend prepares once for a run, and makes one backend for each test."""
+"""Where tests run: each backend is a combination of two sides, prepares once for a run, and is made for each test."""
 
 import asyncio
 import contextlib
@@ -7,19 +7,31 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.process import host_isolation, leftovers
-from dodo_dsl.run.process.backend import ProcessBackend
-from dodo_dsl.run.process.commands import own_modules
-from dodo_dsl.run.process.fork_server_client import ForkServer, serving
+from dodo_dsl.run.process import host_isolation
+from dodo_dsl.run.process.fork_server_client import ForkServer
+from dodo_dsl.run.process.processes import Processes
 from dodo_dsl.run.process.slot import Slot, meeting_place
-from dodo_dsl.run.protocol import Backend, BackendError
+from dodo_dsl.run.protocol import Backend, BackendError, Say
 from dodo_dsl.run.rigs.permission import refuse_unattended
 from dodo_dsl.run.rigs.session import RigSession, attended
+from dodo_dsl.run.sides import Side, Sides, WatchedServices
 
-Say = Callable[[str], None]
+if TYPE_CHECKING:
+    from dodo_dsl.run.docker.containers import Containers
+
+PROCESSES, CONTAINERS = "processes", "containers"
+COMBINATIONS = {
+    "process": (PROCESSES, PROCESSES),
+    "docker": (CONTAINERS, CONTAINERS),
+    "mixed": (PROCESSES, CONTAINERS),
+}
+"""What DoDo's side is, and the application's, by the name of the backend.
+
+Containers of DoDo's cannot enter the network of an application's processes.
+"""
 
 
 @dataclass(frozen=True)
@@ -57,84 +69,74 @@ class Backends(Protocol):
         ...
 
 
-class Processes:
-    """Local processes, each test in its own namespaces, or on the host in a leased slot, as on a real rig."""
+@dataclass
+class CombinedBackends:
+    """The backends of a combination, by its ``name``.
 
-    name = "process"
-    _fork_server: ForkServer | None = None
+    On the host, processes take one of the ``cids``; ``subnets`` are for networks of containers. ``isolation`` is in
+    place of the tests' own. ``roots`` are the folders that tests come from, for the permission to use a rig. A
+    ``session`` spares rigs that stay fit their checks between tests. ``loaded`` gives a fork server that was started
+    with the same ``descriptors`` while tests were compiled.
+    """
 
-    def __init__(
-        self,
-        cids: Sequence[int],
-        isolation: str | None,
-        descriptors: tuple[int, ...],
-        roots: Sequence[Path] = (),
-        loaded: Callable[[], ForkServer | None] = lambda: None,
-        session: RigSession | None = None,
-    ) -> None:
-        """``roots`` are the folders that tests come from, for the permission to use a rig.
+    name: str
+    cids: Sequence[int] = ()
+    subnets: Sequence[str] = ()
+    isolation: str | None = None
+    descriptors: tuple[int, ...] = ()
+    roots: Sequence[Path] = ()
+    loaded: Callable[[], ForkServer | None] = lambda: None
+    session: RigSession | None = None
+    _kinds: "list[Processes | Containers]" = field(default_factory=list)
+    _alone: asyncio.Lock = field(default_factory=asyncio.Lock)
+    """A queue without time limit for tests of this run that need the machine for themselves."""
 
-        A ``session`` spares rigs that stay fit their checks between tests.
+    def __post_init__(self) -> None:
+        self._own, self._application = COMBINATIONS[self.name]
+        is_whole = self._own == self._application
+        if self._own == PROCESSES:
+            self._kinds.append(Processes(self.isolation, self.descriptors, self.loaded, is_whole))
+        if self._application == CONTAINERS:
+            from dodo_dsl.run.docker.containers import Containers
 
-        ``loaded`` gives a fork server that was started with the same ``descriptors`` while tests were compiled.
-        """
-        self._cids = cids
-        self._roots = roots
-        self._isolation = isolation
-        self._descriptors = descriptors
-        self._loaded = loaded
-        self._session = session
-        self._alone = asyncio.Lock()
-        self._problem = ""
-        self._is_apart = True
-
-    def _exclusively(self, plan: Plan) -> AbstractAsyncContextManager[None]:
-        """A queue without time limit for tests of this run that need the machine for themselves."""
-        return self._alone if host_isolation.runs_alone(plan) else contextlib.nullcontext()
+            self._kinds.append(Containers(self.subnets, is_whole))
 
     async def prepare(self, plans: Sequence[Plan], note: Say) -> None:
-        for left in leftovers.reap():
-            note(f"removed what a killed run left: {left}")
-        wanted = {self._isolation or plan.isolation for plan in plans}
-        self._start_fork_server(plans if "network" in wanted else ())
-        is_needed = self._isolation is None and "network" in wanted
-        if is_needed and (refusal := await host_isolation.isolation_refusal(self._fork_server)):
-            remedy = f"{refusal.remedy}; " if refusal.remedy else ""
-            way_out = f"{remedy}an application that you trust runs with --isolation host"
-            self._problem = f"the application cannot be isolated on this machine: {refusal.why}; {way_out}"
-            return
-        if "host" in wanted or any(plan.is_real for plan in plans):
-            why = await asyncio.to_thread(host_isolation.process_namespace_refusal)
-            self._is_apart = not why
-            if why:
-                note(f"what an application starts may outlive its test on the host: {why}")
-
-    def _start_fork_server(self, plans: Sequence[Plan]) -> None:
-        """One for the services of these tests, none if there are none."""
-        self._fork_server = serving(self._loaded(), own_modules(plans) if plans else None, self._descriptors)
+        for kind in self._kinds:
+            await kind.prepare(plans, note)
 
     def close(self) -> None:
-        if self._fork_server is not None:
-            self._fork_server.close()
+        for kind in self._kinds:
+            kind.close()
 
     @contextlib.asynccontextmanager
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
-        plan = self._session.at_home(job.plan) if self._session else job.plan
+        plan = self.session.at_home(job.plan) if self.session else job.plan
+        isolation = "host" if plan.is_real else self.isolation or plan.isolation
         refuse_unattended(plan)
-        isolation = "host" if plan.is_real else self._isolation or plan.isolation
-        if isolation == "network" and self._problem:
-            raise BackendError(self._problem)
-        with meeting_place(job.work, keep) as channel:
-            if isolation == "network":
-                slot = Slot(plan.cid, descriptors=self._descriptors, channel=channel)
-                yield ProcessBackend(plan, job.folder, job.report, isolation, slot, self._fork_server)
-                return
-            async with (
-                self._exclusively(plan),
-                host_isolation.host_slot(
-                    plan, () if plan.is_real else self._cids, say, keep, alone=host_isolation.runs_alone(plan)
-                ) as leased,
-                attended(plan, replace(leased, channel=channel), say, self._roots, self._session) as descriptors,
-            ):
-                slot = replace(leased, descriptors=(*descriptors, *self._descriptors), channel=channel)
-                yield ProcessBackend(plan, job.folder, job.report, isolation, slot, is_apart=self._is_apart)
+        for kind in self._kinds:
+            if problem := kind.problem(plan, isolation):
+                raise BackendError(problem)
+        watched = WatchedServices(plan, job.folder, job.report)
+        async with contextlib.AsyncExitStack() as stack:
+            channel = stack.enter_context(meeting_place(job.work, keep))
+            slot = await stack.enter_async_context(self._slot(plan, isolation, channel, say, keep))
+            sides: list[Side] = [stack.enter_context(kind.side(watched, slot, isolation, say)) for kind in self._kinds]
+            yield Sides(self.name, slot.cid, isolation == "host", watched, sides[0], sides[-1])
+
+    @contextlib.asynccontextmanager
+    async def _slot(self, plan: Plan, isolation: str, channel: str, say: Say, keep: bool) -> AsyncIterator[Slot]:
+        """What keeps a test apart, with the rig's leases; on the host for as long as it runs, and a kept one lives."""
+        if isolation == "network":
+            yield Slot(plan.cid, descriptors=self.descriptors, channel=channel)
+            return
+        is_fixed = self._application == CONTAINERS
+        alone, cids = is_fixed or host_isolation.runs_alone(plan), () if is_fixed or plan.is_real else self.cids
+        if self._own == CONTAINERS:
+            keep = False  # nobody of it could hold the leases
+        async with (
+            self._alone if alone else contextlib.nullcontext(),
+            host_isolation.host_slot(plan, cids, say, keep, alone=alone) as leased,
+            attended(plan, replace(leased, channel=channel), say, self.roots, self.session) as descriptors,
+        ):
+            yield replace(leased, descriptors=(*descriptors, *self.descriptors), channel=channel)

@@ -1,6 +1,6 @@
 """What a backend is, and the events that it reports to the engine while a test runs."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, Protocol
 
@@ -11,6 +11,8 @@ from dodo_dsl.run.machine_load.service_use import Snapshot
 
 MOST_TEXT = 2000
 """Characters that a report can show."""
+Say = Callable[[str], None]
+"""Shows a sentence while a test or a run goes on."""
 Sentence = Annotated[str, Meta(min_length=1, max_length=MOST_TEXT)]
 
 
@@ -196,35 +198,19 @@ class Unmatched:
 Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost
 
 
-class Backend(Protocol):
-    """Where a test's services run. ``open`` raises BackendError, the rest reports through events."""
-
-    name: str
-    cid: int
-
-    @property
-    def is_on_host(self) -> bool:
-        """Whether the application has the machine's own ``/tmp``, shared memory and IPC."""
-        ...
-
-    async def open(self) -> None: ...
+class Running(Protocol):
+    """What runs services of a test. It reports by events, but ``BackendError`` where it says so."""
 
     async def start(self, layer: str) -> dict[str, bool]:
         """Starts the services of a layer; returns their names, and whether each will report that it is ready."""
         ...
 
-    async def next_event(self) -> Event: ...
-
     async def listeners(self) -> Collection[str] | None:
         """The services of the application that listen on an OpenDLV bus already; None if that cannot be seen."""
         ...
 
-    async def begin(self) -> None:
-        """Announces on the test's bus that everything is ready; may be repeated."""
-        ...
-
     async def use(self) -> Snapshot | None:
-        """What the test's services used so far; None if that cannot be measured."""
+        """What the services used so far; None if that cannot be measured."""
         ...
 
     async def application(self) -> Collection[int] | None:
@@ -233,6 +219,25 @@ class Backend(Protocol):
 
     async def close(self, keep: bool) -> list[str]:
         """Ends everything and cleans up; with ``keep``, leaves it and returns sentences on how to look inside."""
+        ...
+
+
+class Backend(Running, Protocol):
+    """Where all of a test's services run."""
+
+    name: str
+    cid: int
+    is_on_host: bool
+    """Whether the application has the machine's own ``/tmp``, shared memory and IPC."""
+
+    async def open(self) -> None:
+        """Raises BackendError."""
+        ...
+
+    async def next_event(self) -> Event: ...
+
+    async def begin(self) -> None:
+        """Announces on the test's bus that everything is ready; may be repeated. Raises BackendError."""
         ...
 
     def tail(self, service: str) -> list[str]:

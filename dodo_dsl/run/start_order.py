@@ -14,38 +14,17 @@ _UNHEALTHY = "is unhealthy"
 
 
 class Conditions:
-    """What became of an application's services, for those that wait for it; belongs to one event loop.
+    """What became of an application's services, for those that wait for it; belongs to one event loop."""
 
-    ``has_health`` means that there are health checks; without, a service that has started counts as healthy.
-    """
-
-    def __init__(self, services: Iterable[ApplicationService], has_health: bool = True) -> None:
+    def __init__(self, services: Iterable[ApplicationService]) -> None:
         services = tuple(services)
-        self._after = {s.name: {n: _without_health(c, has_health) for n, c in s.after.items()} for s in services}
+        self._after = {s.name: s.after for s in services}
         self._optional = {s.name: s.optional for s in services}
         self._known: dict[tuple[str, str], asyncio.Future[str]] = {}
 
     def of(self, name: str) -> Mapping[str, str]:
         """The services for which one waits, each with its condition."""
         return self._after.get(name, {})
-
-    def waits_for_ends(self, name: str) -> bool:
-        """Whether a service starts only after another one has ended, directly or through others."""
-        return any(COMPLETED in self.of(each).values() for each in _chain(self._after, name))
-
-    def in_order(self, names: Iterable[str]) -> list[str]:
-        """The names, each behind those for which it waits."""
-        every, ordered = list(names), dict[str, None]()
-
-        def add(name: str) -> None:
-            if name in every and name not in ordered:
-                for other in self.of(name):
-                    add(other)
-                ordered[name] = None
-
-        for name in every:
-            add(name)
-        return list(ordered)
 
     def started(self, name: str) -> None:
         self._decide(name, STARTED, "")
@@ -162,7 +141,3 @@ def _chain(after: Mapping[str, Mapping[str, str]], name: str) -> list[str]:
     for each in found:
         found += [other for other in after.get(each, {}) if other not in found]
     return found
-
-
-def _without_health(condition: str, has_health: bool) -> str:
-    return condition if has_health else condition.replace(HEALTHY, STARTED)

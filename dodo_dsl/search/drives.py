@@ -19,8 +19,8 @@ from dodo_dsl.diagnostics import format_text, has_errors
 from dodo_dsl.emit.output_folder import write
 from dodo_dsl.outcome import Outcome, failed_checks, worst_margin
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.backends import Backends, Job, Say
-from dodo_dsl.run.protocol import Backend
+from dodo_dsl.run.backends import Backends, Job
+from dodo_dsl.run.protocol import Backend, Say
 from dodo_dsl.run.rigs.session import RigSession
 from dodo_dsl.run.runner import Policy, Progress, Runner
 from dodo_dsl.run.schedule import Schedule

@@ -14,8 +14,7 @@ from dodo_dsl import __version__
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import LAYERS, Flag, Plan
 from dodo_dsl.plan.plan_json import to_json
-from dodo_dsl.run.backends import Job
-from dodo_dsl.run.docker.containers import Containers
+from dodo_dsl.run.backends import CombinedBackends, Job
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
 from tests.run.desk import ROOT
@@ -94,9 +93,10 @@ class Crate:
             "volumes": {"tmp": {}, "report": {}, "channel": {"driver_opts": MEMORY}},
         }
 
-    def run(self, *jobs: Job) -> dict[str, Outcome]:
+    def run(self, *jobs: Job, backend: str = "docker") -> dict[str, Outcome]:
         """The outcomes by slug without the mark, all at once."""
-        runner = Runner(self.progress, Containers(SUBNETS), schedule(len(jobs), lambda job: 1.0), Policy())
+        backends = CombinedBackends(backend, subnets=SUBNETS)
+        runner = Runner(self.progress, backends, schedule(len(jobs), lambda job: 1.0), Policy())
         return {o.slug.removeprefix(f"{self.mark}-"): o for o in asyncio.run(runner.run(jobs))}
 
     def start(self, job: Job, *flags: str, **variables: str) -> "subprocess.Popen[str]":

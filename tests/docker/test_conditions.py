@@ -1,27 +1,20 @@
-"""Containers of an application start in the order of their ``depends_on``, on a real engine."""
+"""Services of an application start in the order of their ``depends_on``, as processes and on a real engine."""
 
-import asyncio
-import os
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dodo_dsl.plan.model import ApplicationService
 from dodo_dsl.run import start_order
-from dodo_dsl.run.backends import Backends, Job
-from dodo_dsl.run.docker.containers import Containers
-from dodo_dsl.run.mixed import Mixed
-from dodo_dsl.run.runner import Policy, Runner
-from dodo_dsl.run.schedule import schedule
-from tests.docker.compose import SUBNETS, Crate, changed
+from dodo_dsl.run.backends import Job
+from tests.docker.compose import Crate, changed, new_crate
+from tests.run.faults import MARKS
 from tests.run.helpers import BEGUN, PASS, READY, STARTED, WAIT
 
-pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
-
-MARKS = "all(os.path.exists('/tmp/' + name) for name in ('init', 'db', 'plain'))"
-APP = f"assert {MARKS}, os.listdir('/tmp')\n" + STARTED + WAIT
+APP = "assert all(os.path.exists('/tmp/' + name) for name in {}), os.listdir('/tmp')\n" + STARTED + WAIT
 HEALTHY, COMPLETED = "service_healthy", "service_completed_successfully"
 MADE = "sleep 1; touch /tmp/$0; "
 CHECK = {"interval": "200ms", "timeout": "5s", "retries": 3}
@@ -43,6 +36,7 @@ TABLE: dict[str, tuple[dict[str, Any], str, str]] = {
         "application service 'init' ended with exit code 3 during set-up, before the test was decided; 'app' waits for "
         "it to end with exit code 0",
     ),
+    "optional": ({"init": (COMPLETED, "exit 3", {})}, "passed", "it drove"),
     "unhealthy": (
         {"db": (HEALTHY, "sleep 600", {"healthcheck": {**CHECK, "test": ["CMD", "false"]}})},
         "error",
@@ -80,10 +74,11 @@ TABLE: dict[str, tuple[dict[str, Any], str, str]] = {
 }
 
 
-def waiting(crate: Crate, slug: str, others: Mapping[str, tuple[str, str, dict[str, Any]]]) -> Job:
+def waiting(crate: Crate, slug: str, others: Mapping[str, tuple[str, str, dict[str, Any]]], optional: bool) -> Job:
     """A test whose application waits for other services, each with a condition, a script and keys."""
     judge = READY + BEGUN + "time.sleep(2)\n" + PASS  # of a busy engine, too, the begin comes by then
-    job = crate.job(slug, judge, APP, timeout_s=30.0)
+    marks = [name for name, (_, script, _) in others.items() if "touch" in script]
+    job = crate.job(slug, judge, APP.format(marks), timeout_s=30.0)
     application, others = job.plan.application, dict(others)
     app = application.compose["services"]["app"]
     shared = {key: app[key] for key in ("image", "volumes", "stop_grace_period", "depends_on", "ipc")}
@@ -91,33 +86,49 @@ def waiting(crate: Crate, slug: str, others: Mapping[str, tuple[str, str, dict[s
     for name, (_, script, keys) in others.items():
         containers[name] = {**shared, "entrypoint": ["sh", "-c", script.replace("$", "$$"), name], **keys}
     after = {name: condition for name, (condition, _, _) in others.items()}
-    services = (replace(application.services[0], after=after), *(ApplicationService(name) for name in others))
-    made = replace(application, services=services, compose={"services": containers})
+    services = (
+        replace(application.services[0], after=after, optional=("init",) if optional else ()),
+        *(ApplicationService(name, ("sh", "-c", script, name)) for name, (_, script, _) in others.items()),
+    )
+    made = replace(application, folder="../..", services=services, compose={"services": containers})
     return changed(job, replace(job.plan, application=made))
 
 
-BACKENDS = {"docker": Containers(SUBNETS), "mixed": Mixed(Containers(SUBNETS), ())}
-NOT_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container")
-
-
-FEW = {"docker": ("come-true", "unhealthy", "own-health"), "mixed": ("come-true", "init-fails")}
+FEW = {
+    "process": ("come-true", "init-fails", "optional", "never-ends"),
+    "docker": ("come-true", "unhealthy", "own-health"),
+    "mixed": ("come-true", "init-fails"),
+}
+NO_CHECK = {"db": ("service_healthy", "sleep 600", {})}
+"""Of processes: who has started is healthy."""
 
 
 @pytest.mark.parametrize(
     ("backend", "names"),
     [
-        pytest.param("docker", FEW["docker"], id="docker"),
-        pytest.param("docker", tuple(TABLE), id="docker, all", marks=pytest.mark.proof),
-        pytest.param("mixed", FEW["mixed"], id="mixed", marks=NOT_ROOT),
+        *(pytest.param(backend, names, id=backend, marks=MARKS[backend]) for backend, names in FEW.items()),
+        pytest.param("docker", tuple(TABLE), id="docker, all", marks=[*MARKS["docker"], pytest.mark.proof]),
     ],
 )
-def test_conditions(backend: str, names: tuple[str, ...], crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_conditions(
+    backend: str,
+    names: tuple[str, ...],
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """One that cannot come true ends the test, and names who waits for what."""
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
+    others, crate = {**OTHERS, **NO_CHECK}, new_crate(tmp_path)
+    if backend != "process":
+        request.getfixturevalue("images")
+        others, crate = OTHERS, request.getfixturevalue("crate")
     if "never-ends" in names:
         monkeypatch.setattr(start_order, "LONGEST_S", 9.0)
     chosen = {name: TABLE[name] for name in names}
-    jobs = [waiting(crate, slug, {**OTHERS, **others}) for slug, (others, _, _) in chosen.items()]
-    backends: Backends = BACKENDS[backend]
-    runner = Runner(crate.progress, backends, schedule(4, lambda job: 1.0), Policy())
-    found = {o.slug.removeprefix(f"{crate.mark}-"): (o.outcome, o.reason) for o in asyncio.run(runner.run(jobs))}
-    assert found == {slug: row[1:] for slug, row in chosen.items()}
+    jobs = [waiting(crate, slug, {**others, **row[0]}, slug == "optional") for slug, row in chosen.items()]
+    outcomes = crate.run(*jobs, backend=backend)
+    assert {slug: (o.outcome, o.reason) for slug, o in outcomes.items()} == {k: row[1:] for k, row in chosen.items()}
+    if "optional" in names:
+        told = "it waits for 'init' to end with exit code 0 (depends_on, required: false), which ended with exit code 3"
+        assert f"service 'app' starts all the same: {told}" in outcomes["optional"].notes

@@ -1,4 +1,4 @@
-"""Faults around tests in containers: the outcome, its sentence, nothing left, and an unharmed neighbour."""
+"""Faults around runs with containers: of registry, disk, engine and runner."""
 
 import re
 import signal
@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run import capabilities, engine, work_folder
+from dodo_dsl.run import capabilities, work_folder
 from tests.docker.broken_registry import BrokenRegistry
 from tests.docker.compose import IMAGE, Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
 from tests.run.desk import wait_for
-from tests.run.faults import Fault, as_told, faults_on, whole_logs
+from tests.run.faults import Fault, as_told
 from tests.run.helpers import BEGUN, DRIVES, PASS, READY, WAIT
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
@@ -30,25 +30,13 @@ def told(process: "subprocess.Popen[str]", result: str) -> str:
     return str(reason)
 
 
-@pytest.mark.parametrize("faults", faults_on("docker"))
-def test_faults_at_once(faults: dict[str, Fault], crate: Crate, book: Book) -> None:
-    jobs = [crate.job(slug, f.judge, f.application, f.environment, **f.app) for slug, f in faults.items()]
+def test_pull_whose_connection_breaks(crate: Crate, book: Book) -> None:
     with BrokenRegistry(is_forgetful=True) as registry:
-        jobs.append(crate.job("pull", image=registry.image))
-        outcomes = crate.run(*jobs)
+        outcomes = crate.run(crate.job("pull", image=registry.image))
     said = [text for _, text in crate.progress.phases]
     assert f"pulling {registry.image}: the connection broke, the engine retries" in said
     broken = Fault("The connection breaks in the middle of a pull", "error", f"image {registry.image} cannot", {})
-    as_told({**faults, "pull": broken}, outcomes, "docker", book)
-    whole_logs(faults, crate.log)
-
-
-@pytest.mark.proof
-def test_service_that_never_gets_ready(crate: Crate, book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "READY_PATIENCE_S", 2.0)
-    (outcome,) = crate.run(crate.job("never-ready", environment=WAIT)).values()
-    assert outcome.reason == "service 'camera' was not ready within 2 s"
-    book.record("A service never gets ready", "docker", outcome.outcome, outcome.reason)
+    as_told({"pull": broken}, outcomes, "docker", book)
 
 
 @pytest.mark.proof

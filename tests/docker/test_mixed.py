@@ -1,6 +1,5 @@
 """The application in containers of a real engine, DoDo's services beside it as processes of this machine."""
 
-import asyncio
 import json
 import os
 import shutil
@@ -11,34 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.docker.containers import Containers
-from dodo_dsl.run.mixed import Mixed
-from dodo_dsl.run.runner import Policy, Runner
-from dodo_dsl.run.schedule import schedule
-from tests.docker.compose import SUBNETS, Crate, changed
+from tests.docker.compose import Crate, changed
 from tests.docker.test_started_anywhere import WITHOUT_COLON
-from tests.faults import Book
 from tests.run.desk import ROOT
-from tests.run.faults import Fault, as_told, faults_on
+from tests.run.faults import MARKS
 from tests.run.helpers import AFTER_START, PASS, READY, WAIT
 
 TEST = "sil-closed-straight"
 
-pytestmark = [
-    pytest.mark.engine,
-    pytest.mark.usefixtures("images"),
-    pytest.mark.skipif(os.geteuid() != 0, reason="only root enters the network of a container"),
-]
-
-
-@pytest.mark.parametrize("faults", faults_on("mixed"))
-def test_faults_beside_processes_of_dodo(faults: dict[str, Fault], crate: Crate, book: Book) -> None:
-    """Those that the other backends show, too, are for ``make proof``."""
-    jobs = [crate.job(slug, f.judge, f.application, f.environment, **f.app) for slug, f in faults.items()]
-    runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(len(jobs), lambda job: 1.0), Policy())
-    outcomes = {o.slug.removeprefix(f"{crate.mark}-"): o for o in asyncio.run(runner.run(jobs))}
-    as_told(faults, outcomes, "mixed", book)
-    assert "memory video0.argb" in crate.log("neighbour")
+pytestmark = [*MARKS["mixed"], pytest.mark.usefixtures("images")]
 
 
 TAKES = """
@@ -70,8 +50,7 @@ def test_root_in_a_container_takes_no_place_of_folders_of_services(crate: Crate)
     compose = {"services": {"app": container, "other": other}}
     plan = replace(job.plan, application=replace(application, services=services, compose=compose))
     job = changed(job, plan)
-    runner = Runner(crate.progress, Mixed(Containers(SUBNETS), ()), schedule(1, lambda job: 1.0), Policy())
-    (outcome,) = asyncio.run(runner.run([job]))
+    (outcome,) = crate.run(job, backend="mixed").values()
     assert outcome.outcome == "passed", outcome.reason
     names = {path.parts[2] for path in (crate.bench.folder, job.folder)}
     for service in ("app", "other"):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
-from dodo_dsl.run.backends import Backends, Job, Processes
+from dodo_dsl.run.backends import Backends, CombinedBackends, Job
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
@@ -142,7 +142,7 @@ class Bench:
     ) -> list[Outcome]:
         """The outcomes; on the host with CIDs that no other test uses."""
         with reserved_cids(len(plans)) as cids:
-            backends = backends or Processes(cids, self.isolation, ())
+            backends = backends or CombinedBackends("process", cids, isolation=self.isolation)
             if self.isolation == "host":
                 plans = tuple(replace(plan, cid=cids[0]) for plan in plans)
             self.runner = Runner(self.progress, backends, schedule(parallel, self.expected), policy or Policy())

@@ -87,7 +87,7 @@ def scripted_commands(folder: Path, spec: str, make: Callable[[Plan, int], Scrip
 
 def stub(patch: pytest.MonkeyPatch, make: Callable[[Plan, int], ScriptedBackend]) -> None:
     patch.setattr(asyncio, "run", scripted.run)
-    patch.setattr(search_session, "Processes", lambda *_: ScriptedBackends(make))
+    patch.setattr(search_session, "CombinedBackends", lambda *_, **__: ScriptedBackends(make))
     patch.setattr(shortage, "used_up", lambda *_: shortage.Shortage())  # it looks at all processes of the machine
     connect = sqlite3.connect
 

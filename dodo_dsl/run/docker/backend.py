@@ -1,103 +1,72 @@
-"""The docker backend: the containers that ``docker compose`` creates, watched by the engine's events."""
+"""The side of a test whose services are containers: ``docker compose`` creates them, the engine's events watch them."""
 
 import asyncio
 import contextlib
-import ipaddress
-import os
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
-from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
-from dodo_dsl.run.announce import begin_frame, hearers
+from dodo_dsl.plan.model import HEALTHY, READY_S
 from dodo_dsl.run.application_time import PAGE_DESTROYED
-from dodo_dsl.run.docker import shared_files
+from dodo_dsl.run.docker import beside_processes, shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
 from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch
-from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, copy_into
-from dodo_dsl.run.docker.pulls import Pulls, Say
+from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into
+from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Snapshot
-from dodo_dsl.run.printed_lines import PrintedLines
-from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
-from dodo_dsl.run.service_output import ServiceOutput
-from dodo_dsl.run.service_protocol import Reports
-from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, one_off, optional
+from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Unstartable
+from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
+from dodo_dsl.run.start_order import LONGEST_S
 from dodo_dsl.spec.model import VIRTUAL
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
-_MEMORY_TURNS, _MEMORY_TURN_S = 20, 0.05
-"""How often, and how long each time, the engine's word is awaited that it was for memory: it may come late."""
-
+_MEMORY_S = 1.0
+"""How long the engine's word is awaited that it was for memory: it may come late."""
 _COPY_S = 600.0
 """The longest that copies of the repository's files may take."""
 _HOST_TURNS, _HOST_TURN_S = 20, 0.05
 """How often, and how long each time, a container's process is looked for on this machine."""
+_OUTPUT_S = 2.0
 
 
-class DockerBackend:
-    """One test as its own compose project; ``subnets`` are tried in turn until the engine accepts one."""
-
-    name = "docker"
-    compose_kind: type[Compose] = Compose
+class ContainerSide:
+    """One test's compose project; ``subnets`` are tried in turn until the engine accepts one."""
 
     def __init__(
-        self,
-        plan: Plan,
-        folder: Path,
-        report: Path,
-        client: Any,
-        pulls: Pulls,
-        project: str,
-        subnets: Iterable[str],
-        say: Say,
-        channel: str = "",
+        self, watched: WatchedServices, compose: Compose, client: Any, pulls: Pulls, subnets: Iterable[str]
     ) -> None:
-        """``channel`` is the folder where services and runner meet, if the engine sees it."""
-        self.plan = plan
-        self.cid = plan.cid
-        self.report = report
-        self.project = project
-        self._folder = folder
+        self._watched = watched
+        self._plan = watched.plan
+        self._compose = compose
         self._client = client
         self._pulls = pulls
         self._subnets = subnets
-        self._say = say
-        self._events: asyncio.Queue[Event] = asyncio.Queue()
-        self._compose = self.compose_kind(plan, folder, report, project, say, channel)
-        self._application = tuple(service.name for service in plan.application.services)
+        self._application = tuple(service.name for service in self._plan.application.services)
         self._containers: dict[str, Any] = {}
         self._use = ContainerUse({})
-        self.lines = PrintedLines(plan, folder, lambda text: self._events.put_nowait(Noted(text)))
-        """What the application's containers print."""
         self._relay: ContainerRelay | None = None
-        self._outputs: dict[str, ServiceOutput] = {}
-        self._reports = Reports(plan, report / "logs", self._events.put_nowait, self._outputs)
         self._out_of_memory: set[str] = set()
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
-        self._watch = EventWatch(self._take, lambda why: self._events.put_nowait(Lost(why)))
-        self._copied, self._copy_problem = asyncio.Event(), ""
-        self._conditions = Conditions(plan.application.services)
-        self._may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
-        self._turns: set[asyncio.Task[None]] = set()
-        """The services of the application that wait for others."""
+        self._events = EventWatch(self._take, lambda why: watched.tell(Lost(why)))
+        self._copied = asyncio.get_running_loop().create_future()
+        """Whether the application has its own copies of the repository's files."""
         self.left_behind = False
 
     @property
-    def is_on_host(self) -> bool:
-        return self.plan.isolation == "host"
+    def _is_on_host(self) -> bool:
+        return self._plan.isolation == "host"
 
-    async def open(self) -> None:
-        if self.plan.clock == VIRTUAL and self.is_on_host:
+    async def open(self, entered: int = 0) -> int:
+        if self._plan.clock == VIRTUAL and self._is_on_host:
             raise BackendError(
                 "clock: virtual needs a network of the test's own where the application runs in containers: "
                 "remove 'isolation: host', or run with --backend process"
@@ -109,59 +78,55 @@ class DockerBackend:
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets)
         await self._start_watching()
+        if self._compose.is_whole:
+            return 0
+        return await asyncio.to_thread(beside_processes.entered, self._containers, self._application)
 
     async def _require_files(self) -> None:
         """Raises BackendError where the engine does not see what the test mounts; once for all tests of a run."""
-        await self._pulls.once(shared_files.IMAGE, self._provide_empty_image)
+        await self._pulls.once(shared_files.IMAGE, lambda: asyncio.to_thread(shared_files.provide_image, self._client))
         paths = self._compose.mounted()
-        others = [str(path) for path in paths if not path.is_relative_to(self._folder)]
-        await self._pulls.once(f"files {self._folder.parent} {others}", lambda: self._look_for(paths))
+        others = [str(path) for path in paths if not path.is_relative_to(self._watched.folder)]
+        await self._pulls.once(f"files {self._watched.folder.parent} {others}", lambda: self._look_for(paths))
 
     async def _open_channel(self) -> None:
         """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
-        folder = self._compose.channel
-        if not self._compose.layers:  # DoDo's services are no containers
+        folder = Path(self._compose.channel)
+        if not self._compose.is_whole:  # DoDo's services are processes
             return
         try:
-            if not self.is_on_host:
-                await self._pulls.once(f"folder {Path(folder).parent}", lambda: self._look_for([Path(folder)]))
-            self._reports.listen(Path(folder))
+            if not self._is_on_host:
+                await self._pulls.once(f"folder {folder.parent}", lambda: self._look_for([folder]))
+            self._watched.reports.listen(folder)
         except BackendError:
             self._compose.channel = ""
         except OSError as error:
             raise BackendError(f"services cannot reach the runner: {error}") from error
 
-    async def _provide_empty_image(self) -> str:
-        await asyncio.to_thread(shared_files.provide_image, self._client)
-        return ""
-
-    async def _look_for(self, paths: Sequence[Path]) -> str:
-        missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self.project)
+    async def _look_for(self, paths: Sequence[Path]) -> None:
+        missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self._compose.project)
         if missing:
             raise BackendError(": ".join(shared_files.problem(missing)))
-        return ""
 
     async def _start_watching(self) -> None:
         from docker.errors import DockerException
 
         try:
-            self._containers = await asyncio.to_thread(self._find_containers)
+            label = {"label": f"{PROJECT_LABEL}={self._compose.project}"}
+            found = await asyncio.to_thread(self._client.containers.list, all=True, filters=label)
+            self._containers = {container.labels[SERVICE_LABEL]: container for container in found}
             self._use = ContainerUse(self._containers, self._application)
             self._require_health()
-            await asyncio.to_thread(self._watch.begin, self._client, self.project)
+            await asyncio.to_thread(self._events.begin, self._client, self._compose.project)
             for name in (SANDBOX, FILES):
                 if name in self._containers:
-                    await asyncio.to_thread(self._start_container, name)
+                    close(await asyncio.to_thread(self._start_container, name))
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot start the test: {engine_error(error)}") from error
 
-    def _find_containers(self) -> dict[str, Any]:
-        found = self._client.containers.list(all=True, filters={"label": f"{PROJECT_LABEL}={self.project}"})
-        return {c.labels[SERVICE_LABEL]: c for c in found}
-
     def _require_health(self) -> None:
         """Raises BackendError where a service waits for the health of another one that has no health check."""
-        for service in self.plan.application.services:
+        for service in self._plan.application.services:
             for other, condition in service.after.items():
                 if condition == HEALTHY and other in self._containers and not healthcheck(self._containers[other]):
                     raise BackendError(
@@ -173,27 +138,28 @@ class DockerBackend:
         if self._is_closing:
             code = int(attributes.get("exitCode", 0)) if action == "die" else 0
             if code > 128 and code != _KILLED:  # process 1 may not hear SIGTERM, and miss a world that has ended
-                self._events.put_nowait(Exited(name, code))
+                self._watched.tell(Exited(name, code))
         elif action == "oom":
             self._take_memory_kill(name)
         elif name == FILES:
-            self._take_of_copies(action)
+            if action in ("health_status: healthy", "die") and not self._copied.done():
+                self._copied.set_result(action != "die")
         elif action == "health_status: healthy":
-            self._conditions.healthy(name)
-            self._events.put_nowait(Ready(name))
+            self._watched.conditions.healthy(name)
+            self._watched.tell(Ready(name))
         elif action == "health_status: unhealthy":
-            self._conditions.unhealthy(name)
-        elif action == "die" and name in self._outputs:
+            self._watched.conditions.unhealthy(name)
+        elif action == "die" and name in self._watched.outputs:
             task = asyncio.ensure_future(self._died(name, int(attributes.get("exitCode", 1))))
             task.add_done_callback(lambda t: t.exception())
         elif action == "die" and name == SANDBOX and attributes.get("exitCode") == str(PAGE_DESTROYED):
             pass  # the clock says it
         elif action == "die":
-            self._events.put_nowait(Lost(f"the test's {name} ended unexpectedly"))
+            self._watched.tell(Lost(f"the test's {name} ended unexpectedly"))
 
     def _take_memory_kill(self, name: str) -> None:
         """Ends a service of which the kernel killed a process for memory, because it may have been a child."""
-        if name in self._outputs and name not in self._out_of_memory:
+        if name in self._watched.outputs and name not in self._out_of_memory:
             self._kills.add(asyncio.ensure_future(asyncio.to_thread(self._kill, name)))
         self._out_of_memory.add(name)
 
@@ -203,187 +169,113 @@ class DockerBackend:
         with contextlib.suppress(DockerException, OSError):  # it has ended
             self._containers[name].kill()
 
-    def _take_of_copies(self, action: str) -> None:
-        if action == "health_status: healthy":
-            self._copied.set()
-        elif action == "die" and not self._copied.is_set():
-            task = asyncio.ensure_future(self._not_copied())
-            task.add_done_callback(lambda t: t.exception())
-
-    async def _not_copied(self) -> None:
-        from docker.errors import DockerException
-
-        said = b""
-        with contextlib.suppress(DockerException, OSError):
-            said = await asyncio.to_thread(self._containers[FILES].logs, tail=1)
-        why = said.decode("utf-8", "replace").strip() or "the program that copies them ended"
-        self._copy_problem = f"the application's files cannot be copied: {why}"
-        self._copied.set()
-
     async def _wait_for_copies(self) -> None:
         """Until the application has its own copies of the repository's files; raises BackendError."""
         if FILES not in self._containers:
             return
-        try:
-            await asyncio.wait_for(self._copied.wait(), _COPY_S)
-        except TimeoutError:
+        await asyncio.wait([self._copied], timeout=_COPY_S)
+        if not self._copied.done():
             hint = "mount large folders read-only (:ro)"
-            raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}") from None
-        if self._copy_problem:
-            raise BackendError(self._copy_problem)
+            raise BackendError(f"the application's files are not copied within {_COPY_S:g} s; {hint}")
+        if not self._copied.result():
+            said = await asyncio.to_thread(_last_line, self._containers[FILES])
+            raise BackendError(f"the application's files cannot be copied: {said or 'the program that does it ended'}")
         await asyncio.to_thread(self._kill, FILES)
 
     async def _died(self, name: str, code: int) -> None:
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
-        await self._reports.ended(name)
-        self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
-        self._conditions.ended(name, code)
+        await self._watched.last_output(name, _OUTPUT_S)
+        if code == _KILLED and name not in self._out_of_memory:
+            await asyncio.sleep(_MEMORY_S)
+            await asyncio.to_thread(self._ask_for_memory_kill, name)
+        self._watched.ended(name, code, name in self._out_of_memory)
 
-    async def _was_out_of_memory(self, name: str, code: int) -> bool:
-        for _ in range(_MEMORY_TURNS):
-            if code != _KILLED or name in self._out_of_memory:
-                break
-            await asyncio.sleep(_MEMORY_TURN_S)
-        else:
-            return await asyncio.to_thread(self._was_killed_for_memory, name)
-        return name in self._out_of_memory
-
-    def _was_killed_for_memory(self, name: str) -> bool:
+    def _ask_for_memory_kill(self, name: str) -> None:
         from docker.errors import DockerException
 
         with contextlib.suppress(DockerException, OSError):
             self._containers[name].reload()
-            return bool(self._containers[name].attrs["State"].get("OOMKilled"))
-        return False
+            if self._containers[name].attrs["State"].get("OOMKilled"):
+                self._out_of_memory.add(name)
 
     async def start(self, layer: str) -> dict[str, bool]:
-        names = [s.name for s in self.plan.layer(layer)]
-        if layer == "application":
-            names = [name for name in self._application if name in self._containers]
-            await asyncio.gather(self._wait_for_copies(), self._connect())
-            self._reports.stop_listening()
-        for name in names:
-            self._outputs[name] = ServiceOutput(
-                self.report / "logs" / f"{layer}.{name}.log",
-                self._line_reader(layer, name),
-                is_cooked=self._prints(name),
-            )
-        waiting = [name for name in names if self._conditions.of(name)]
-        await asyncio.gather(*(self._start(name) for name in names if name not in waiting))
-        self._turns |= {in_turn(self._start_in_turn(name), partial(self._not_started, name)) for name in waiting}
-        reports = {name for name in names if layer != "application" or self._compose.has_healthcheck(name)}
-        ready = ({*waiting} | reports) - self._may_be_ill
-        return {name: name in ready for name in names}
+        names = [service.name for service in self._watched.of(layer)]
+        reports = names
+        if layer == APPLICATION:
+            names = [name for name in names if name in self._containers]
+            reports = [name for name in names if self._compose.has_healthcheck(name)]
+            await self._wait_for_copies()
 
-    async def _connect(self) -> None:
-        """Lets the runner send to services, and on the test's bus; raises BackendError."""
+        async def start(name: str) -> None:
+            await self._start(layer, name)
+
+        return await self._watched.start(names, start, reports, self._patience)
+
+    def _patience(self, name: str) -> dict[str, float]:
+        after = self._watched.conditions.of(name)
+        return {other: health_patience_s(self._containers[other]) for other in after if other in self._containers}
+
+    async def connect(self) -> Send:
         from docker.errors import DockerException
 
         try:
-            own = self._containers.get(RECORDER) or self._containers[self.plan.services[0].name]
-            self._relay = await asyncio.to_thread(ContainerRelay, own, self.cid)
+            own = self._containers.get(RECORDER) or self._containers[self._plan.services[0].name]
+            self._relay = await asyncio.to_thread(ContainerRelay, own, self._plan.cid)
         except (DockerException, OSError, ValueError) as error:
             raise BackendError(f"nothing can be sent to the test's services: {engine_error(error)}") from error
-        self.lines.connect(self._relay.send)
+        return self._relay.send
 
-    def _prints(self, name: str) -> bool:
-        """Whether what a container prints becomes messages."""
-        return name in self.lines.services
-
-    async def _start_in_turn(self, name: str) -> None:
-        """Starts a service of the application when what it waits for is so, and then waits for its own health."""
-        after = self._conditions.of(name)
-        patience = {other: health_patience_s(self._containers[other]) for other in after if other in self._containers}
-        try:
-            why = await self._conditions.unmet(name, patience, lambda text: self._events.put_nowait(Noted(text)))
-        except asyncio.CancelledError:
-            self._outputs[name].release_writer()
-            raise
-        if why:
-            self._not_started(name, why)
-            return
-        await self._start(name)
-        if not self._compose.has_healthcheck(name):
-            self._events.put_nowait(Ready(name))
-            return
-        why = await self._conditions.ill(name, health_patience_s(self._containers[name]))
-        if why and name not in self._may_be_ill:
-            self._events.put_nowait(Unstartable(name, why))
-
-    def _not_started(self, name: str, why: str) -> None:
-        self._outputs[name].release_writer()
-        self._events.put_nowait(Unstartable(name, why))
-        self._conditions.failed(name)
-
-    def _line_reader(self, layer: str, name: str) -> Callable[[bytes], bool]:
-        def on_line(line: bytes) -> bool:
-            if self._prints(name):
-                self.lines.take(name, line)
-            return layer != "application" and self._reports.take(name, line)
-
-        return on_line
-
-    async def _start(self, name: str) -> None:
+    async def _start(self, layer: str, name: str) -> None:
+        """Starts a service; where it waited for others, its own health is awaited, too."""
         from docker.errors import DockerException
 
+        has_terminal = bool(self._containers[name].attrs.get("Config", {}).get("Tty"))
+        output = self._watched.output(layer, name, is_cooked=has_terminal)
         try:
-            stream = await asyncio.to_thread(self._start_container, name)
+            printed = await asyncio.to_thread(self._start_container, name)
         except (DockerException, OSError) as error:
-            self._not_started(name, engine_error(error))
+            output.release_writer()
+            self._watched.not_started(name, engine_error(error))
             return
-        self._conditions.started(name)
-        follow, source = (self._follow, self._containers[name]) if stream is None else (copy_into, stream)
-        threading.Thread(target=follow, args=(source, self._outputs[name].writer), daemon=True).start()
+        self._watched.conditions.started(name)
+        arguments = printed, has_terminal, output.writer
+        threading.Thread(target=copy_into, args=arguments, daemon=True).start()
+        if not self._watched.conditions.of(name):
+            return
+        if not self._compose.has_healthcheck(name):
+            self._watched.tell(Ready(name))
+            return
+        why = await self._watched.conditions.ill(name, health_patience_s(self._containers[name]))
+        if why and name not in self._watched.may_be_ill:
+            self._watched.tell(Unstartable(name, why))
 
     def _start_container(self, name: str, again: bool = False) -> Any:
-        """Starts a container, if need be twice; what it prints, where that becomes messages."""
+        """Starts a container, if need be twice; what it prints."""
         from docker.errors import APIError
 
-        # before its start, because it may end at once; a log comes later than what is attached, and by single bytes
-        stream = attached(self._containers[name]) if self._prints(name) else None
+        printed = attached(self._containers[name])  # before its start, because it may end at once
         try:
             self._containers[name].start()
         except APIError as error:
+            close(printed)
             if again or not TOO_SLOW.search(engine_error(error)):
                 raise
             self._note(f"the container of '{name}' is started once more: {engine_error(error)}")
             return self._start_container(name, again=True)
-        return stream
-
-    @staticmethod
-    def _follow(container: Any, writer: int) -> None:
-        """Copies a container's output into the pipe of its Output; runs in its own thread.
-
-        It ends with the container, or when nobody reads the pipe any more.
-        """
-        with contextlib.suppress(Exception), contextlib.closing(container.logs(stream=True, follow=True)) as chunks:
-            for chunk in chunks:
-                os.write(writer, chunk)
-        with contextlib.suppress(OSError):
-            os.close(writer)
-
-    async def next_event(self) -> Event:
-        return await self._events.get()
+        return printed
 
     async def listeners(self) -> Collection[str] | None:
-        return await asyncio.to_thread(self._use.listeners, self._application, self.cid)
+        return await asyncio.to_thread(self._use.listeners, self._application, self._plan.cid)
 
-    async def require_own_host(self) -> None:
-        """Raises BackendError where the test is on the network of a host that is not this machine.
+    async def beginning(self) -> Collection[int]:
+        """None, as DoDo's services do not see them; raises on the network of a host that is not this machine.
 
         The engine shows a service that has just ended as a process that is not here, so it is asked again.
         """
         for _ in range(_HOST_TURNS):
-            if not self.is_on_host or await self.application() is not None:
-                return
+            if not self._is_on_host or await self.application() is not None:
+                return ()
             await asyncio.sleep(_HOST_TURN_S)
         raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
-
-    async def begin(self) -> None:
-        await self.require_own_host()
-        assert self._relay is not None, "the application was started"
-        self._relay.send(begin_frame(self.plan.seed), hearers(self.plan))
 
     async def use(self) -> Snapshot | None:
         return await asyncio.to_thread(self._use.take)
@@ -393,45 +285,40 @@ class DockerBackend:
 
     async def close(self, keep: bool) -> list[str]:
         self._is_closing = True
-        for turn in self._turns:
-            turn.cancel()
-        await asyncio.gather(*self._turns, return_exceptions=True)
         kept = []
         if keep and self._containers:
             kept = self._kept()
         else:
             await asyncio.to_thread(self._take_down)
-        self._watch.close()
+        self._events.close()
         if self._relay is not None:
             self._relay.close()
-        self._reports.close()
-        for output in self._outputs.values():
-            output.close()
         return kept
 
     def _take_down(self) -> None:
-        report = (writers(self.plan), self.report)
-        self.left_behind = not take_down(self._client, self.project, self._containers, report, self._note)
+        report = (writers(self._plan), self._watched.report)
+        self.left_behind = not take_down(self._client, self._compose.project, self._containers, report, self._note)
 
     def _note(self, text: str) -> None:
         """Reports a sentence at once, and with the outcome; may be called from any thread."""
-        self._say(text)
-        self._watch.call_in_loop(self._events.put_nowait, Noted(text))
+        self._compose.say(text)
+        self._events.call_in_loop(self._watched.note, text)
 
     def _kept(self) -> list[str]:
-        compose = f"docker compose -p {self.project}"
+        compose = f"docker compose -p {self._compose.project}"
         return [
-            f"{self.plan.slug} is kept running as compose project {self.project}",
+            f"{self._plan.slug} is kept running as compose project {self._compose.project}",
             f"look inside:  {compose} ps;  {compose} logs camera;  {compose} exec {SANDBOX} bash",
             f"take it down: {compose} down -v",
         ]
 
-    def tail(self, service: str) -> list[str]:
-        output = self._outputs.get(service)
-        return output.tail() if output else []
 
-    def unmatched(self) -> tuple[Unmatched, ...]:
-        return self.lines.unmatched({name: output.unfinished for name, output in self._outputs.items()})
+def _last_line(container: Any) -> str:
+    from docker.errors import DockerException
+
+    with contextlib.suppress(DockerException, OSError):
+        return str(container.logs(tail=1).decode("utf-8", "replace").strip())
+    return ""
 
 
 def healthcheck(container: Any) -> dict[str, Any]:
@@ -446,16 +333,3 @@ def health_patience_s(container: Any) -> float:
     interval, timeout = (((check.get(key) or 0) / 1e9) or 30.0 for key in ("Interval", "Timeout"))
     tries = (check.get("StartPeriod") or 0) / 1e9 + (check.get("Retries") or 3) * (interval + timeout)
     return min(tries + READY_S, LONGEST_S)
-
-
-def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
-    """The planned subnet, then the rest of the deployment's of the same size."""
-    yield first
-    length = int(first.partition("/")[2]) if first else 32
-    seen = {first}
-    for text in all_subnets:
-        network = ipaddress.IPv4Network(text)
-        same = str(network.supernet(new_prefix=length)) if length < network.prefixlen else text
-        if same not in seen:
-            seen.add(same)
-            yield same

@@ -12,6 +12,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +26,15 @@ from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.plan.added_services import RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
+from dodo_dsl.run.docker.beside_processes import without_own
 from dodo_dsl.run.docker.builds import HiddenContext, is_built, own_contexts, private_images
 from dodo_dsl.run.docker.mounts import Bind, absent, binds, long_form, masks, over, whole
-from dodo_dsl.run.docker.pulls import Pulls, Say, image_hints
+from dodo_dsl.run.docker.pulls import Pulls, image_hints
 from dodo_dsl.run.hidden_paths import hidden_paths
-from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.process.commands import needed_paths
+from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.rigs.permission import known_ports
+from dodo_dsl.run.sides import APPLICATION
 
 
 def traced(plan: Plan, text: str) -> str:
@@ -58,25 +62,31 @@ _OVERLAP = "overlaps"
 _YIELDING = ("nice", "-n", "10")  # set-up must not slow down tests that already run
 
 
+_LAYERS = tuple(layer for layer in LAYERS if layer != APPLICATION)
+
+
+@dataclass
 class Compose:
-    """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``."""
+    """The test compiled into ``folder`` as a project; ``services`` are the application's after ``read``.
 
-    layers: Sequence[str] = [layer for layer in LAYERS if layer != "application"]
-    """Those whose compiled files have a part in it."""
+    If it ``is_whole``, DoDo's services are containers of it, else processes beside it. ``channel`` is the folder where
+    services and runner meet, empty if that is a volume.
+    """
 
-    def __init__(self, plan: Plan, folder: Path, report: Path, project: str, say: Say, channel: str = "") -> None:
-        """``channel`` is the folder where services and runner meet, empty if that is a volume."""
-        self.plan = plan
-        self.folder = folder
-        self.report = report
-        self.project = project
-        self.services: dict[str, Any] = {}
-        self.channel = channel
-        self._application = plan.application.compose
-        self._say = say
-        self._paths = application_paths(plan.application, folder)
-        self._binds: dict[str, list[Bind]] = {}
-        self._outside: dict[str, str] = {}
+    plan: Plan
+    folder: Path
+    report: Path
+    project: str
+    say: Say
+    channel: str = ""
+    is_whole: bool = True
+    services: dict[str, Any] = field(init=False)
+    _binds: dict[str, list[Bind]] = field(init=False)
+    _outside: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._application = self.plan.application.compose
+        self._paths = application_paths(self.plan.application, self.folder)
 
     def read(self) -> None:
         """Fills ``services``; raises BackendError."""
@@ -93,12 +103,11 @@ class Compose:
         self._binds = {name: list(binds(each, self.folder)) for name, each in mounting.items()}
         self._require_own()
 
-    async def require_plugin(self) -> str:
-        """Raises BackendError where the docker command cannot compose; else nothing is to be said."""
-        code, _, _ = await self.run("version")
+    async def require_plugin(self) -> None:
+        """Raises BackendError where the docker command cannot compose."""
+        code, _ = await self.run("version")
         if code:
             raise BackendError(f"the docker command has no 'compose' of version 2: {advice.docker_plugin('compose')}")
-        return ""
 
     def _require_own(self) -> None:
         """Raises BackendError if a path of the application leads elsewhere than when the test was compiled."""
@@ -131,7 +140,7 @@ class Compose:
         """What containers mount of this machine; what is compiled stands as one file."""
         sources = {Path(bind.source) for each in self._binds.values() for bind in each}
         reads_files = self.plan.messages or any(f.kind == "path" for s in self.plan.services for f in s.flags)
-        own = [self.folder / PLAN_FILE] if self.layers and reads_files else []
+        own = [self.folder / PLAN_FILE] if self.is_whole and reads_files else []
         return [*own, *sorted(path for path in sources if path.exists())]
 
     def has_healthcheck(self, name: str) -> bool:
@@ -148,8 +157,8 @@ class Compose:
             for s in self.plan.application.services
             if s.name in self.services and not s.process
         }
-        for note in await pulls.provide(self._own_images(), foreign, self._say, ways | image_hints(self.plan)):
-            self._say(note)
+        for note in await pulls.provide(self._own_images(), foreign, self.say, ways | image_hints(self.plan)):
+            self.say(note)
         for name, image in private.items():
             self.services[name]["image"] = image
         built = {name: service for name, service in self.services.items() if is_built(service)}
@@ -158,12 +167,14 @@ class Compose:
             await pulls.once(key, lambda: self._build(built))
 
     def _own_images(self) -> set[str]:
+        if not self.is_whole:
+            return set()
         sandbox = {self.plan.sandbox_image} if self.plan.isolation == "network" or self.plan.application.copies else ()
         return {service.image for service in self.plan.services}.union(sandbox)
 
-    async def _build(self, services: Mapping[str, Any]) -> str:
+    async def _build(self, services: Mapping[str, Any]) -> None:
         """Builds images in a project that all tests have in common, from folders without what is hidden."""
-        self._say(f"building {', '.join(services)}")
+        self.say(f"building {', '.join(services)}")
         log = self.report / "logs" / "build.log"
         self.report.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".build-", dir=self.report) as name:
@@ -175,11 +186,10 @@ class Compose:
             file = copies / "builds.compose.json"
             secrets = self._application.get("secrets") or {}
             _write(file, {"services": builds, "secrets": secrets})
-            code, _, problem = await self.run("build", files=[str(file)], log=log, project=_BUILD_PROJECT)
+            code, problem = await self.run("build", files=[str(file)], log=log, project=_BUILD_PROJECT)
         if code:
             where = f"{log.parent.name}/{log.name} of the test in the report"
             raise BackendError(f"the application's images cannot be built: {problem}; see {where}")
-        return ""
 
     async def create(self, subnets: Iterable[str]) -> None:
         """Creates network, volumes and containers, with the first subnet that is not in use; raises BackendError."""
@@ -191,9 +201,9 @@ class Compose:
         with tempfile.TemporaryDirectory(prefix="dodo-compose-") as folder:
             own = Path(folder) / "application.compose.json"
             _write(own, document)
-            files = [*(f"{layer}.compose.yml" for layer in self.layers), str(own)]
+            files = [*(f"{layer}.compose.yml" for layer in _LAYERS), str(own)]
             for subnet in subnets:
-                code, _, problem = await self.run("create", "--no-build", "--pull", "never", files=files, subnet=subnet)
+                code, problem = await self.run("create", "--no-build", "--pull", "never", files=files, subnet=subnet)
                 if not code or _OVERLAP not in problem:
                     break
         if code:
@@ -206,7 +216,7 @@ class Compose:
         if any(path.is_file() for path in hidden):
             empty.touch()
         meets = {"volumes": [{"type": "bind", "source": escaped(self.channel), "target": CHANNEL}]}
-        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel}
+        services: dict[str, Any] = {s.name: meets for s in self.plan.services if self.channel and self.is_whole}
         for name, mounted in self._binds.items():
             lie_over = masks(mounted, hidden, empty) + absent(mounted, self._paths, always=name == FILES)
             service = {key: value for key, value in self.services.get(name, {}).items() if key != "build"}
@@ -214,12 +224,16 @@ class Compose:
             services[name] = service | ({"volumes": volumes} if volumes else {})
             if name in self.services:
                 services[name]["image"] = escaped(service["image"])
-        return {**self._application, "services": services}
+        made = {**self._application, "services": services}
+        if self.is_whole:
+            return made
+        needed = [*needed_paths(self.plan, self.folder, self.report), Path(self.channel)]
+        return without_own(made, self.plan, needed)
 
     async def run(
         self, *words: str, files: Sequence[str] = (), subnet: str = "", log: Path | None = None, project: str = ""
-    ) -> tuple[int, str, str]:
-        """Exit code, standard output and the last line of standard error of a compose command."""
+    ) -> tuple[int, str]:
+        """Exit code and the last line of standard error of a compose command."""
         own = {"COMPOSE_PROGRESS": "plain", "COMPOSE_PROJECT_NAME": project or self.project, RUNNER_VARIABLE: "dodo"}
         environment = {**secret_variables.of_client(os.environ), **self._outside, **own}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_ENV_FILES"):
@@ -242,4 +256,4 @@ class Compose:
         if log is not None:
             atomic.write_bytes(log, out + err)
         errors = [line for line in err.decode("utf-8", "replace").splitlines() if line.strip()]
-        return process.returncode or 0, out.decode("utf-8", "replace"), errors[-1].strip() if errors else ""
+        return process.returncode or 0, errors[-1].strip() if errors else ""

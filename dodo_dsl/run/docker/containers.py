@@ -1,54 +1,34 @@
-"""Tests in containers; apart from the other backends, because its libraries take long to load.
-
-Cameras that containers of DoDo's cannot have are refused.
-"""
+"""Containers for the tests of a run, on an engine; apart from processes, because its libraries take long to load."""
 
 import asyncio
 import contextlib
+import ipaddress
 import secrets
-from collections.abc import AsyncIterator, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
-from dodo_dsl.run.backends import Job, Say
 from dodo_dsl.run.docker import cleanup
-from dodo_dsl.run.docker.backend import DockerBackend, other_subnets
+from dodo_dsl.run.docker.backend import ContainerSide
 from dodo_dsl.run.docker.client import connect
+from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.pulls import Pulls
-from dodo_dsl.run.process import host_isolation
-from dodo_dsl.run.process.slot import meeting_place
-from dodo_dsl.run.protocol import Backend, BackendError
-from dodo_dsl.run.rigs.permission import refuse_unattended
-from dodo_dsl.run.rigs.session import attended
+from dodo_dsl.run.process.slot import Slot
+from dodo_dsl.run.protocol import BackendError, Say
+from dodo_dsl.run.sides import Side, WatchedServices
 from dodo_dsl.spec.rig import CAMERA_SOURCE, RPICAM
 
 _FLAG = CAMERA_SOURCE.rpartition(".")[2]
 
 
-def refuse_rpicam(plan: Plan) -> None:
-    """Raises BackendError where a service takes pictures by ``rpicam-vid``, a program of the rig's computer."""
-    for service in plan.services:
-        if any((flag.name, flag.value) == (_FLAG, RPICAM) for flag in service.flags):
-            raise BackendError(
-                f"service '{service.name}' needs the program rpicam-vid of the rig's computer, which containers do not "
-                "have: use --backend mixed or process"
-            )
-
-
-_Kind = TypeVar("_Kind", bound=DockerBackend)
-
-
 class Containers:
-    """Containers of a Docker engine, each test its own compose project."""
+    """Each test's are a compose project; if it ``is_whole``, DoDo's services are among them."""
 
-    name = "docker"
-
-    def __init__(self, subnets: Sequence[str], roots: Sequence[Path] = ()) -> None:
+    def __init__(self, subnets: Sequence[str], is_whole: bool) -> None:
         self._subnets = subnets
-        self._roots = roots
+        self._is_whole = is_whole
         self._client: Any = None
         self._pulls: Pulls | None = None
         self._problem = ""
@@ -69,37 +49,48 @@ class Containers:
     def close(self) -> None:
         """Does nothing: only the tests' own containers run, and each test removes them."""
 
-    @contextlib.asynccontextmanager
-    async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
-        plan = job.plan
-        refuse_rpicam(plan)
-        with meeting_place(job.work, keep) as channel, self.project(DockerBackend, job, say, channel) as backend:
-            Path(channel).chmod(0o777)  # for users of images; the folder around it is closed
-            if plan.isolation == "network" and not plan.is_real:
-                yield backend
-                return
-            async with (
-                host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
-                attended(plan, replace(slot, channel=channel), say, self._roots),
-            ):
-                yield backend
+    def problem(self, plan: Plan, _isolation: str) -> str:
+        """Why a test cannot run here, in a sentence; empty if it can."""
+        return (unfit_camera(plan) if self._is_whole else "") or self._problem
 
     @contextlib.contextmanager
-    def project(self, kind: type[_Kind], job: Job, say: Say, channel: str = "") -> Iterator[_Kind]:
-        """A backend of a kind with its own project, and the project's lease; raises BackendError.
-
-        ``channel`` is the folder where services and runner meet, if the engine sees it.
-        """
-        if self._client is None or self._pulls is None:
-            raise BackendError(self._problem)
-        plan = job.plan
-        refuse_unattended(plan)
+    def side(self, watched: WatchedServices, slot: Slot, _isolation: str, say: Say) -> Iterator[Side]:
+        """One with its own project, and the project's lease."""
+        if self._is_whole:
+            Path(slot.channel).chmod(0o777)  # for users of images; the folder around it is closed
+        assert self._pulls is not None, "there is no problem"
+        plan = watched.plan
         project = f"dodo-{plan.slug}-{secrets.token_hex(3)}"
         lease = leases.try_lease(f"{leases.PROJECT}{project}", {"test": plan.slug})
         assert lease is not None, "a fresh name is free"
+        compose = Compose(plan, watched.folder, watched.report, project, say, slot.channel, self._is_whole)
         subnets = other_subnets(plan.subnet, self._subnets)
-        backend = kind(plan, job.folder, job.report, self._client, self._pulls, project, subnets, say, channel)
+        side = ContainerSide(watched, compose, self._client, self._pulls, subnets)
         try:
-            yield backend
+            yield side
         finally:
-            lease.leave() if backend.left_behind else lease.release()
+            lease.leave() if side.left_behind else lease.release()
+
+
+def unfit_camera(plan: Plan) -> str:
+    """Which service takes pictures by ``rpicam-vid``, a program of the rig's computer, in a sentence; else empty."""
+    for service in plan.services:
+        if any((flag.name, flag.value) == (_FLAG, RPICAM) for flag in service.flags):
+            return (
+                f"service '{service.name}' needs the program rpicam-vid of the rig's computer, which containers do not "
+                "have: use --backend mixed or process"
+            )
+    return ""
+
+
+def other_subnets(first: str, all_subnets: Iterable[str]) -> Iterator[str]:
+    """The planned subnet, then the rest of the deployment's of the same size."""
+    yield first
+    length = int(first.partition("/")[2]) if first else 32
+    seen = {first}
+    for text in all_subnets:
+        network = ipaddress.IPv4Network(text)
+        same = str(network.supernet(new_prefix=length)) if length < network.prefixlen else text
+        if same not in seen:
+            seen.add(same)
+            yield same

@@ -1,7 +1,4 @@
-"""The events of one compose project on an engine, watched in a thread, and the start of its test, announced.
-
-Services hear of the start through their sandbox container, or on the host.
-"""
+"""The events of one compose project on an engine, watched in a thread."""
 
 import asyncio
 import contextlib

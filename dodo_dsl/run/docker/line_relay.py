@@ -4,7 +4,7 @@ import contextlib
 import os
 import socket
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, BinaryIO
 
 from dodo_dsl.opendlv.relay import BUS
 
@@ -15,17 +15,18 @@ _HEADER_BYTES = 8
 """Before each piece of a program's output without a terminal; the last four are its length."""
 
 
-def attached(container: Any) -> socket.socket:
-    """What a container with a terminal prints, from its start on; raises DockerException and OSError."""
-    return _socket(container.attach_socket(params={"stdout": 1, "stderr": 1, "stream": 1}))
+def attached(container: Any) -> Any:
+    """What a container prints from its start on, to be closed; raises DockerException and OSError."""
+    return container.attach_socket(params={"stdout": 1, "stderr": 1, "stream": 1})
 
 
-def copy_into(stream: socket.socket, writer: int) -> None:
+def copy_into(answer: Any, is_terminal: bool, writer: int) -> None:
     """Copies output into a pipe, until the container ends or nobody reads the pipe; then closes both."""
-    with contextlib.suppress(OSError), stream:
-        while data := stream.recv(_CHUNK):
+    with contextlib.suppress(OSError), _socket(answer).makefile("rb") as output:
+        while data := output.read1(_CHUNK) if is_terminal else _piece(output):
             while data:
                 data = data[os.write(writer, data) :]
+    close(answer)
     with contextlib.suppress(OSError):
         os.close(writer)
 
@@ -39,18 +40,20 @@ class ContainerRelay:
     def __init__(self, container: Any, cid: int) -> None:
         api = container.client.api
         self._exec = api.exec_create(container.id, [*_COMMAND, str(cid)], stdin=True, stdout=True, stderr=True)["Id"]
-        self._stream = _socket(api.exec_start(self._exec, socket=True))
+        self._answer = api.exec_start(self._exec, socket=True)
+        self._stream = _socket(self._answer)
         self._stream.settimeout(_START_S)
         try:
             self._await_start()
         except (OSError, ValueError):
-            self._stream.close()
+            self.close()
             raise
 
     def _await_start(self) -> None:
         data = b""
-        while not data.endswith(b"\n") and (header := self._stream.recv(_HEADER_BYTES, socket.MSG_WAITALL)):
-            data += self._stream.recv(int.from_bytes(header[4:], "big"), socket.MSG_WAITALL)
+        with self._stream.makefile("rb") as output:
+            while not data.endswith(b"\n") and (piece := _piece(output)):
+                data += piece
         said = " ".join(data.decode("utf-8", "replace").split())
         if said != "ready":
             raise ValueError(f"the program that sends it says '{said[:200]}'")
@@ -61,11 +64,23 @@ class ContainerRelay:
             self._stream.sendall(" ".join([*to, f"{data.hex()}\n"]).encode())
 
     def close(self) -> None:
-        self._stream.close()
+        close(self._answer)
 
 
-def _socket(found: Any) -> socket.socket:
-    """The socket of an answer of the engine, which the docker package wraps."""
-    inner = getattr(found, "_sock", found)
-    assert isinstance(inner, socket.socket), "the engine is reached by a local socket"
+def _socket(answer: Any) -> socket.socket:
+    """The socket of an answer of the engine, which the docker package wraps unless it is TLS."""
+    inner = getattr(answer, "_sock", answer)
+    assert isinstance(inner, socket.socket), "the engine is reached by a socket"
     return inner
+
+
+def close(answer: Any) -> None:
+    """Closes the socket of an answer of the engine, and the response, which holds it open."""
+    _socket(answer).close()
+    if (response := getattr(answer, "_response", None)) is not None:
+        response.close()
+
+
+def _piece(output: BinaryIO) -> bytes:
+    """Of what a program without a terminal prints; empty at its end."""
+    return output.read(int.from_bytes(output.read(_HEADER_BYTES)[4:], "big"))

@@ -13,10 +13,9 @@ from typing import Any
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.process.commands import own_module
-from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.spec.deployment import build_command
 
-Say = Callable[[str], None]
 _UNKNOWN = "unknown"
 """Of an image that does not say what it is for."""
 _SMALLER = {"amd64": "386", "arm64": "arm"}
@@ -28,7 +27,7 @@ class Pulls:
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self._tasks: dict[str, asyncio.Task[str]] = {}
+        self._tasks: dict[str, asyncio.Task[str | None]] = {}
         self._interrupted = threading.Event()
         self._hints: dict[str, str] = {}
 
@@ -46,7 +45,7 @@ class Pulls:
         notes = [note for note in await asyncio.gather(*waits) if note]
         return notes + await asyncio.to_thread(self._foreign, [*ours, *theirs])
 
-    async def _pull_once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str:
+    async def _pull_once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str | None:
         return await self.once(image, lambda: self._in_thread(work, image, say))
 
     async def _in_thread(self, work: Callable[[str, Say], str], image: str, say: Say) -> str:
@@ -57,7 +56,7 @@ class Pulls:
             self._interrupted.set()
             raise
 
-    async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str]]) -> str:
+    async def once(self, key: str, work: Callable[[], Coroutine[Any, Any, str | None]]) -> str | None:
         """Does work once for all tests of the run; later callers wait for the first.
 
         Failed work is forgotten, so that a retried test repeats it.
@@ -68,7 +67,7 @@ class Pulls:
             task.add_done_callback(lambda done: self._forget_failed(key, done))
         return await asyncio.shield(task)
 
-    def _forget_failed(self, key: str, task: "asyncio.Task[str]") -> None:
+    def _forget_failed(self, key: str, task: "asyncio.Task[str | None]") -> None:
         if task.cancelled() or task.exception() is not None:
             del self._tasks[key]
 

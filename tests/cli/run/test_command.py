@@ -88,7 +88,7 @@ def dodo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Command]:
     def backends(*_: object) -> ScriptedBackends:
         return ScriptedBackends(lambda tested, _: made.backend(tested, made.stages))
 
-    monkeypatch.setattr(cli_run, "Processes", backends)
+    monkeypatch.setattr(cli_run, "CombinedBackends", backends)
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     yield made
     for number, handler in before.items():

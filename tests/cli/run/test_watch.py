@@ -65,7 +65,7 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     shutil.copytree(ROOT / "examples/kiwi", tmp_path / "kiwi", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: kiwi/docker-compose.yml\n")
     made = Desk(tmp_path)
-    monkeypatch.setattr(run, "Processes", lambda *_: ScriptedBackends(made.backend))
+    monkeypatch.setattr(run, "CombinedBackends", lambda *_: ScriptedBackends(made.backend))
     given = options("--watch", "--clock", "lockstep", "--isolation", "host", "--report", "report")
     with work_folder() as folder:
         made.watch = Watch(given, folder, made.stdout)

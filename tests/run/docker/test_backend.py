@@ -1,17 +1,19 @@
 """What the backend makes of the ends of containers."""
 
 import asyncio
+import socket
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
-from unittest import mock
+from typing import Any, cast
 
 import pytest
 from docker.errors import APIError
 
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.docker.backend import DockerBackend
+from dodo_dsl.run.docker.backend import ContainerSide
+from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.protocol import Event, Exited, Noted, Ready, Unstartable
+from dodo_dsl.run.sides import WatchedServices
 from tests.run.scripted import plan
 
 NOBODY: Any = None
@@ -19,17 +21,15 @@ NOBODY: Any = None
 
 def test_a_crash_upon_the_end_is_reported(tmp_path: Path) -> None:
     async def ends() -> list[Event]:
-        backend = DockerBackend(plan("t"), tmp_path, tmp_path, NOBODY, NOBODY, "dodo-t", [], print)
-        backend._is_closing = True
+        watched = WatchedServices(plan("t"), tmp_path, tmp_path)
+        side = ContainerSide(watched, NOBODY, NOBODY, NOBODY, [])
+        side._is_closing = True
         for code in (0, 1, 134, 137, 139, 143):
-            backend._take(f"app{code}", "die", {"exitCode": str(code)})
-        backend._take("app", "oom", {})
-        return [backend._events.get_nowait() for _ in range(backend._events.qsize())]
+            side._take(f"app{code}", "die", {"exitCode": str(code)})
+        side._take("app", "oom", {})
+        return [watched.events.get_nowait() for _ in range(watched.events.qsize())]
 
     assert asyncio.run(ends()) == [Exited("app134", 134), Exited("app139", 139), Exited("app143", 143)]
-
-
-CHECK = {"test": ["CMD", "false"]}
 
 
 class Container:
@@ -37,14 +37,16 @@ class Container:
 
     def __init__(self, *problems: str, config: str = "Config") -> None:
         self.problems = [*problems]
-        self.attrs: dict[str, Any] = {config: {"Healthcheck": {"Test": CHECK["test"]}}}
+        self.attrs: dict[str, Any] = {config: {"Healthcheck": {"Test": ["CMD", "false"]}}}
 
     def start(self) -> None:
         if self.problems:
             raise APIError("", None, self.problems.pop(0))
 
-    def logs(self, **_: object) -> Any:
-        return SimpleNamespace(__iter__=lambda: iter(()), close=lambda: None)
+    def attach_socket(self, **_: object) -> Any:
+        ours, theirs = socket.socketpair()
+        theirs.close()
+        return SimpleNamespace(_sock=ours, _response=ours)
 
 
 def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] = (), **others: Container) -> Any:
@@ -52,18 +54,18 @@ def in_turn(folder: Path, *statuses: tuple[str, str], optional: tuple[str, ...] 
     services = (ApplicationService("app", after={"db": "service_healthy"}, optional=optional), ApplicationService("db"))
 
     async def started() -> tuple[dict[str, bool], list[Event]]:
-        tested = plan("t", application=Application(".", services))
-        backend = DockerBackend(tested, folder, folder, NOBODY, NOBODY, "dodo-t", [], print)
-        backend._containers = {"app": Container(), "db": Container(), **others}
-        backend._compose.services = {name: {"healthcheck": CHECK} for name in ("app", "db")}
-        with mock.patch.object(backend, "_connect"):  # nobody is to be told of the begin
-            waits = await backend.start("application")
+        watched = WatchedServices(plan("t", application=Application(".", services)), folder, folder)
+        has_check = SimpleNamespace(has_healthcheck=lambda _: True, project="dodo-t", say=print)
+        side = ContainerSide(watched, cast(Compose, has_check), NOBODY, NOBODY, [])
+        side._containers = {"app": Container(), "db": Container(), **others}
+        waits = await side.start("application")
         for name, status in statuses:
-            backend._take(name, f"health_status: {status}", {})
-        await asyncio.wait(backend._turns)
+            side._take(name, f"health_status: {status}", {})
+        await asyncio.wait(watched.turns)
         await asyncio.sleep(0)  # for what is called when they are done
-        events = [await backend.next_event() for _ in range(backend._events.qsize())]
-        await backend.close(keep=True)
+        events = [await watched.events.get() for _ in range(watched.events.qsize())]
+        await side.close(keep=True)
+        watched.close()
         return waits, events
 
     return asyncio.run(asyncio.wait_for(started(), 20.0))

@@ -13,13 +13,15 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
-from dodo_dsl.run.docker.backend import DockerBackend
+from dodo_dsl.run.docker.backend import ContainerSide
 from dodo_dsl.run.docker.container_use import ContainerUse
-from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.protocol import BackendError
+from dodo_dsl.run.sides import WatchedServices
 from tests.run.helpers import Bench
 from tests.run.load.test_service_use import Proc
+
+NOBODY: Any = None
 
 
 class Container:
@@ -80,9 +82,9 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
 
     async def begin() -> None:
         plan = replace(Bench(tmp_path).plan(), isolation=isolation)
-        backend = DockerBackend(plan, tmp_path, tmp_path, None, Pulls(None), "p", (), print, b"")
-        backend._use = ContainerUse({"app": Changing("c0ffee", 0)}, proc=proc.root)
-        await backend.require_own_host()
+        side = ContainerSide(WatchedServices(plan, tmp_path, tmp_path), NOBODY, NOBODY, NOBODY, ())
+        side._use = ContainerUse({"app": Changing("c0ffee", 0)}, proc=proc.root)
+        await side.beginning()
 
     refused = pytest.raises(BackendError, match=r"another machine.*use --isolation network")
     with refused if (isolation, pids) == ("host", [11]) else contextlib.nullcontext():

@@ -48,7 +48,7 @@ def test_without_images_of_dodo(
         return engine
 
     monkeypatch.setattr("dodo_dsl.run.docker.client.connect", connect)
-    monkeypatch.setattr("dodo_dsl.run.mixed.may_enter", lambda: root)
+    monkeypatch.setattr(run, "may_enter", lambda: root)
     assert run.choose_backend([plan(application=IMAGE, services=OWN)]) == backend
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.run.mixed import covers, uncovered
+from dodo_dsl.run.docker.beside_processes import covers, uncovered
 
 
 @pytest.mark.parametrize("own", [{"Mounts": [{"Destination": "/dev/shm"}]}, {"HostConfig": {"Tmpfs": {"/dev": ""}}}])

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run import engine, start_order
+from dodo_dsl.run import engine
 from tests.run.desk import processes_with
 from tests.run.helpers import AFTER_START, BEGUN, PASS, READY, STARTED, WAIT, Bench
 
@@ -31,26 +31,6 @@ def bench(request: pytest.FixtureRequest, host: Bench) -> Bench:
     return host
 
 
-DECISIONS = {
-    "passes": ({}, "passed", "it drove"),
-    "application-crashes": (
-        {"application": "print('cone lost'); raise SystemExit(7)", "judge": READY + WAIT},
-        "failed",
-        "application service 'app' ended with exit code 7 after",
-    ),
-    "service-is-killed": (
-        {"environment": READY + "os.kill(os.getpid(), 9)", "judge": READY + WAIT},
-        "error",
-        "service 'camera' of layer environment was killed by SIGKILL",
-    ),
-    "application-says-that-it-passed": (
-        {"application": PASS + WAIT, "judge": READY + WAIT, "timeout_s": 0.5},
-        "error",
-        "evaluator 'judge' gave no verdict within the timeout of 0.5 s",
-    ),
-}
-
-
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="this kernel counts no waits")
 def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
     """The application's part is that of a process which it has started, and which has ended before the test does."""
@@ -63,59 +43,6 @@ def test_what_application_and_services_used_is_measured(bench: Bench) -> None:
     assert (outcome.outcome, load.cores) == ("passed", len(os.sched_getaffinity(0)))
     assert (load.application.longest, load.services.longest in ("camera", "judge")) == ("app", True)
     assert load.application.ran_s > 0.2 > load.services.ran_s > 0.0
-
-
-def test_what_processes_do_decides(host: Bench) -> None:
-    """Exits, signals and lines of output reach the engine; all tests at once."""
-    plans = [host.plan(**parts, slug=slug) for slug, (parts, _, _) in DECISIONS.items()]
-    outcomes = {outcome.slug: outcome for outcome in host.run(*plans)}
-    for slug, (_, expected, reason) in DECISIONS.items():
-        assert (outcomes[slug].outcome, outcomes[slug].reason[: len(reason)]) == (expected, reason)
-    assert outcomes["application-crashes"].last_lines == ("cone lost",)
-    assert host.log(plans[1], "application.app") == "cone lost\n"
-
-
-IN_TURN = {
-    "in-turn": ("pass", "passed", "it drove"),
-    "not-in-turn": (
-        "raise SystemExit(3)",
-        "failed",
-        "application service 'init' ended with exit code 3 during set-up, before the test was decided; 'app' waits "
-        "for it to end with exit code 0",
-    ),
-    "optional": ("raise SystemExit(3)", "passed", "it drove"),
-    "never": (
-        WAIT,
-        "error",
-        "service 'app' could not be started: it waits for 'init' to end with exit code 0 (depends_on), and it did not "
-        "within 2 s",
-    ),
-}
-
-
-def test_services_start_when_those_for_which_they_wait_have_ended(host: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(start_order, "LONGEST_S", 2.0)
-    plans = []
-    for slug, (last, _, _) in IN_TURN.items():
-        mark = host.folder / f"{slug}-mark"
-        app = f"assert os.path.exists({str(mark)!r}), 'too early'\n" + STARTED + WAIT
-        plan = host.plan(application=app, judge=READY + BEGUN + PASS, slug=slug)
-        script = host.script(f"{slug}-init", f"import time; time.sleep(0.5); open({str(mark)!r}, 'w').close(); {last}")
-        (service,) = plan.application.services
-        services = (
-            replace(
-                service,
-                after={"other": "service_healthy", "init": "service_completed_successfully"},
-                optional=("init",) if slug == "optional" else (),
-            ),
-            ApplicationService("init", script),
-            ApplicationService("other", host.script(f"{slug}-other", WAIT)),
-        )
-        plans.append(replace(plan, application=replace(plan.application, services=services)))
-    outcomes = {outcome.slug: outcome for outcome in host.run(*plans)}
-    assert {slug: (o.outcome, o.reason) for slug, o in outcomes.items()} == {k: v[1:] for k, v in IN_TURN.items()}
-    told = "it waits for 'init' to end with exit code 0 (depends_on, required: false), which ended with exit code 3"
-    assert f"service 'app' starts all the same: {told}" in outcomes["optional"].notes
 
 
 GONE = """#!/bin/sh

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.backend import ProcessBackend
+from dodo_dsl.run.process.backend import ProcessSide
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.service_protocol import Reports
+from dodo_dsl.run.sides import WatchedServices
 from tests.run.scripted import plan
 
 
@@ -41,8 +42,8 @@ def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setenv("SSH_AUTH_SOCK", "/tmp/dodo-agent/socket")
     monkeypatch.setenv("LD_LIBRARY_PATH", f"/usr/lib{os.pathsep}/dev/shm/dodo-d/lib")
     for container in (0, 12):
-        backend = ProcessBackend(one, folder, Path("/tmp/dodo-c/report"), "network", Slot(130))
-        asyncio.run(backend.open(container))
+        watched = WatchedServices(one, folder, Path("/tmp/dodo-c/report"))
+        asyncio.run(ProcessSide(watched, Slot(130), "network").open(container))
         entered = shown.pop()
         assert entered is not None and entered.process == container
         names = {path.name for path in entered.shown}

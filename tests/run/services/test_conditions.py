@@ -77,8 +77,6 @@ def test_how_long_one_may_wait_is_by_those_for_which_it_waits() -> None:
     first = ApplicationService("first", after={"app": STARTED, "db": HEALTHY})
     services = (first, *app(COMPLETED))
     assert [longest_s(services, name) for name in ("first", "app", "db")] == [2 * LONGEST_S, LONGEST_S, 0.0]
-    assert Conditions(services).waits_for_ends("first")
-    assert not Conditions(app(HEALTHY)).waits_for_ends("app")
 
 
 def test_an_exception_in_the_start_of_one_is_told() -> None:

@@ -1,0 +1,202 @@
+"""One test on a backend: DoDo's services on one side, the application's on the other, or all of them on the same.
+
+Services report to one queue, whichever side has them; all of them start in the same order.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+from dodo_dsl.opendlv.relay import BUS
+from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
+from dodo_dsl.run.announce import begin_frame, hearers
+from dodo_dsl.run.machine_load.service_use import Snapshot
+from dodo_dsl.run.printed_lines import PrintedLines
+from dodo_dsl.run.protocol import Event, Exited, Noted, Running, Unmatched, Unstartable
+from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.service_protocol import Reports
+from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
+
+APPLICATION = "application"
+"""The layer that is not DoDo's."""
+
+
+class WatchedServices:
+    """What becomes of a test's services, on whichever side they run: events, output, and who waits for whom."""
+
+    def __init__(self, plan: Plan, folder: Path, report: Path) -> None:
+        """``folder`` is the compiled test's, ``report`` takes logs."""
+        self.plan, self.folder, self.report = plan, folder, report
+        self.events: asyncio.Queue[Event] = asyncio.Queue()
+        self.lines = PrintedLines(plan, folder, self.note)
+        self.outputs: dict[str, ServiceOutput] = {}
+        self.reports = Reports(plan, report / "logs", self.tell, self.outputs)
+        self.conditions = Conditions(plan.application.services)
+        self.may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
+        self.turns: set[asyncio.Task[None]] = set()
+        """The services of the application that wait for others."""
+
+    def of(self, layer: str) -> tuple[PlannedService | ApplicationService, ...]:
+        """The services of a layer."""
+        return self.plan.application.services if layer == APPLICATION else self.plan.layer(layer)
+
+    def tell(self, event: Event) -> None:
+        self.events.put_nowait(event)
+
+    def note(self, text: str) -> None:
+        self.tell(Noted(text))
+
+    def not_started(self, name: str, why: str) -> None:
+        self.tell(Unstartable(name, why))
+        self.conditions.failed(name)
+
+    def ended(self, name: str, code: int, out_of_memory: bool) -> None:
+        self.tell(Exited(name, code, out_of_memory))
+        self.conditions.ended(name, code)
+
+    async def start(
+        self,
+        names: Collection[str],
+        start: Callable[[str], Awaitable[None]],
+        reports: Iterable[str],
+        patience: Callable[[str], Mapping[str, float]] = lambda _: {},
+    ) -> dict[str, bool]:
+        """Starts services, those of the application when what they wait for is so; who will report to be ready.
+
+        Those do that wait, and those in ``reports``. ``patience`` of a service is as for ``Conditions.unmet``.
+        """
+
+        async def when_met(name: str) -> None:
+            if why := await self.conditions.unmet(name, patience(name), self.note):
+                self.not_started(name, why)
+            else:
+                await start(name)
+
+        waiting = [name for name in names if self.conditions.of(name)]
+        await asyncio.gather(*(start(name) for name in names if name not in waiting))
+        self.turns |= {in_turn(when_met(name), partial(self.not_started, name)) for name in waiting}
+        ready = {*waiting, *reports} - self.may_be_ill
+        return {name: name in ready for name in names}
+
+    def prints(self, name: str) -> bool:
+        """Whether what a service prints becomes messages."""
+        return name in self.lines.services
+
+    def output(self, layer: str, name: str, take: Callable[[bytes], bool] | None = None, **kind: bool) -> ServiceOutput:
+        """Where a service that is started writes; raises OSError for a terminal.
+
+        ``take`` gets its lines instead, and ``kind`` is as for ``ServiceOutput``.
+        """
+
+        def on_line(line: bytes) -> bool:
+            if self.prints(name):
+                self.lines.take(name, line)
+            return layer != APPLICATION and self.reports.take(name, line)
+
+        if name in self.outputs:  # it is started once more
+            self.outputs[name].close()
+        log = self.report / "logs" / f"{layer}.{name}.log"
+        self.outputs[name] = ServiceOutput(log, take or on_line, **kind)
+        return self.outputs[name]
+
+    async def last_output(self, name: str, patience_s: float) -> None:
+        """Returns when all is read that a service said and wrote, so that no verdict follows its end."""
+        if name in self.outputs:
+            with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
+                await asyncio.wait_for(self.outputs[name].done.wait(), patience_s)
+        await self.reports.ended(name)
+
+    def tail(self, service: str) -> list[str]:
+        return self.outputs[service].tail() if service in self.outputs else []
+
+    def close(self) -> None:
+        """Reads what is there of what services said and wrote, and no more."""
+        self.reports.close()
+        for output in self.outputs.values():
+            output.close()
+
+
+class Send(Protocol):
+    """Sends a datagram to a test's services by their names, or on its bus."""
+
+    def __call__(self, data: bytes, to: Sequence[str] = (BUS,)) -> None: ...
+
+
+class Side(Running, Protocol):
+    """Processes or containers of one test."""
+
+    async def open(self, entered: int = 0) -> int:
+        """In the network, IPC namespace and ``/tmp`` of a process; returns the one whose the other side shares.
+
+        0 stands for own namespaces, or the host's. Raises BackendError.
+        """
+        ...
+
+    async def connect(self) -> Send:
+        """What sends to DoDo's services, which this side has, and on the bus; raises BackendError."""
+        ...
+
+    async def beginning(self) -> Collection[int]:
+        """The application's processes as DoDo's services see them; raises BackendError where the test cannot begin."""
+        ...
+
+
+class Sides:
+    """The backend of one test; ``own`` is DoDo's side, which may be the ``application``'s, too."""
+
+    def __init__(
+        self, name: str, cid: int, is_on_host: bool, watched: WatchedServices, own: Side, application: Side
+    ) -> None:
+        self.name, self.cid, self.is_on_host = name, cid, is_on_host
+        self._watched, self._own, self._application = watched, own, application
+        self._send: Send | None = None
+        self.tail, self.next_event = watched.tail, watched.events.get
+        self.listeners, self.application = application.listeners, application.application
+
+    @property
+    def _both(self) -> list[Side]:
+        return [self._own] if self._own is self._application else [self._own, self._application]
+
+    async def open(self) -> None:
+        process = await self._application.open()
+        if self._own is not self._application:
+            await self._own.open(process)
+
+    async def start(self, layer: str) -> dict[str, bool]:
+        if layer != APPLICATION:
+            return await self._own.start(layer)
+        self._send = await self._own.connect()
+        self._watched.reports.stop_listening()
+        self._watched.lines.connect(self._send)
+        return await self._application.start(layer)
+
+    async def begin(self) -> None:
+        processes = await self._application.beginning()
+        assert self._send is not None, "the application was started"
+        self._send(begin_frame(self._watched.plan.seed, processes), hearers(self._watched.plan))
+
+    async def use(self) -> Snapshot | None:
+        """What all have used; the load of the machine is measured if both sides know it."""
+        own, *others = await asyncio.gather(*(side.use() for side in self._both))
+        if not others:
+            return own
+        application = others[0]
+        if own is None or application is None:
+            return application and replace(application, busy_s=None)
+        busy_s = None if application.busy_s is None else own.busy_s
+        return replace(own, services={**own.services, **application.services}, busy_s=busy_s)
+
+    async def close(self, keep: bool) -> list[str]:
+        for turn in self._watched.turns:
+            turn.cancel()
+        await asyncio.gather(*self._watched.turns, return_exceptions=True)
+        kept = await asyncio.gather(*(side.close(keep) for side in self._both))
+        self._watched.close()
+        return [line for lines in kept for line in lines]
+
+    def unmatched(self) -> tuple[Unmatched, ...]:
+        return self._watched.lines.unmatched({n: out.unfinished for n, out in self._watched.outputs.items()})
