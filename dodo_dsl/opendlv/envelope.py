@@ -85,12 +85,10 @@ def encode_body(envelope: Envelope) -> bytes:
     data_type, payload, sent, received, sample_time, sender_stamp = envelope
     proto = _TYPE()
     try:
-        proto.dataType = data_type
-        proto.serializedData = payload
-        _put_time(proto.sent, sent)
-        _put_time(proto.received, received)
-        _put_time(proto.sampleTimeStamp, sample_time)
-        proto.senderStamp = sender_stamp
+        proto.dataType, proto.serializedData, proto.senderStamp = data_type, payload, sender_stamp
+        for stamp, time in (proto.sent, sent), (proto.received, received), (proto.sampleTimeStamp, sample_time):
+            seconds, microseconds = divmod(abs(time), MICROSECONDS)
+            stamp.seconds, stamp.microseconds = (seconds, microseconds) if time >= 0 else (-seconds, -microseconds)
     except ValueError as error:
         raise FrameError(f"the envelope cannot be encoded: {error}") from None
     body: bytes = proto.SerializeToString()
@@ -135,11 +133,3 @@ def _parsed(body: bytes) -> Any:
     except (DecodeError, wire.WireError) as error:
         raise FrameError(f"the frame holds no envelope: {error}") from None
     return proto
-
-
-def _put_time(stamp: Any, time: int) -> None:
-    if time >= 0:
-        stamp.seconds, stamp.microseconds = divmod(time, MICROSECONDS)
-    else:
-        seconds, microseconds = divmod(-time, MICROSECONDS)
-        stamp.seconds, stamp.microseconds = -seconds, -microseconds

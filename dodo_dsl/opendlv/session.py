@@ -8,6 +8,7 @@ import contextlib
 import ctypes
 import errno
 import itertools
+import math
 import select
 import socket
 import struct
@@ -133,6 +134,9 @@ class Session:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
         self._bus = bus
+        self.gathers = 0.0
+        """Seconds in which messages gather after some were received, so that this process wakes once for several."""
+        self._may_gather = False
         self.hears_directly = False
         """Whether it receives what others send to its own address."""
         self._pending: dict[socket.socket, Envelope] = {}
@@ -156,19 +160,24 @@ class Session:
 
     def send_envelope(self, envelope: Envelope) -> bytes:
         """Sends an envelope unchanged and returns its frame; raises FrameError, and SessionError above 65,507 bytes."""
-        frame = _datagram(envelope)
+        frame = datagram(envelope)
+        self.send_frames((frame,))
+        return frame
+
+    def send_frames(self, frames: Iterable[bytes]) -> None:
+        """Sends encoded envelopes; raises SessionError."""
         try:
-            self._sender.sendto(frame, self._bus)
+            for frame in frames:
+                self._sender.sendto(frame, self._bus)
         except OSError as error:
             raise SessionError(f"the bus does not take a message: {error.strerror}") from None
-        return frame
 
     def send_directly(self, envelope: Envelope, to: Iterable[Address]) -> bytes:
         """As ``send_envelope``, but to the addresses of sessions alone: other members of the group do not hear it.
 
         One that cannot be reached misses it.
         """
-        frame = _datagram(envelope)
+        frame = datagram(envelope)
         for address in to:
             with contextlib.suppress(OSError):
                 self._sender.sendto(frame, address)
@@ -188,6 +197,7 @@ class Session:
                     return None
             else:
                 if envelope is not None:
+                    self._may_gather = True
                     return envelope
             if dropped > MAX_DROPPED and deadline is not None and time.monotonic() > deadline:
                 return None
@@ -282,13 +292,16 @@ class Session:
             return None
 
     def _wait(self, deadline: float | None) -> bool:
-        if deadline is None:
-            return bool(self._poll.poll())
-        left = deadline - time.monotonic()
-        return left > 0 and bool(self._poll.poll(left * 1000))
+        left = math.inf if deadline is None else deadline - time.monotonic()
+        if left > 0 and self._may_gather and self.gathers:
+            self._may_gather = False
+            time.sleep(min(self.gathers, left))
+            return True
+        return left > 0 and bool(self._poll.poll(None if deadline is None else left * 1000))
 
 
-def _datagram(envelope: Envelope) -> bytes:
+def datagram(envelope: Envelope) -> bytes:
+    """The frame of an envelope; raises FrameError, and SessionError above 65,507 bytes."""
     frame = encode_frame(envelope)
     if len(frame) > MAX_DATAGRAM_BYTES:
         raise SessionError(

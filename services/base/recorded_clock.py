@@ -171,8 +171,8 @@ class SilentSession(Session):
         self.is_member = self.hears_directly = self.was_direct = False
         self.address = self.source = ("", 0)
 
-    def send_envelope(self, envelope: Envelope) -> bytes:
-        return encode_frame(envelope)
+    def send_frames(self, frames: Iterable[bytes]) -> None:
+        """Nobody hears it."""
 
     def send_directly(self, envelope: Envelope, to: Iterable[Address]) -> bytes:
         return encode_frame(envelope)

@@ -31,10 +31,10 @@ def shown(one: EntryStream) -> list[int | None]:
     numbers: list[int | None] = []
     while True:
         try:
-            entry = one.take()
+            _, _, _, played = one.take()
         except StopIteration:
             return numbers
-        found = [n for n in range(10) if entry.picture and np.array_equal(entry.picture.i420, picture(n))]
+        found = [n for n in range(10) if played and np.array_equal(played.i420, picture(n))]
         numbers.append(found[0] if found else None)
 
 
