@@ -12,19 +12,6 @@ from dodo_dsl.opendlv import odvd, wire
 from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError, body_length
 from dodo_dsl.opendlv.protobuf_classes import Layout, build
 
-__all__ = [
-    "HEADER_BYTES",
-    "MAGIC",
-    "Envelope",
-    "FrameError",
-    "body_length",
-    "decode_body",
-    "decode_frame",
-    "decode_parts",
-    "encode_body",
-    "encode_frame",
-]
-
 MAX_BODY_BYTES = 2**24 - 1
 MICROSECONDS = 1_000_000
 
@@ -63,25 +50,6 @@ _TYPE: Any = _LAYOUT.type
 
 def encode_frame(envelope: Envelope) -> bytes:
     """The frame of an envelope; raises FrameError if a number or the payload is too large."""
-    body = encode_body(envelope)
-    if len(body) > MAX_BODY_BYTES:
-        raise FrameError(f"an envelope of {len(body)} bytes is larger than a frame, {MAX_BODY_BYTES} bytes")
-    return MAGIC + len(body).to_bytes(3, "little") + body
-
-
-def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
-    """The envelope of a frame, ``received`` at its own time or the one given. Raises FrameError.
-
-    Bytes after the frame are ignored, as libcluon does.
-    """
-    end = HEADER_BYTES + body_length(frame)
-    if len(frame) < end:
-        raise FrameError(f"the frame has {len(frame)} bytes of {end}")
-    return decode_body(frame[HEADER_BYTES:end], received)
-
-
-def encode_body(envelope: Envelope) -> bytes:
-    """The envelope without the header; raises FrameError for a number that does not fit."""
     data_type, payload, sent, received, sample_time, sender_stamp = envelope
     proto = _TYPE()
     try:
@@ -92,15 +60,21 @@ def encode_body(envelope: Envelope) -> bytes:
     except ValueError as error:
         raise FrameError(f"the envelope cannot be encoded: {error}") from None
     body: bytes = proto.SerializeToString()
-    return body
+    if len(body) > MAX_BODY_BYTES:
+        raise FrameError(f"an envelope of {len(body)} bytes is larger than a frame, {MAX_BODY_BYTES} bytes")
+    return MAGIC + len(body).to_bytes(3, "little") + body
 
 
-def decode_body(body: bytes, received: int | None = None) -> Envelope:
-    """The envelope in the bytes after a header; raises FrameError.
+def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
+    """The envelope of a frame, ``received`` at its own time or the one given. Raises FrameError.
 
-    Fields come in any order, the first of equal ones counts, absent ones are zero.
+    Bytes after the frame are ignored, as libcluon does. Fields come in any order, the first of equal ones counts,
+    absent ones are zero.
     """
-    proto = _parsed(body)
+    end = HEADER_BYTES + body_length(frame)
+    if len(frame) < end:
+        raise FrameError(f"the frame has {len(frame)} bytes of {end}")
+    proto = _parsed(frame[HEADER_BYTES:end])
     sent, sample_time = proto.sent, proto.sampleTimeStamp
     if received is None:
         received = proto.received.seconds * MICROSECONDS + proto.received.microseconds

@@ -20,8 +20,8 @@ from typing import Self
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import wire
-from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, group
-from dodo_dsl.opendlv.envelope import Envelope, FrameError, decode_frame, encode_frame
+from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, FrameError, group
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.wire import varint, zigzag
 

@@ -11,7 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from dodo_dsl.opendlv.envelope import Envelope, FrameError, encode_frame
+from dodo_dsl.opendlv.address import FrameError
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from services.base.runner import tell
 
@@ -88,6 +89,15 @@ class RecordingFileError(ValueError):
     """A file that cannot become a recording, or a disk that is full."""
 
 
+def _new(path: Path) -> RecordingWriter:
+    try:
+        return RecordingWriter(path)
+    except FileExistsError:
+        raise RecordingFileError(f"{path} exists and is not overwritten") from None
+    except OSError as error:
+        raise RecordingFileError(f"{path} cannot be written: {error.strerror}") from None
+
+
 class RecordingFile:
     """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and logs that.
 
@@ -101,12 +111,7 @@ class RecordingFile:
         self._traffic = traffic
         self.left_out = 0
         self._max_size = max_size
-        try:
-            self._writer = RecordingWriter(path)
-        except FileExistsError:
-            raise RecordingFileError(f"{path} exists and is not overwritten") from None
-        except OSError as error:
-            raise RecordingFileError(f"{path} cannot be written: {error.strerror}") from None
+        self._writer = _new(path)
 
     @property
     def frames(self) -> int:
@@ -186,12 +191,7 @@ class NewestPictures:
         self._path, self._max_size = path, max_size
         self.is_on = True
         self._sizes: deque[int] = deque()
-        try:
-            self._writer = RecordingWriter(path)
-        except FileExistsError:
-            raise RecordingFileError(f"{path} exists and is not overwritten") from None
-        except OSError as error:
-            raise RecordingFileError(f"{path} cannot be written: {error.strerror}") from None
+        self._writer = _new(path)
 
     def write(self, envelope: Envelope) -> None:
         """Append a picture; oldest ones may go."""

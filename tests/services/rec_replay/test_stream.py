@@ -9,7 +9,6 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.pixels import FORMATS, size
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.shared_memory import SharedMemory
-from dodo_dsl.opendlv.video import VideoError
 from services.rec_replay.selection import Selection, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame, pixels
 from tests.services.rec_replay.recordings import IMAGE, S, images, message, picture, write
@@ -65,13 +64,6 @@ def test_pictures_that_cannot_be_decoded_are_counted(tmp_path: Path) -> None:
         one = stream(recording)
         assert shown(one) == [None, None, 4, 5, None]
         assert (one.decoder.undecoded, one.decoder.early) == (3, 2)
-
-
-def test_a_recording_without_a_decodable_picture(tmp_path: Path) -> None:
-    path = write(tmp_path / "bad.rec", images([0, 0.1])[1:])
-    with Recording(path) as recording, pytest.raises(VideoError) as caught:
-        first_frame(recording, np.array([0]))
-    assert str(caught.value) == f"none of the 1 pictures in {path} can be decoded: there is no key frame among them"
 
 
 def test_memories_are_in_their_formats(path: Path) -> None:
