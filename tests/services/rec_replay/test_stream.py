@@ -81,14 +81,3 @@ def test_memories_are_in_their_formats(path: Path) -> None:
     assert (found["argb"], found["i420"]) == (one.argb.tobytes(), one.i420.tobytes())
     assert found["bgr"] == one.argb[..., :3].tobytes()
     assert found["rgb"] == one.argb[..., 2::-1].tobytes()
-
-
-def test_a_picture_of_another_size_is_left_out(path: Path) -> None:
-    class Memory:
-        size = 4
-
-    with Recording(path) as recording:
-        one = pixels(first_frame(recording, np.arange(10)))
-    memories = PictureMemories([(Memory(), "argb")])  # type: ignore[list-item]
-    memories.show(one, 5)
-    assert (memories.shown, memories.misfits) == (0, 1)
