@@ -20,7 +20,7 @@ from typing import Self
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import wire
-from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, FrameError, group
+from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, FrameError, group, sender
 from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.wire import varint, zigzag
@@ -128,8 +128,8 @@ class Session:
         """Whether the last datagram came to this session's own address, and not to the group."""
         bus = group(cid)
         try:
-            self._receiver = _receiver(bus)
-            self._sender, self.address = _sender(bus, self._receiver)
+            self._sender, self.address = sender(bus)
+            self._receiver = self._joined(bus)
         except OSError as error:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
@@ -257,6 +257,20 @@ class Session:
     ) -> None:
         self.close()
 
+    def _joined(self, bus: Address) -> socket.socket:
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            _as_receiver(receiver)
+            receiver.bind(bus)
+            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
+            receiver.setblocking(False)
+        except OSError:
+            receiver.close()
+            self._sender.close()
+            raise
+        return receiver
+
     def _next(self) -> Envelope | None:
         if not self.hears_directly and not self._pending:
             self.was_direct = False
@@ -330,41 +344,6 @@ def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
 def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
     """The number of datagrams that the kernel has dropped so far."""
     return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
-
-
-def _sender(bus: Address, receiver: socket.socket) -> tuple[socket.socket, Address]:
-    """Time to live 1, loop on; with the address that its datagrams carry.
-
-    It has its port at all addresses of this machine: were it connected, another program could have the same port at
-    another address, and put the first one into its datagrams (``IP_PKTINFO``).
-    """
-    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
-        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        sender.bind(("", 0))
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect(bus)
-            host = str(probe.getsockname()[0])
-    except OSError:
-        receiver.close()
-        sender.close()
-        raise
-    return sender, (host, int(sender.getsockname()[1]))
-
-
-def _receiver(bus: Address) -> socket.socket:
-    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        _as_receiver(receiver)
-        receiver.bind(bus)
-        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
-        receiver.setblocking(False)
-    except OSError:
-        receiver.close()
-        raise
-    return receiver
 
 
 def _as_receiver(receiver: socket.socket) -> None:
