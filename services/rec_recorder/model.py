@@ -8,8 +8,6 @@ import os
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from dodo_dsl.opendlv.address import FrameError
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
@@ -99,11 +97,11 @@ def _new(path: Path) -> RecordingWriter:
 
 
 class RecordingFile:
-    """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and logs that.
+    """A new `.rec` file. Once it has `max_size` bytes it takes no more messages, and logs that.
 
     ``traffic`` counts what it takes. Nothing is buffered in the process: whatever ends it, the file holds all frames
     written so far.
-    Raises RecordingError for a file that exists, and if none can be made.
+    Raises RecordingFileError for a file that exists, and if none can be made.
     """
 
     def __init__(self, path: Path, max_size: int | None = None, traffic: Traffic | None = None) -> None:
@@ -154,14 +152,6 @@ class RecordingFile:
         if self.left_out:
             _log.warning("%d messages were not recorded", self.left_out)
         self._writer.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _count(self, envelope: Envelope, size: int) -> None:
         try:

@@ -75,7 +75,8 @@ def build(context: Context) -> Service:
     if flags["pictures"] and not flags["frames"]:
         raise ValueError("--pictures needs --frames: the rate of the pictures")
     max_size = flags["max-size"] and round(flags["max-size"] * MEGABYTE)
-    recording = context.resources.enter_context(RecordingFile(Path(flags["rec"]), max_size, _traffic(context)))
+    recording = RecordingFile(Path(flags["rec"]), max_size, _traffic(context))
+    context.resources.callback(recording.close)
     if context.session is not None:
         context.session.gathers = GATHERS
     if flags["paused"]:

@@ -15,6 +15,7 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Context, Service
+from services.base.loop import TEST_BEGIN
 from services.base.service import Framed, Output, period_of
 from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Player, Selection, SelectionError, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
@@ -148,6 +149,8 @@ def build(context: Context) -> Service:
     player, stream = Player(part.due, flags["autorewind"]), EntryStream(recording, part)
     if not flags["await-begin"]:
         player.play()
+    if context.session is not None:  # what it sends itself would fill its buffer
+        context.session.hear_only(map(context.messages.id, (COMMAND, TEST_BEGIN)))
     settle = round(flags["settle"] * MICROSECONDS)
     memories = _memories(context, recording, part)
     service = Replay(

@@ -1,5 +1,6 @@
 import resource
 import signal
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from tests.opendlv.vectors import ENVELOPES
 @pytest.mark.thorough
 def test_what_is_written_is_read_again(tmp_path_factory: pytest.TempPathFactory, written: list[Envelope]) -> None:
     path = tmp_path_factory.mktemp("rec") / "drive.rec"
-    with RecordingFile(path) as recording:
+    with closing(RecordingFile(path)) as recording:
         for envelope in written:
             recording.write(envelope)
         assert list(read_envelopes(path)) == written  # before it is closed: a killed recorder leaves this
@@ -34,7 +35,7 @@ def envelope(number: int) -> Envelope:
 
 def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "drive.rec"
-    with RecordingFile(path, max_size=300) as recording:
+    with closing(RecordingFile(path, max_size=300)) as recording:
         for number in range(5):
             recording.write(envelope(number))
     assert len(list(read_envelopes(path))) == 2
@@ -47,7 +48,7 @@ def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureF
 
 def test_commands_stop_it_and_let_it_go_on(tmp_path: Path) -> None:
     path = tmp_path / "drive.rec"
-    with RecordingFile(path) as recording:
+    with closing(RecordingFile(path)) as recording:
         for number, command in enumerate((1, 2, 7, 1, 1, 2)):
             recording.write(envelope(number))
             recording.command(command)
@@ -61,7 +62,7 @@ def test_a_full_disk_ends_it_with_a_readable_file(tmp_path: Path) -> None:
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
     try:
-        with RecordingFile(path) as recording, pytest.raises(RecordingFileError) as caught:
+        with closing(RecordingFile(path)) as recording, pytest.raises(RecordingFileError) as caught:
             for number in range(50):
                 recording.write(envelope(number))
     finally:
