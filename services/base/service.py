@@ -182,7 +182,7 @@ class Context:
     resources: ExitStack = field(default_factory=ExitStack)
     clock: Clock = field(default_factory=RealTimeClock)
     session: Session | None = None
-    """The bus itself; only for a service with ``drive``."""
+    """The bus itself: what a service has to hear of it. Only one with ``drive`` uses it for more."""
     on_rig: bool = False
     """Whether the test runs on a rig, where a service that vanishes may have been unplugged."""
 
