@@ -9,7 +9,6 @@ too fast shows in the duration instead.
 import statistics
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -32,21 +31,27 @@ FAST, EVEN, SHORT, ROUNDS = 50_000, 3_000, 1_000, 5  # messages; those in real t
 CID = 126
 STATUS, END = 10, 2901
 QUIET = 3.0
+GATHERS = 0.005
+"""Seconds for which what listens sleeps at a time: were it woken by each message, it would hold up the player."""
 PEER = tool("cluon-replay")
 NO_PEER = "pycluon is not installed: no peer to measure against"
 
 
 class Heard(NamedTuple):
-    """What came: when (us), when it was sampled (us), how many were lost, and the player's share of a processor."""
+    """What came: when (us), when it was sampled (us), how many were lost, and the player's processor time (s)."""
 
     received: "np.ndarray[tuple[int], np.dtype[np.int64]]"
     sampled: "np.ndarray[tuple[int], np.dtype[np.int64]]"
     lost: int
-    share: float
+    processor: float
 
     def rate(self) -> float:
         """Messages a second, lost ones included: the player sent these."""
         return (len(self.received) + self.lost) / (self.received[-1] - self.received[0]) * 1e6
+
+    def cost(self) -> float:
+        """Microseconds of processors for a message."""
+        return self.processor / (len(self.received) + self.lost) * 1e6
 
     def deviations(self) -> list[float]:
         """Percentiles 50, 90, 99 and 100 in ms."""
@@ -71,21 +76,20 @@ def listen(path: Path, name: str, count: int) -> Heard:
     """One play of the recording."""
     received, sampled = [], []
     with Session(CID) as session, (ours if name == "rec-replay" else theirs)(path) as player:
+        session.gathers = GATHERS
         if name == "rec-replay":
             session.send(session.messages.type("dodo.TestBegin")())
-        begin = (0.0, 0.0)
-        share = 0.0
+        begin = processor = 0.0
         while len(received) + session.lost < count and (envelope := session.receive(QUIET)) is not None:
             if envelope.data_type in (STATUS, END):
                 continue
             received.append(envelope.received)
             sampled.append(envelope.sample_time)
             if len(received) == 1:
-                begin = (time.perf_counter(), player.processor_time())
+                begin = player.processor_time()
             elif len(received) % (count // 10) == 0:
-                wall = time.perf_counter() - begin[0]
-                share = (player.processor_time() - begin[1]) / wall
-        return Heard(np.array(received), np.array(sampled), session.lost, share)
+                processor = player.processor_time() - begin
+        return Heard(np.array(received), np.array(sampled), session.lost, processor)
 
 
 def write(path: Path, envelopes: list[Envelope]) -> Path:
@@ -114,6 +118,11 @@ def fast_row(found: dict[str, list[Heard]]) -> Row:
     return rate_row("replay, all due at once", "messages/s", **columns(found, Heard.rate), goal=Goal(1))
 
 
+def fast_cost_row(found: dict[str, list[Heard]]) -> Row:
+    """However busy the machine is, and whatever its scheduler gives to several threads of one player."""
+    return cost_row("replay, processor time of a message due at once", "us", **columns(found, Heard.cost))
+
+
 def even_row(found: dict[str, list[Heard]]) -> Row:
     """The 90th percentile: single late ones say more of the machine than of the player."""
     return cost_row("replay in real time, 90 % within", "ms", **columns(found, lambda heard: heard.deviations()[1]))
@@ -124,8 +133,9 @@ def show_fast(found: dict[str, list[Heard]]) -> None:
     for name, rounds in found.items():
         rate, lost = statistics.median(h.rate() for h in rounds), sum(h.lost for h in rounds)
         print(f"  {name:13} {rate:9,.0f} messages/s ({lost} of {len(rounds) * FAST} overran the listener's buffer)")
-    if ratios := fast_row(found).ratios:
-        print(f"  {statistics.median(ratios):.2f} times as many ({min(ratios):.2f} to {max(ratios):.2f})")
+    for text, row in (("as many", fast_row(found)), ("as little of a processor", fast_cost_row(found))):
+        if ratios := row.ratios:
+            print(f"  {statistics.median(ratios):.2f} times {text} ({min(ratios):.2f} to {max(ratios):.2f})")
 
 
 def show_even(found: dict[str, list[Heard]]) -> None:
@@ -133,7 +143,7 @@ def show_even(found: dict[str, list[Heard]]) -> None:
     for name, rounds in found.items():
         middle = [statistics.median(column) for column in zip(*(h.deviations() for h in rounds), strict=True)]
         drift = statistics.median((np.ptp(h.received) - np.ptp(h.sampled)) / 1000.0 for h in rounds)
-        share = statistics.median(h.share for h in rounds)
+        share = statistics.median(h.processor / np.ptp(h.received) * 1e6 for h in rounds)
         numbers = "  ".join(f"{value:6.2f}" for value in middle)
         print(f"  {name:13} {numbers}   {drift:+7.1f} ms   {share:.1%} of a processor")
 
@@ -143,12 +153,13 @@ def main() -> int:
         envelopes = drive(FAST)
         at_once = [e._replace(sample_time=1_700_000_000_000_000) for e in envelopes]
         budget = Budget.given()
-        plan(fast_row({"": []}), even_row({"": []}))
+        at_once_rows = fast_row({"": []}), fast_cost_row({"": []})
+        plan(*at_once_rows, even_row({"": []}))
         count = SHORT if budget.limited else EVEN
         even = [e._replace(sample_time=e.sent) for e in envelopes[:count]]
-        with attempt(fast_row({"": []})):
+        with attempt(*at_once_rows):
             fast = in_turns(write(Path(name) / "fast.rec", at_once), FAST, budget, until=0.4)
-            report(fast_row(fast))
+            report(fast_row(fast), fast_cost_row(fast))
             show_fast(fast)
         with attempt(even_row({"": []})):
             found = in_turns(write(Path(name) / "even.rec", even), count, budget, until=1.0)

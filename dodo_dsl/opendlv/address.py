@@ -4,6 +4,8 @@ Each session has a UDP multicast group and port, as for libcluon; some messages 
 the length of the envelope behind it. Imports the standard library alone, as sandboxes load it and start often.
 """
 
+import socket
+
 Address = tuple[str, int]
 """Host and port."""
 
@@ -25,6 +27,25 @@ CHANNEL_VARIABLE = "DODO_CHANNEL"
 def group(cid: int) -> Address:
     """The multicast group of a session, with its port."""
     return f"225.0.0.{cid}", PORT
+
+
+def sender(bus: Address) -> tuple[socket.socket, Address]:
+    """Time to live 1, loop on; with the address that its datagrams carry. Raises OSError, as if there is no route.
+
+    It has its port at all addresses of this machine: were it connected, another program could have the same port at
+    another address, and put the first one into its datagrams (``IP_PKTINFO``).
+    """
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        made.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        made.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        made.bind(("", 0))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect(bus)
+            return made, (str(probe.getsockname()[0]), int(made.getsockname()[1]))
+    except OSError:
+        made.close()
+        raise
 
 
 def is_of_the_world(name: str) -> bool:

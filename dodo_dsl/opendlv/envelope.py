@@ -12,19 +12,6 @@ from dodo_dsl.opendlv import odvd, wire
 from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError, body_length
 from dodo_dsl.opendlv.protobuf_classes import Layout, build
 
-__all__ = [
-    "HEADER_BYTES",
-    "MAGIC",
-    "Envelope",
-    "FrameError",
-    "body_length",
-    "decode_body",
-    "decode_frame",
-    "decode_parts",
-    "encode_body",
-    "encode_frame",
-]
-
 MAX_BODY_BYTES = 2**24 - 1
 MICROSECONDS = 1_000_000
 
@@ -63,7 +50,16 @@ _TYPE: Any = _LAYOUT.type
 
 def encode_frame(envelope: Envelope) -> bytes:
     """The frame of an envelope; raises FrameError if a number or the payload is too large."""
-    body = encode_body(envelope)
+    data_type, payload, sent, received, sample_time, sender_stamp = envelope
+    proto = _TYPE()
+    try:
+        proto.dataType, proto.serializedData, proto.senderStamp = data_type, payload, sender_stamp
+        for stamp, time in (proto.sent, sent), (proto.received, received), (proto.sampleTimeStamp, sample_time):
+            seconds, microseconds = divmod(abs(time), MICROSECONDS)
+            stamp.seconds, stamp.microseconds = (seconds, microseconds) if time >= 0 else (-seconds, -microseconds)
+    except ValueError as error:
+        raise FrameError(f"the envelope cannot be encoded: {error}") from None
+    body: bytes = proto.SerializeToString()
     if len(body) > MAX_BODY_BYTES:
         raise FrameError(f"an envelope of {len(body)} bytes is larger than a frame, {MAX_BODY_BYTES} bytes")
     return MAGIC + len(body).to_bytes(3, "little") + body
@@ -72,37 +68,13 @@ def encode_frame(envelope: Envelope) -> bytes:
 def decode_frame(frame: bytes, received: int | None = None) -> Envelope:
     """The envelope of a frame, ``received`` at its own time or the one given. Raises FrameError.
 
-    Bytes after the frame are ignored, as libcluon does.
+    Bytes after the frame are ignored, as libcluon does. Fields come in any order, the first of equal ones counts,
+    absent ones are zero.
     """
     end = HEADER_BYTES + body_length(frame)
     if len(frame) < end:
         raise FrameError(f"the frame has {len(frame)} bytes of {end}")
-    return decode_body(frame[HEADER_BYTES:end], received)
-
-
-def encode_body(envelope: Envelope) -> bytes:
-    """The envelope without the header; raises FrameError for a number that does not fit."""
-    data_type, payload, sent, received, sample_time, sender_stamp = envelope
-    proto = _TYPE()
-    try:
-        proto.dataType = data_type
-        proto.serializedData = payload
-        _put_time(proto.sent, sent)
-        _put_time(proto.received, received)
-        _put_time(proto.sampleTimeStamp, sample_time)
-        proto.senderStamp = sender_stamp
-    except ValueError as error:
-        raise FrameError(f"the envelope cannot be encoded: {error}") from None
-    body: bytes = proto.SerializeToString()
-    return body
-
-
-def decode_body(body: bytes, received: int | None = None) -> Envelope:
-    """The envelope in the bytes after a header; raises FrameError.
-
-    Fields come in any order, the first of equal ones counts, absent ones are zero.
-    """
-    proto = _parsed(body)
+    proto = _parsed(frame[HEADER_BYTES:end])
     sent, sample_time = proto.sent, proto.sampleTimeStamp
     if received is None:
         received = proto.received.seconds * MICROSECONDS + proto.received.microseconds
@@ -135,11 +107,3 @@ def _parsed(body: bytes) -> Any:
     except (DecodeError, wire.WireError) as error:
         raise FrameError(f"the frame holds no envelope: {error}") from None
     return proto
-
-
-def _put_time(stamp: Any, time: int) -> None:
-    if time >= 0:
-        stamp.seconds, stamp.microseconds = divmod(time, MICROSECONDS)
-    else:
-        seconds, microseconds = divmod(-time, MICROSECONDS)
-        stamp.seconds, stamp.microseconds = -seconds, -microseconds

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import message_columns, wire
-from dodo_dsl.opendlv.envelope import HEADER_BYTES, MAGIC, FrameError, decode_body, decode_parts, encode_body
+from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError
+from dodo_dsl.opendlv.envelope import decode_frame, decode_parts, encode_frame
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
 
 PADDING = bytes(128)  # what a reader of the last frame may look at beyond it
@@ -119,8 +120,7 @@ def _is_doubtful(data: bytes, start: int, end: int) -> bool:
     """
     if end + len(PADDING) >= len(data) or data.startswith(MAGIC, end) or data.find(MAGIC, start + 1, end) < 0:
         return False
-    body = data[start + HEADER_BYTES : end]
-    return encode_body(decode_body(body)) != body
+    return encode_frame(decode_frame(data[start:end])) != data[start:end]
 
 
 def _begins_well(data: bytes, at: int, end: int) -> bool:

@@ -72,8 +72,7 @@ def _truncated(value: int, type_: str) -> int:
     mask: int = 2 ** INTEGER_BITS[type_] - 1
     if not type_.startswith("int"):
         return value & mask
-    zigzag = (value << 1 ^ value >> 31) & mask
-    return zigzag >> 1 ^ -(zigzag & 1)
+    return wire.unzigzag(wire.zigzag(value) & mask)
 
 
 OWN_IDS = range(2900, 3000)  # DoDo's

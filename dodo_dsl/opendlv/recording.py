@@ -7,7 +7,7 @@ file is.
 
 import os
 import struct
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv import frame_table, regular_file
-from dodo_dsl.opendlv.envelope import HEADER_BYTES, MAGIC, MICROSECONDS, Envelope
+from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC
+from dodo_dsl.opendlv.envelope import MICROSECONDS, Envelope
 from dodo_dsl.opendlv.frame_table import PADDING, Fact, Table
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
 
@@ -197,8 +198,6 @@ class Scanner:
         self._at = found
 
 
-__all__ = ["Batch", "Damage", "Recording", "RecordingError", "read_envelopes"]
-
 BATCH_FRAMES = 1 << 12
 BATCH_BYTES = 4 << 20
 _NEAR = 1 << 16  # bytes between frames that are read rather than jumped over
@@ -342,6 +341,14 @@ class Recording:
         back = np.empty(len(rows), np.int64)
         back[order] = np.arange(len(rows))
         return Batch(data, -1, table[:, back])
+
+
+def matching(index: NDArray[np.void], keys: Iterable[tuple[int, int | None]]) -> Marks:
+    """Which rows of an index are of these messages, by id and sender stamp (None for any)."""
+    marks: Marks = np.zeros(len(index), np.bool_)
+    for id_, stamp in keys:
+        marks |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
+    return marks
 
 
 def _indexed(stream: BinaryIO, progress: Callable[[int], None] | None) -> tuple[Damage, NDArray[np.void]]:

@@ -1,5 +1,6 @@
 """Writing recordings so that whatever ends the writer, the file holds all frames written so far."""
 
+import itertools
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
@@ -7,7 +8,7 @@ from typing import Self
 
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 
-_MOST_BYTES = 1 << 20
+_TOGETHER = 16
 
 
 class RecordingWriter:
@@ -28,17 +29,10 @@ class RecordingWriter:
         self.write_frames((encode_frame(envelope),))
 
     def write_frames(self, frames: Iterable[bytes]) -> None:
-        """Append encoded frames, up to a mebibyte with one write; raises OSError as ``write`` does."""
-        pending: list[bytes] = []
-        size = 0
-        for frame in frames:
-            pending.append(frame)
-            size += len(frame)
-            if size >= _MOST_BYTES:
-                self._append(pending)
-                pending, size = [], 0
-        if pending:
-            self._append(pending)
+        """Append encoded frames, some with one write; raises OSError as ``write`` does."""
+        rest = iter(frames)
+        while some := list(itertools.islice(rest, _TOGETHER)):
+            self._append(some)
 
     def close(self) -> None:
         """End the recording."""

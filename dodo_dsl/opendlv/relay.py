@@ -6,14 +6,13 @@ the standard library alone, as sandboxes load it and start often.
 
 import contextlib
 import os
-import socket
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TextIO
 
 from dodo_dsl.opendlv import address_book
-from dodo_dsl.opendlv.address import CHANNEL_VARIABLE, Address, group
+from dodo_dsl.opendlv.address import CHANNEL_VARIABLE, Address, group, sender
 
 BUS = "*"
 """Stands for all on the bus, as does a service that has not entered its address."""
@@ -24,15 +23,9 @@ class Relay:
 
     def __init__(self, cid: int, folder: Path, name: str = address_book.RUNNER) -> None:
         self._bus, self._book = group(cid), address_book.AddressBook(folder)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket, address = sender(self._bus)
         try:
-            self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
-            self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-            self._socket.bind(("", 0))
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-                probe.connect(self._bus)
-                host = str(probe.getsockname()[0])
-            address_book.enter(folder, name, (host, int(self._socket.getsockname()[1])))
+            address_book.enter(folder, name, address)
         except OSError:
             self._socket.close()
             raise

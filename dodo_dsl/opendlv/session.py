@@ -8,6 +8,7 @@ import contextlib
 import ctypes
 import errno
 import itertools
+import math
 import select
 import socket
 import struct
@@ -19,8 +20,8 @@ from typing import Self
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import wire
-from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, group
-from dodo_dsl.opendlv.envelope import Envelope, FrameError, decode_frame, encode_frame
+from dodo_dsl.opendlv.address import RECEIVE_BUFFER, Address, FrameError, group, sender
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.wire import varint, zigzag
 
@@ -127,12 +128,15 @@ class Session:
         """Whether the last datagram came to this session's own address, and not to the group."""
         bus = group(cid)
         try:
-            self._receiver = _receiver(bus)
-            self._sender, self.address = _sender(bus, self._receiver)
+            self._sender, self.address = sender(bus)
+            self._receiver = self._joined(bus)
         except OSError as error:
             hint = " (is there a route to 224.0.0.0/4?)" if error.errno in _NO_ROUTE else ""
             raise SessionError(f"the bus {bus[0]}:{bus[1]} cannot be joined: {error.strerror}{hint}") from None
         self._bus = bus
+        self.gathers = 0.0
+        """Seconds in which messages gather after some were received, so that this process wakes once for several."""
+        self._may_gather = False
         self.hears_directly = False
         """Whether it receives what others send to its own address."""
         self._pending: dict[socket.socket, Envelope] = {}
@@ -156,19 +160,24 @@ class Session:
 
     def send_envelope(self, envelope: Envelope) -> bytes:
         """Sends an envelope unchanged and returns its frame; raises FrameError, and SessionError above 65,507 bytes."""
-        frame = _datagram(envelope)
+        frame = datagram(envelope)
+        self.send_frames((frame,))
+        return frame
+
+    def send_frames(self, frames: Iterable[bytes]) -> None:
+        """Sends encoded envelopes; raises SessionError."""
         try:
-            self._sender.sendto(frame, self._bus)
+            for frame in frames:
+                self._sender.sendto(frame, self._bus)
         except OSError as error:
             raise SessionError(f"the bus does not take a message: {error.strerror}") from None
-        return frame
 
     def send_directly(self, envelope: Envelope, to: Iterable[Address]) -> bytes:
         """As ``send_envelope``, but to the addresses of sessions alone: other members of the group do not hear it.
 
         One that cannot be reached misses it.
         """
-        frame = _datagram(envelope)
+        frame = datagram(envelope)
         for address in to:
             with contextlib.suppress(OSError):
                 self._sender.sendto(frame, address)
@@ -188,6 +197,7 @@ class Session:
                     return None
             else:
                 if envelope is not None:
+                    self._may_gather = True
                     return envelope
             if dropped > MAX_DROPPED and deadline is not None and time.monotonic() > deadline:
                 return None
@@ -247,6 +257,20 @@ class Session:
     ) -> None:
         self.close()
 
+    def _joined(self, bus: Address) -> socket.socket:
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            _as_receiver(receiver)
+            receiver.bind(bus)
+            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
+            receiver.setblocking(False)
+        except OSError:
+            receiver.close()
+            self._sender.close()
+            raise
+        return receiver
+
     def _next(self) -> Envelope | None:
         if not self.hears_directly and not self._pending:
             self.was_direct = False
@@ -282,13 +306,16 @@ class Session:
             return None
 
     def _wait(self, deadline: float | None) -> bool:
-        if deadline is None:
-            return bool(self._poll.poll())
-        left = deadline - time.monotonic()
-        return left > 0 and bool(self._poll.poll(left * 1000))
+        left = math.inf if deadline is None else deadline - time.monotonic()
+        if left > 0 and self._may_gather and self.gathers:
+            self._may_gather = False
+            time.sleep(min(self.gathers, left))
+            return True
+        return left > 0 and bool(self._poll.poll(None if deadline is None else left * 1000))
 
 
-def _datagram(envelope: Envelope) -> bytes:
+def datagram(envelope: Envelope) -> bytes:
+    """The frame of an envelope; raises FrameError, and SessionError above 65,507 bytes."""
     frame = encode_frame(envelope)
     if len(frame) > MAX_DATAGRAM_BYTES:
         raise SessionError(
@@ -317,41 +344,6 @@ def _received(ancillary: list[tuple[int, int, bytes]]) -> int:
 def _lost(ancillary: list[tuple[int, int, bytes]]) -> int:
     """The number of datagrams that the kernel has dropped so far."""
     return max((int(_COUNT.unpack(data)[0]) for _, kind, data in ancillary if kind == _SO_RXQ_OVFL), default=0)
-
-
-def _sender(bus: Address, receiver: socket.socket) -> tuple[socket.socket, Address]:
-    """Time to live 1, loop on; with the address that its datagrams carry.
-
-    It has its port at all addresses of this machine: were it connected, another program could have the same port at
-    another address, and put the first one into its datagrams (``IP_PKTINFO``).
-    """
-    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
-        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
-        sender.bind(("", 0))
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect(bus)
-            host = str(probe.getsockname()[0])
-    except OSError:
-        receiver.close()
-        sender.close()
-        raise
-    return sender, (host, int(sender.getsockname()[1]))
-
-
-def _receiver(bus: Address) -> socket.socket:
-    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        _as_receiver(receiver)
-        receiver.bind(bus)
-        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(bus[0]))
-        receiver.setblocking(False)
-    except OSError:
-        receiver.close()
-        raise
-    return receiver
 
 
 def _as_receiver(receiver: socket.socket) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
-from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.recording import Recording, matching
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 
 ABSOLUTE_S = 1e8  # seconds from here on are counted since 1970
@@ -35,20 +35,13 @@ class Excerpt:
         begin = int(times[times != 0].min(initial=np.iinfo(np.int64).max))
         rows = recording.rows(start=_microseconds(self.start, begin), end=_microseconds(self.end, begin))
         if self.messages:
-            index = recording.index[rows]
-            chosen = np.zeros(len(rows), np.bool_)
-            for id_, stamp in self._keys(known):
-                chosen |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
-            rows = rows[chosen]
+            try:
+                rows = rows[matching(recording.index[rows], map(known.key, self.messages))]
+            except MessageError as error:
+                raise NothingSelected(str(error)) from None
         if not len(rows):
             raise NothingSelected(f"nothing selected: no message of {recording.path} matches {self}")
         return rows
-
-    def _keys(self, known: MessageSet) -> list[tuple[int, int | None]]:
-        try:
-            return list(map(known.key, self.messages))
-        except MessageError as error:
-            raise NothingSelected(str(error)) from None
 
     def __str__(self) -> str:
         options = [f"--message {message}" for message in self.messages]

@@ -17,12 +17,12 @@ from google.protobuf.message import Message
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageError, decode
 from dodo_dsl.opendlv.protobuf_classes import Layout
-from dodo_dsl.opendlv.session import Session, SessionError
+from dodo_dsl.opendlv.session import Session, SessionError, datagram
 from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
 from services.base.members import END_OF_INPUT, NOT_SHOWN, Members, World
 from services.base.runner import tell
-from services.base.service import IDLE_PERIOD, Handler, Output, Service
+from services.base.service import IDLE_PERIOD, Framed, Handler, Output, Service
 
 SHORTEST = 10_000
 """Microseconds; less harms no test, and usual on any machine."""
@@ -155,6 +155,7 @@ class Loop:
             self._run(stopped)
         except UnjudgeableError as error:
             raise UnjudgeableError(with_strangers(str(error), self._stamps.strangers())) from None
+        self._hear_rest()
         if self.service.finished and self.service.verdict is None:
             tell("end-of-input")
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
@@ -182,6 +183,15 @@ class Loop:
                 self._report(now)
             if service.finished and not self.clock.has_new_picture:
                 return
+
+    def _hear_rest(self) -> None:
+        """An observer gets what came before its end."""
+        end = self.clock.now()
+        while self.observes and not self.clock.relays and self.service.verdict is None:
+            envelope = self.receive(0.0)
+            if envelope is None or envelope.received > end:
+                return
+            self.handle(envelope)
 
     def receive(self, timeout: float) -> Envelope | None:
         """For the clock: the next envelope within ``timeout`` seconds."""
@@ -256,20 +266,21 @@ class Loop:
             self._paused, self._report_after = self.service.paused, now + REPORT_PERIOD
             tell("paused", seconds=round(self._paused, 3))
 
-    def _send(self, output: Message | Output | Envelope, now: int) -> None:
-        envelope = output if isinstance(output, Envelope) else self._envelope(output, now)
-        self._publish(envelope)
-        self.clock.sent(envelope)
-
-    def _publish(self, envelope: Envelope) -> None:
-        """Send an envelope on the bus, or where the application is not."""
-        if not self._world.holds(envelope):
-            self.session.send_envelope(envelope)
-        elif self.members is not None:
-            self.members.send(envelope)
-        elif not self.clock.relays:
-            name = self.session.messages.name(envelope.data_type)
-            raise SessionError(f"'{name}' must not come to the bus, and the services that get it are not known")
+    def _send(self, output: Message | Output | Envelope | list[Framed], now: int) -> None:
+        """Send on the bus, or where the application is not."""
+        if not isinstance(output, list):
+            output = [(output if isinstance(output, Envelope) else self._envelope(output, now), b"")]
+        frames = []
+        for envelope, frame in output:
+            self.clock.sent(envelope)
+            if not self._world.holds(envelope):
+                frames.append(frame or datagram(envelope))
+            elif self.members is not None:
+                self.members.send(envelope)
+            elif not self.clock.relays:
+                name = self.session.messages.name(envelope.data_type)
+                raise SessionError(f"'{name}' must not come to the bus, and the services that get it are not known")
+        self.session.send_frames(frames)
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:
         message, stamp, sampled = output if isinstance(output, Output) else Output(output, self.sender_stamp)

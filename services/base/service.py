@@ -124,6 +124,10 @@ class Output(NamedTuple):
     sample_time: int | None = None
 
 
+Framed = tuple[Envelope, bytes]
+"""An envelope with its frame on the bus; that is made of it where it is empty."""
+
+
 class Service:
     """A model as the loop sees it; models override what they need.
 
@@ -154,8 +158,8 @@ class Service:
     def begin(self, now: int) -> None:
         """All services are ready: the test begins."""
 
-    def update(self, now: int) -> Iterable[Message | Output | Envelope]:
-        """Messages to send at ``now``, which is their sample time; envelopes are sent unchanged."""
+    def update(self, now: int) -> Iterable[Message | Output | Envelope | list[Framed]]:
+        """Messages to send at ``now``, which is their sample time; envelopes are sent unchanged, lists fastest."""
         return ()
 
     def end_of_input(self, now: int) -> None:
@@ -178,7 +182,7 @@ class Context:
     resources: ExitStack = field(default_factory=ExitStack)
     clock: Clock = field(default_factory=RealTimeClock)
     session: Session | None = None
-    """The bus itself; only for a service with ``drive``."""
+    """The bus itself: what a service has to hear of it. Only one with ``drive`` uses it for more."""
     on_rig: bool = False
     """Whether the test runs on a rig, where a service that vanishes may have been unplugged."""
 

@@ -8,10 +8,9 @@ import os
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
-from dodo_dsl.opendlv.envelope import Envelope, FrameError, encode_frame
+from dodo_dsl.opendlv.address import FrameError
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from services.base.runner import tell
 
@@ -88,12 +87,21 @@ class RecordingFileError(ValueError):
     """A file that cannot become a recording, or a disk that is full."""
 
 
+def _new(path: Path) -> RecordingWriter:
+    try:
+        return RecordingWriter(path)
+    except FileExistsError:
+        raise RecordingFileError(f"{path} exists and is not overwritten") from None
+    except OSError as error:
+        raise RecordingFileError(f"{path} cannot be written: {error.strerror}") from None
+
+
 class RecordingFile:
-    """A new `.rec` file; a context manager. Once it has `max_size` bytes it takes no more messages, and logs that.
+    """A new `.rec` file. Once it has `max_size` bytes it takes no more messages, and logs that.
 
     ``traffic`` counts what it takes. Nothing is buffered in the process: whatever ends it, the file holds all frames
     written so far.
-    Raises RecordingError for a file that exists, and if none can be made.
+    Raises RecordingFileError for a file that exists, and if none can be made.
     """
 
     def __init__(self, path: Path, max_size: int | None = None, traffic: Traffic | None = None) -> None:
@@ -101,12 +109,7 @@ class RecordingFile:
         self._traffic = traffic
         self.left_out = 0
         self._max_size = max_size
-        try:
-            self._writer = RecordingWriter(path)
-        except FileExistsError:
-            raise RecordingFileError(f"{path} exists and is not overwritten") from None
-        except OSError as error:
-            raise RecordingFileError(f"{path} cannot be written: {error.strerror}") from None
+        self._writer = _new(path)
 
     @property
     def frames(self) -> int:
@@ -150,14 +153,6 @@ class RecordingFile:
             _log.warning("%d messages were not recorded", self.left_out)
         self._writer.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def _count(self, envelope: Envelope, size: int) -> None:
         try:
             if self._traffic is not None:
@@ -186,12 +181,7 @@ class NewestPictures:
         self._path, self._max_size = path, max_size
         self.is_on = True
         self._sizes: deque[int] = deque()
-        try:
-            self._writer = RecordingWriter(path)
-        except FileExistsError:
-            raise RecordingFileError(f"{path} exists and is not overwritten") from None
-        except OSError as error:
-            raise RecordingFileError(f"{path} cannot be written: {error.strerror}") from None
+        self._writer = _new(path)
 
     def write(self, envelope: Envelope) -> None:
         """Append a picture; oldest ones may go."""

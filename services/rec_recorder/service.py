@@ -20,6 +20,8 @@ FAST_LOOKS = 4
 """Looks a picture at most where the newest pictures are kept, of which none has to be exactly in time."""
 WAITING = 32_000_000
 """Bytes of pictures that wait to be encoded: 69 of 640 x 480 pixels, which take a third of a second at the end."""
+GATHERS = 0.01
+"""Seconds in which messages may gather, in real time: to wake for each one costs more than to record it."""
 COMMAND = "cluon.data.RecorderCommand"
 MEGABYTE = 1_000_000
 
@@ -73,7 +75,10 @@ def build(context: Context) -> Service:
     if flags["pictures"] and not flags["frames"]:
         raise ValueError("--pictures needs --frames: the rate of the pictures")
     max_size = flags["max-size"] and round(flags["max-size"] * MEGABYTE)
-    recording = context.resources.enter_context(RecordingFile(Path(flags["rec"]), max_size, _traffic(context)))
+    recording = RecordingFile(Path(flags["rec"]), max_size, _traffic(context))
+    context.resources.callback(recording.close)
+    if context.session is not None:
+        context.session.gathers = GATHERS
     if flags["paused"]:
         recording.is_on = False
     period, is_stepped = flags["frames"] and round(period_of(flags["frames"])), context.clock.relays

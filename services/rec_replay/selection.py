@@ -12,7 +12,7 @@ import numpy as np
 from dodo_dsl.opendlv import recording_times
 from dodo_dsl.opendlv.message_columns import Marks, Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet, UnknownMessage
-from dodo_dsl.opendlv.recording import Recording
+from dodo_dsl.opendlv.recording import Recording, matching
 
 IMAGE = 1055
 MICROSECONDS = 1_000_000
@@ -72,15 +72,11 @@ def select(recording: Recording, selection: Selection, known: MessageSet, max_ga
 
 
 def _named(index: np.ndarray, texts: Sequence[str], known: MessageSet) -> Marks:
-    marks: Marks = np.zeros(len(index), np.bool_)
     try:
-        keys = list(map(known.key, texts))
+        return matching(index, map(known.key, texts))
     except MessageError as error:
         hint = " (or give an id)" if isinstance(error, UnknownMessage) else ""
         raise SelectionError(f"{error}{hint}") from None
-    for id_, stamp in keys:
-        marks |= (index["data_type"] == id_) & (stamp is None or index["sender_stamp"] == stamp)
-    return marks
 
 
 PLAY, PAUSE, SEEK, STEP = 1, 2, 3, 4

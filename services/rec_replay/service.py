@@ -11,17 +11,18 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dodo_dsl.opendlv import message_versions, pixels
-from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.recording_times import DAY
 from services.base import Context, Service
-from services.base.service import Output, period_of
+from services.base.loop import TEST_BEGIN
+from services.base.service import Framed, Output, period_of
 from services.rec_replay.selection import IMAGE, MICROSECONDS, Part, Player, Selection, SelectionError, select
 from services.rec_replay.stream import EntryStream, PictureMemories, first_frame
 
 LOOKS_HZ = 1000.0
-LARGEST_PAYLOAD = 65_400
+LARGEST_FRAME = 65_480
+MOST_TOGETHER = 256
 STATUS_PERIOD = MICROSECONDS
 COMMAND, STATUS, NOT_SHOWN = "cluon.data.PlayerCommand", "cluon.data.PlayerStatus", "dodo.NotShown"
 _PLAYING = 2
@@ -60,13 +61,30 @@ class Replay(Service):
     def begin(self, now: int) -> None:
         self._player.play()
 
-    def update(self, now: int) -> Iterator[Output | Envelope]:
+    def update(self, now: int) -> Iterator[Output | list[Framed]]:
         player = self._player
         player.advance(now)
         if player.jumped:
-            self._jump()
-        while (entry := player.take()) is not None:
-            yield from self._play(*entry)
+            self._stream.seek(player.position)
+            player.jumped = False
+        together: list[Framed] = []
+        while (taken := player.take()) is not None:
+            entry, due = taken
+            envelope, frame, is_sent, picture = self._stream.take()
+            too_large = len(frame) > LARGEST_FRAME
+            if self._shifts:
+                envelope, frame = envelope._replace(sent=due, sample_time=due), b""
+            memories = self._memories if self._memories and self._stream.shown[entry] else None
+            if memories or len(together) == MOST_TOGETHER:
+                yield together
+                together = []
+            if memories and (picture is None or not memories.show(picture, envelope.sample_time)):
+                yield Output(self._missed(entry, due, memories.misfits), 0, due)
+            if is_sent and too_large:
+                self._too_large += 1
+            elif is_sent:
+                together.append((envelope, frame))
+        yield together
         if not player.ended:
             self._stream.prepare()
             self._end = None
@@ -104,25 +122,6 @@ class Replay(Service):
     def _command(self, message: Any, _sample_time: int) -> None:
         self._player.command(message.command, message.seekTo)
 
-    def _jump(self) -> None:
-        self._stream.seek(self._player.position)
-        self._player.jumped = False
-
-    def _play(self, entry: int, due: int) -> Iterator[Output | Envelope]:
-        """Show an entry's picture; the messages to send."""
-        envelope, is_sent, picture = self._stream.take()
-        envelope = envelope._replace(received=0)  # it has not been received yet
-        if self._shifts:
-            envelope = envelope._replace(sent=due, sample_time=due)
-        if self._memories is not None and self._stream.shown[entry]:
-            is_shown = picture is not None and self._memories.show(picture, envelope.sample_time)
-            if not is_shown:
-                yield Output(self._missed(entry, due, self._memories.misfits), 0, due)
-        if is_sent and len(envelope.payload) > LARGEST_PAYLOAD:
-            self._too_large += 1
-        elif is_sent:
-            yield envelope
-
     def _missed(self, entry: int, due: int, misfits: int) -> Message:
         """The message that a picture was not shown, and until when: evaluators expect no answer to it."""
         number, times, next_due = int(np.searchsorted(self._pictures, entry)), self._stream.times, self._next_due()
@@ -150,6 +149,8 @@ def build(context: Context) -> Service:
     player, stream = Player(part.due, flags["autorewind"]), EntryStream(recording, part)
     if not flags["await-begin"]:
         player.play()
+    if context.session is not None:  # what it sends itself would fill its buffer
+        context.session.hear_only(map(context.messages.id, (COMMAND, TEST_BEGIN)))
     settle = round(flags["settle"] * MICROSECONDS)
     memories = _memories(context, recording, part)
     service = Replay(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.pixels import with_copies
@@ -141,12 +142,8 @@ class PictureMemories:
 READ_AHEAD = 256
 
 
-class RecordedEntry(NamedTuple):
-    """An entry to play: ``picture`` if it is shown and could be decoded, ``is_sent`` if it goes to the bus."""
-
-    envelope: Envelope
-    is_sent: bool
-    picture: RecordedPicture | None
+Entry = tuple[Envelope, bytes, bool, RecordedPicture | None]
+"""A message, its frame as recorded, whether it is sent, and its picture if it is shown and could be decoded."""
 
 
 class EntryStream:
@@ -161,7 +158,7 @@ class EntryStream:
         """The sample times of entries, in us."""
         self._images = np.flatnonzero(part.shown)
         self._entries = self._from(0)
-        self._ahead: RecordedEntry | None = None
+        self._ahead: Entry | None = None
 
     def seek(self, position: int) -> None:
         """Go on with another entry; what its picture needs is decoded first."""
@@ -179,20 +176,21 @@ class EntryStream:
         if self._ahead is None:
             self._ahead = next(self._entries, None)
 
-    def take(self) -> RecordedEntry:
+    def take(self) -> Entry:
         """The next entry; raises StopIteration behind the last."""
         entry = self._ahead or next(self._entries)
         self._ahead = None
         return entry
 
-    def _from(self, position: int) -> Iterator[RecordedEntry]:
+    def _from(self, position: int) -> Iterator[Entry]:
         part = self._part
         for first in range(position, len(part), READ_AHEAD):
             last = first + READ_AHEAD
             marks = zip(part.sent[first:last].tolist(), part.shown[first:last].tolist(), strict=True)
-            envelopes = self._recording.envelopes(part.rows[first:last])
-            for envelope, (sent, shown) in zip(envelopes, marks, strict=True):
-                yield RecordedEntry(envelope, sent, self._decoded(envelope) if shown else None)
+            for batch in self._recording.batches(part.rows[first:last]):
+                batch.table[[Fact.RECEIVED_S, Fact.RECEIVED_US]] = 0  # it has not been received yet
+                for envelope, frame, (sent, shown) in zip(batch.envelopes(), batch.frames(), marks, strict=False):
+                    yield envelope, frame, sent, self._decoded(envelope) if shown else None
 
     def _decoded(self, envelope: Envelope) -> RecordedPicture | None:
         frame = self.decoder.frame(envelope)

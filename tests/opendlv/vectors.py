@@ -1,8 +1,12 @@
-"""Reader of the conformance vectors that libcluon itself wrote."""
+"""Envelopes for tests: the conformance vectors that libcluon itself wrote, and any."""
 
 import re
 from dataclasses import dataclass
 from pathlib import Path
+
+from hypothesis import strategies as st
+
+from dodo_dsl.opendlv.envelope import Envelope
 
 
 @dataclass(frozen=True)
@@ -34,3 +38,9 @@ def read(path: Path) -> list[Vector]:
         )
         for match in _VECTOR.finditer(path.read_text())
     ]
+
+
+TIMES = st.integers(-(2**31) * 1_000_000, 2**31 * 1_000_000 - 1)
+ENVELOPES = st.builds(
+    Envelope, st.integers(-(2**31), 2**31 - 1), st.binary(max_size=300), TIMES, TIMES, TIMES, st.integers(0, 2**32 - 1)
+)

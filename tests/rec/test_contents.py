@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from dodo_dsl.opendlv.envelope import encode_frame
 from tests.rec.conftest import BEGIN, dodo_rec, message, video
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
@@ -57,6 +58,16 @@ def test_json_for_programs(record: Callable[..., Path]) -> None:
     assert [(place["offset"], place["size"]) for place in found["skipped"]] == [(0, 5), (path.stat().st_size - 3, 3)]
     assert (found["skipped_places"], found["skipped_bytes"], found["untimed"]) == (2, 8, 1)
     assert "skipped 5 bytes at byte 0: a frame that is cut short" in dodo_rec("info", path, "--no-decode").stdout
+
+
+def test_what_is_odd_is_said(record: Callable[..., Path]) -> None:
+    path = record([])
+    times = [BEGIN + 1, BEGIN, 0, *range(BEGIN + 2, BEGIN + 11)]
+    path.write_bytes(b"".join(b"?" + encode_frame(message(STEERING, time)) for time in times))
+    lines = dodo_rec("info", path).stdout.splitlines()
+    assert "1 steps back in time, 1 messages without a sample time" in lines
+    assert sum(line.startswith("skipped 1 byte at byte ") for line in lines) == 10
+    assert "skipped 12 bytes at 12 positions in all" in lines
 
 
 def test_frames_count_from_the_first_key_frame_that_is_whole(record: Callable[..., Path]) -> None:

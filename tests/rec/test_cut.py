@@ -26,6 +26,7 @@ def drive(record: Callable[..., Path]) -> Path:
         (["--start", f"{BEGIN / 1e6 + 3:.6f}"], [6, 7, 8]),
         (["--message", f"{DISTANCE}/1", "--message", "1090"], [0, 2, 3, 5, 6, 8, 9, 11]),
         (["--message", DISTANCE, "--end", "1s"], [1, 2]),
+        (["--message", f"{DISTANCE}/1", "--start", "2"], [8, 11]),
         ([], list(range(12))),
     ],
 )

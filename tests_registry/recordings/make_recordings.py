@@ -15,6 +15,7 @@ import importlib.util
 import math
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -185,7 +186,7 @@ def make(folder: Path, names: Iterable[str] = RECORDINGS) -> None:
         path = folder / f"{name}.rec"
         part = path.with_suffix(".part")
         part.unlink(missing_ok=True)
-        with RecordingFile(part) as recording:
+        with closing(RecordingFile(part)) as recording:
             play(Recorded(recording))
         part.replace(path)
 

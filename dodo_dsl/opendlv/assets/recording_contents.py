@@ -1,5 +1,6 @@
 """What a recording holds, as far as a test needs it: looked for without an index, and only until it is found."""
 
+import collections
 import functools
 import io
 import itertools
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.opendlv.address import HEADER_BYTES, MAGIC, FrameError, body_length
+from dodo_dsl.opendlv.address import HEADER_BYTES, FrameError, body_length
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.opendlv.wire import first_message, first_number, unzigzag
 
@@ -47,11 +48,13 @@ def look(path: Path, message: int, sender: int) -> LookedThrough:
     """Looks for a message of a sender, from the start to the first bytes that are not a message; raises OSError."""
     with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
         found = LookedThrough(os.fstat(stream.fileno()).st_size)
-        for body in _bodies(stream, found):
+        bodies = _bodies(stream, found)
+        for body in bodies:
             if _type(body) == message:
                 found.senders.add(first_number(body, _STAMP_FIELD))
                 if sender in found.senders:
-                    found.is_whole = found.size > SMALL_BYTES or _end(stream.read()) + found.ends_at == found.size
+                    found.is_whole = found.size > SMALL_BYTES
+                    collections.deque(() if found.is_whole else bodies, 0)
                     return found
     return found
 
@@ -64,17 +67,6 @@ def count(path: Path, message: int, sender: int, most: int) -> int | None:
         found = (1 for body in bodies if _type(body) == message and first_number(body, _STAMP_FIELD) == sender)
         number = sum(itertools.islice(found, most))
     return number if number == most or looked.is_whole else None
-
-
-def _end(data: bytes) -> int:
-    """Where the first bytes are that are not a whole frame."""
-    at = 0
-    while data[at : at + 2] == MAGIC and at + HEADER_BYTES <= len(data):
-        behind = at + HEADER_BYTES + body_length(data[at : at + HEADER_BYTES])
-        if behind > len(data):
-            break
-        at = behind
-    return at
 
 
 def problems(path: Path, message: int, sender: int, name: str, is_needed: bool) -> Iterator[InputError]:

@@ -5,13 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.envelope import Envelope, FrameError, body_length, decode_frame, encode_frame
+from dodo_dsl.opendlv.address import FrameError, body_length
+from dodo_dsl.opendlv.envelope import Envelope, decode_frame, encode_frame
 from tests.opendlv import vectors
-
-times = st.integers(-(2**31) * 1_000_000, 2**31 * 1_000_000 - 1)
-envelopes = st.builds(
-    Envelope, st.integers(-(2**31), 2**31 - 1), st.binary(), times, times, times, st.integers(0, 2**32 - 1)
-)
 
 
 def framed(body: bytes) -> bytes:
@@ -25,7 +21,7 @@ def test_frames_of_libcluon(shared_data: Callable[[str], Path]) -> None:
         assert encode_frame(envelope) == vector.frame
 
 
-@given(envelopes)
+@given(vectors.ENVELOPES)
 def test_round_trip(envelope: Envelope) -> None:
     assert decode_frame(encode_frame(envelope)) == envelope
 

@@ -3,6 +3,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 
@@ -165,6 +166,17 @@ def test_waiting_ends_with_the_timeout(cid: int) -> None:
     with Session(cid) as session:
         start = time.monotonic()
         assert session.receive(0.05) is None
+        assert time.monotonic() - start >= 0.05
+
+
+def test_messages_gather_behind_one_that_came(cid: int) -> None:
+    with Session(cid) as session, Session(cid) as other:
+        session.gathers = 0.05
+        other.send(STEERING())
+        assert session.receive(5.0) is not None
+        threading.Timer(0.001, other.send, [STEERING()]).start()
+        start = time.monotonic()
+        assert session.receive(5.0) is not None
         assert time.monotonic() - start >= 0.05
 
 

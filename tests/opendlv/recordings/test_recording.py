@@ -3,7 +3,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv import recording as recordings
 from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.recording import MAX_PLACES, Damage, DamagePlace, Recording, RecordingError, read_envelopes
+from tests.opendlv import vectors
 
-times = st.integers(-(2**31) * 1_000_000, 2**31 * 1_000_000 - 1)
-envelopes = st.builds(
-    Envelope,
-    st.integers(-(2**31), 2**31 - 1),
-    st.binary(max_size=80),
-    times,
-    times,
-    times | st.just(0),
-    st.integers(0, 2**32 - 1),
-)
+envelopes = vectors.ENVELOPES | vectors.ENVELOPES.map(lambda envelope: envelope._replace(sample_time=0))
 UNUSUAL = [
     b"",  # nothing: all zero
     b"\x30\x05\x08\x02",  # another order
@@ -46,9 +39,12 @@ def read(path: Path) -> tuple[list[Envelope], Damage]:
     return found, told[0]
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("recordings")
+@pytest.fixture(scope="module", params=[16, recordings.CHUNK_BYTES])
+def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Read some bytes at a time, which end anywhere in a frame."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recordings, "CHUNK_BYTES", request.param)
+        yield tmp_path_factory.mktemp("recordings")
 
 
 @given(st.lists(envelopes, min_size=1, max_size=60))
@@ -59,6 +55,7 @@ def test_stream_and_index_give_what_was_written(folder: Path, written: list[Enve
     with Recording(path) as recording:
         assert len(recording) == len(written) and not recording.damage
         assert list(recording.envelopes()) == written
+        assert [f for batch in recording.batches() for f in batch.frames()] == list(map(encode_frame, written))
         assert recording.envelope(len(written) - 1) == written[-1]
         assert [recording.index[c].tolist() for c in ("data_type", "sender_stamp", "sampled")] == [
             [e.data_type for e in written],
@@ -157,6 +154,8 @@ def test_rows_by_message_sender_and_time(tmp_path: Path) -> None:
         assert recording.rows(start=20, end=40).tolist() == [2, 3]
         assert recording.index["time"][0] == 9  # no sample time: when it was received
         assert list(recording.envelopes(np.array([7, 2, 7]))) == [frames[7], frames[2], frames[7]]
+        (batch,) = recording.batches()
+        assert list(batch.select(np.array([2, 0])).envelopes()) == [frames[2], frames[0]]
 
 
 @pytest.mark.slow

@@ -3,7 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.envelope import Envelope, FrameError, encode_frame
+from dodo_dsl.opendlv.address import FrameError
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 

@@ -1,5 +1,6 @@
 import resource
 import signal
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -9,29 +10,18 @@ from hypothesis import strategies as st
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.recording import read_envelopes
 from services.rec_recorder.model import RecordingFile, RecordingFileError
-
-times = st.integers(0, 2**31 * 1_000_000 - 1)
-envelopes = st.builds(Envelope, st.integers(1, 5000), st.binary(max_size=300), times, times, times, st.integers(0, 9))
+from tests.opendlv.vectors import ENVELOPES
 
 
-@given(st.lists(envelopes, max_size=20))
+@given(st.lists(ENVELOPES, max_size=20))
 @pytest.mark.thorough
 def test_what_is_written_is_read_again(tmp_path_factory: pytest.TempPathFactory, written: list[Envelope]) -> None:
     path = tmp_path_factory.mktemp("rec") / "drive.rec"
-    with RecordingFile(path) as recording:
+    with closing(RecordingFile(path)) as recording:
         for envelope in written:
             recording.write(envelope)
         assert list(read_envelopes(path)) == written  # before it is closed: a killed recorder leaves this
     assert recording.frames == len(written)
-
-
-def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "drive.rec"
-    path.write_bytes(b"dear")
-    with pytest.raises(RecordingFileError) as caught:
-        RecordingFile(path)
-    assert str(caught.value) == f"{path} exists and is not overwritten"
-    assert path.read_bytes() == b"dear"
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
@@ -45,7 +35,7 @@ def envelope(number: int) -> Envelope:
 
 def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "drive.rec"
-    with RecordingFile(path, max_size=300) as recording:
+    with closing(RecordingFile(path, max_size=300)) as recording:
         for number in range(5):
             recording.write(envelope(number))
     assert len(list(read_envelopes(path))) == 2
@@ -58,7 +48,7 @@ def test_it_stops_at_its_largest_size(tmp_path: Path, caplog: pytest.LogCaptureF
 
 def test_commands_stop_it_and_let_it_go_on(tmp_path: Path) -> None:
     path = tmp_path / "drive.rec"
-    with RecordingFile(path) as recording:
+    with closing(RecordingFile(path)) as recording:
         for number, command in enumerate((1, 2, 7, 1, 1, 2)):
             recording.write(envelope(number))
             recording.command(command)
@@ -72,7 +62,7 @@ def test_a_full_disk_ends_it_with_a_readable_file(tmp_path: Path) -> None:
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
     try:
-        with RecordingFile(path) as recording, pytest.raises(RecordingFileError) as caught:
+        with closing(RecordingFile(path)) as recording, pytest.raises(RecordingFileError) as caught:
             for number in range(50):
                 recording.write(envelope(number))
     finally:

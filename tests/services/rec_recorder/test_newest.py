@@ -6,7 +6,7 @@ import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.recording import read_envelopes
-from services.rec_recorder.model import NewestPictures, RecordingFileError
+from services.rec_recorder.model import NewestPictures
 
 
 def picture(number: int, size: int = 100) -> Envelope:
@@ -34,14 +34,6 @@ def test_a_picture_that_fits_nowhere_ends_it(tmp_path: Path, caplog: pytest.LogC
     pictures.close()
     assert (pictures.is_on, len(list(read_envelopes(path)))) == (False, 1)
     assert [r.getMessage() for r in caplog.records] == ["no more pictures are recorded: a picture has 2031 bytes"]
-
-
-def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "frames.rec"
-    path.write_bytes(b"dear")
-    with pytest.raises(RecordingFileError, match="exists and is not overwritten"):
-        NewestPictures(path, 1500)
-    assert path.read_bytes() == b"dear"
 
 
 def test_a_link_in_its_place_is_not_read(tmp_path: Path) -> None:

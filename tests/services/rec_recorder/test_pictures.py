@@ -13,15 +13,12 @@ import pytest
 from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.recording import read_envelopes
-from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from dodo_dsl.opendlv.video import VideoDecoder, VideoEncoder
 from services.rec_recorder import service
 from services.rec_recorder.service import Recorder
 from services.rec_recorder.source import SourceError
 from tests.services.built import MESSAGES, built, refusal
-from tests.services.process import running, send
-from tests.services.rec_replay.viewer import Viewer
 
 WIDTH, HEIGHT, COUNT = 160, 120, 8
 T0, PERIOD = 1_700_000_000_000_000, 50_000
@@ -103,24 +100,6 @@ def test_lossless_pictures_are_decoded_bit_for_bit(tmp_path: Path, kind: str) ->
     for number, envelope in enumerate(envelopes):
         frame = decoder.decode(MESSAGES.decode(IMAGE, envelope.payload).data)
         assert frame is not None and np.array_equal(frame.pixels(kind), scene(number, kind))
-
-
-@pytest.mark.realtime
-@pytest.mark.parametrize("kind", ["i420", "argb"])
-def test_lossless_pictures_come_back_bit_for_bit(cid: int, tmp_path: Path, kind: str) -> None:
-    path = record(tmp_path, kind, "--lossless")
-    assert sum(e.data_type == 1086 for e in read_envelopes(path)) == COUNT
-    name = f"played-{os.getpid()}"
-    names = [f"--name.{each}={name}.{each}" for each in ("argb", "i420")]
-    with (
-        Session(cid) as session,
-        running("rec_replay", tmp_path, f"--cid={cid}", f"--rec={path}", *names),
-        Viewer(f"{name}.{kind}") as viewer,
-    ):
-        time.sleep(0.1)
-        send(session, "dodo.TestBegin")
-        viewer.wait_for(COUNT)
-    assert viewer.seen == [(scene(n, kind).tobytes(), T0 + n * PERIOD) for n in range(COUNT)]
 
 
 def test_messages_are_as_opendlv_has_them(tmp_path: Path) -> None:

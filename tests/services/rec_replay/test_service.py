@@ -63,7 +63,7 @@ class Stage:
                 if isinstance(each, Output):
                     self.status.append(each.message)
                 else:
-                    self.heard.append((self.now - BEGIN, each))
+                    self.heard.extend((self.now - BEGIN, envelope) for envelope, _ in each)
             self.now += 1000
 
     @property
