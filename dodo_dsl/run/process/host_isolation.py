@@ -141,9 +141,9 @@ async def host_slot(
     try:
         held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
         order = [plan.cid, *(c for c in cids if c != plan.cid)]
-        lease = await leases.lease_any([f"cid-{c}" for c in order], about, say, attempt=attempt)
+        lease = await leases.lease_any([f"{leases.CID}{c}" for c in order], about, say, attempt=attempt)
         held.append(lease)
-        cid = int(lease.name.removeprefix("cid-"))
+        cid = int(lease.name.removeprefix(leases.CID))
         foreigner = await asyncio.get_running_loop().run_in_executor(None, listen, cid)
         if foreigner:
             raise BackendError(
