@@ -51,33 +51,28 @@ class SandboxClient:
 
         ``entered`` are its namespaces; None on the host.
         """
-        answer: dict[str, Any] = {}
-        server = self._fork_server if entered else None
-        for each in (server, None) if server else (None,):  # it may have ended
-            answer = await self._start(slot, log, entered.word() if entered else HOST, each)
-            if "up" in answer:
-                break
+        answer = await self._start(slot, log, entered)
+        if "up" not in answer:
             self._close_socket()
-        else:
             raise BackendError(f"the test's sandbox does not start: {answer['down']}")
         self.pid = answer["up"]
         with contextlib.suppress(ProcessLookupError):
             self._end = os.pidfd_open(answer["up"])
 
-    async def _start(self, slot: Slot, log: int, entered: str, server: ForkServer | None) -> dict[str, Any]:
+    async def _start(self, slot: Slot, log: int, entered: Entered | None) -> dict[str, Any]:
         """The first message of a new sandbox, which a fork server forks, where there is one."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
         self._socket, self._up = ours, asyncio.get_running_loop().create_future()
         asyncio.get_running_loop().add_reader(ours, self._receive)
         with theirs:
-            if server is not None:
+            if entered and self._fork_server is not None:
                 with contextlib.suppress(OSError):
-                    server.fork(theirs, log, slot.name, entered)
+                    self._fork_server.fork(theirs, log, slot.name, entered.word())
             else:
                 module = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox"]
                 self._child = subprocess.Popen(
-                    [*module, str(theirs.fileno()), entered],
+                    [*module, str(theirs.fileno()), entered.word() if entered else HOST],
                     pass_fds=(theirs.fileno(), *slot.descriptors),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -120,14 +115,18 @@ class SandboxClient:
         if self._up is not None and not self._up.done():
             self._up.set_result(answer)
 
+    def start(self, command: dict[str, Any], output: int) -> None:
+        """Starts a process with an output, by a file, as words and variables may be longer than a message."""
+        with os.fdopen(os.memfd_create("command"), "wb") as file:
+            file.write(json.dumps(command).encode())
+            file.flush()
+            self.send({"do": "start"}, (output, file.fileno()))
+
     def send(self, message: dict[str, Any], descriptors: tuple[int, ...] = ()) -> None:
-        """Sends a message with descriptors; raises ValueError when it is longer than the sandbox reads at once."""
+        """Sends a message with descriptors."""
         assert self._socket is not None
-        data = json.dumps(message).encode()
-        if len(data) > MAX_MESSAGE:
-            raise ValueError(f"{len(data):,} bytes of words and variables, expected at most {MAX_MESSAGE:,}")
         try:
-            send_with_patience(self._socket, data, descriptors)
+            send_with_patience(self._socket, json.dumps(message).encode(), descriptors)
         except OSError as error:
             self._on_lost(f"the test's sandbox cannot be reached: {error.strerror}")
 
