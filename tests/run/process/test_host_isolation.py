@@ -148,7 +148,7 @@ def test_a_strange_record_removes_nothing_but_itself(slot: object, folder: Path)
 
 @pytest.mark.slow
 def test_a_fork_server_answers_as_a_sandbox_of_its_own_does() -> None:
-    server = ForkServer(())
+    server = ForkServer()
     try:
         assert asyncio.run(isolation_refusal(server)) == asyncio.run(isolation_refusal())
     finally:

@@ -34,7 +34,7 @@ def test_words_and_variables_may_be_longer_than_a_message(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_a_fork_server_that_has_ended_is_not_the_kernels_fault(tmp_path: Path) -> None:
-    server = ForkServer(())
+    server = ForkServer()
     server.kill()
     refusal = asyncio.run(isolation_refusal(server))
     assert refusal is not None and not refusal.remedy
