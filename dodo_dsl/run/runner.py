@@ -16,7 +16,7 @@ from dodo_dsl.run.attempts import Attempts, is_undecided
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.outcomes import error_outcome, error_reason
 from dodo_dsl.run.run_state import Standing
-from dodo_dsl.run.schedule import CorePool, Schedule, Share
+from dodo_dsl.run.schedule import CorePool, Schedule
 
 BackendName = Literal["process", "docker", "mixed"]
 Finished = Callable[[Job, Outcome], None]
@@ -125,11 +125,7 @@ class Runner:
     async def _one(self, job: Job) -> Outcome | None:
         """A test's outcome, or None when no further test was to begin."""
 
-        async def first(share: Share) -> Outcome:
-            return await self._attempts.outcome(job, lambda: share.shrink(need))
-
-        need = self.schedule.need(job)
-        outcome = await self._turn(job, max(need, self.schedule.setup), first)
+        outcome = await self._turn(job, self.schedule.need(job), functools.partial(self._attempts.outcome, job))
         if outcome is None:
             self.skipped.append(job)
             return None
@@ -144,15 +140,15 @@ class Runner:
         self._show_rest()
         return outcome
 
-    async def _turn(self, job: Job, cores: float, attempt: Callable[[Share], Awaitable[Outcome]]) -> Outcome | None:
+    async def _turn(self, job: Job, cores: int, attempt: Callable[[], Awaitable[Outcome]]) -> Outcome | None:
         """The outcome of an attempt with some cores, in its turn; None when no further one was to begin."""
         try:
-            async with self._cores.take(cores) as share:
+            async with self._cores.take(cores):
                 self._waiting.remove(job)
                 if self._stop or self.interrupted:
                     return None
                 self._began[job.plan.slug] = (job, _now())
-                return await attempt(share)
+                return await attempt()
         except asyncio.CancelledError:
             return None
         except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
@@ -160,7 +156,7 @@ class Runner:
         finally:
             self._began.pop(job.plan.slug, None)
 
-    async def _again(self, job: Job, first: Outcome, _share: Share) -> Outcome:
+    async def _again(self, job: Job, first: Outcome) -> Outcome:
         """The outcome of a test for which the machine was too busy."""
         if problem := self._attempts.set_aside(job):
             return replace(first, notes=(*first.notes, f"not tried again alone, {problem}"))
