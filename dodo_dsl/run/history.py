@@ -40,8 +40,6 @@ class PastRun:
     execution_s: float
     checks: Mapping[str, float] = field(default_factory=dict)
     """Values by name, of names that one check has."""
-    timed: bool = False
-    """Whether the application acted by its own clock in lockstep."""
     repository: str = ""
     """The folder of the repository that it ran in."""
 
@@ -101,17 +99,12 @@ class History:
         runs = [run for run in self._alike(spec, test, backend, clock) if run.checks]
         return [{"when": r.when, "outcome": r.outcome, "checks": dict(r.checks)} for r in runs[-_SHOWN:]]
 
-    def is_timed(self, spec: str, test: str) -> bool:
-        """Whether the application acted by its own clock in the latest run of a test in lockstep."""
-        seen = [run.timed for run in self._of[spec, test] if run.clock == "lockstep"]
-        return bool(seen and seen[-1])
-
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
         """Adds pairs of a test's name and its outcome; errors are left out, because they say nothing about its time."""
         self._take(
             PastRun(
                 int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s,
-                _values(o.checks), bool(o.response and o.response.unasked), self._repository,
+                _values(o.checks), self._repository,
             )
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None

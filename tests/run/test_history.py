@@ -8,7 +8,7 @@ from typing import Literal
 
 import pytest
 
-from dodo_dsl.outcome import Outcome, Response
+from dodo_dsl.outcome import Outcome
 from dodo_dsl.run import history
 from dodo_dsl.run.history import History
 from dodo_dsl.run.outcomes import error_outcome
@@ -70,20 +70,6 @@ def test_times_are_apart_by_clock() -> None:
     found.add([(name, outcome), (name, replace(outcome, clock="lockstep")), (name, replace(outcome, backend="docker"))])
     assert found.times([("a/a.dodo.yml", "a")], "process") == {"a": [(1.0, 2.0)], "a (lockstep)": [(1.0, 2.0)]}
     assert found.times([], "process") == {}
-
-
-def test_the_latest_run_in_lockstep_tells_whether_the_application_has_a_clock_of_its_own(tmp_path: Path) -> None:
-    path = tmp_path / "history.jsonl"
-    path.write_text(json.dumps({**LINE, "clock": "lockstep"}) + "\n")
-    found, (name, outcome) = History(path), took(1.0, 2.0)
-    assert not found.is_timed("s", "t"), "a run of an earlier version, which did not look"
-    stepped = replace(outcome, clock="lockstep")
-    for unasked, is_timed in ((0, False), (2, True), (0, False)):
-        response = Response(9, 0.1, 0.1, 0.1, 0.1, None, None, None, 0, None, "", pauses=2, unasked=unasked)
-        found.add([(name, replace(stepped, response=response)), (name, outcome)])
-        assert found.is_timed(outcome.spec, name) is is_timed
-    found.save()
-    assert [run.timed for run in History(path).runs] == [False, False, False, True, False, False, False]
 
 
 @pytest.mark.parametrize(
