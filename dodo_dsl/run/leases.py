@@ -113,12 +113,9 @@ def arrived() -> Iterator[None]:
 def _alone() -> Iterator[Path]:
     """The lease folder, in which nobody else looks or writes meanwhile; not to be nested."""
     path = lease_folder() / _LOCK
-    flags = os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW
-    try:
-        descriptor = os.open(path, flags)
-    except FileNotFoundError:  # kernels refuse O_CREAT on another user's file in a sticky folder
-        descriptor = os.open(path, flags | os.O_CREAT, _MODE)
-        os.fchmod(descriptor, _MODE)
+    with contextlib.suppress(FileExistsError):
+        os.close(_created(path))
+    descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield path.parent
@@ -126,11 +123,19 @@ def _alone() -> Iterator[Path]:
         os.close(descriptor)
 
 
+def _created(path: Path) -> int:
+    """The descriptor of a new file, which whoever shares the folder can read and write, whatever the user's umask."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
+    os.fchmod(descriptor, _MODE)
+    with contextlib.suppress(OSError):  # of a group that this user is not in
+        os.fchown(descriptor, -1, path.parent.stat().st_gid)
+    return descriptor
+
+
 def _written(path: Path, claim: Claim) -> int:
     """The locked descriptor of a new file."""
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
+    descriptor = _created(path)
     try:
-        os.fchmod(descriptor, _MODE)
         fcntl.flock(descriptor, fcntl.LOCK_EX)
         os.write(descriptor, msgspec.json.encode(claim))
     except OSError:

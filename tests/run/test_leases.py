@@ -1,10 +1,12 @@
 """Leases: held, shared, waited for, left to others, and with records that are damaged or another user's."""
 
 import asyncio
+import contextlib
 import fcntl
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -19,6 +21,37 @@ from tests.run.scripted import run
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("DODO_LEASES", str(tmp_path))
     return tmp_path
+
+
+TAKES = """
+import os, sys
+from dodo_dsl.run import leases
+os.umask(0o077)
+os.setgroups([65111])
+os.setresgid(*[int(sys.argv[2])] * 3)
+os.setresuid(*[int(sys.argv[2])] * 3)
+lease = leases.try_lease(sys.argv[1], {"test": "of " + str(os.getuid())})
+print("taken" if lease else leases.holder(sys.argv[1]), flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can be two users")
+def test_users_of_a_group_exclude_each_other_and_name_the_holder() -> None:
+    """In a folder of root's, as an operator of rigs names it."""
+    with tempfile.TemporaryDirectory() as name, contextlib.ExitStack() as stack:
+        os.chown(name, 0, 65_111)
+        Path(name).chmod(0o770)
+        said = []
+        for user, lease in (("65001", "cid-121"), ("65002", "cid-121"), ("65002", "cid-122")):
+            one = subprocess.Popen(
+                [sys.executable, "-c", TAKES, lease, user], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                env={**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": name},
+            )  # fmt: skip
+            stack.callback(one.communicate, "")
+            assert one.stdout is not None
+            said.append(one.stdout.readline().strip().partition(" of process")[0])
+    assert said == ["taken", "test of 65001", "taken"]
 
 
 def take(name: str, shared: bool = False) -> Lease:
