@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -66,12 +67,7 @@ class Attempts:
     async def _attempt(self, job: Job) -> Outcome:
         slug, outcome = job.plan.slug, None
         self._made[slug] = self._made.get(slug, 0) + 1
-
-        def say(text: str) -> None:
-            self._phase(slug, text)
-
-        def stands(standing: Standing) -> None:
-            self._standing(slug, standing)
+        say, stands = functools.partial(self._phase, slug), functools.partial(self._standing, slug)
 
         def forget_pictures() -> None:
             with contextlib.suppress(OSError):

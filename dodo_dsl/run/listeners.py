@@ -11,7 +11,7 @@ _PROC = Path("/proc")
 _LOCAL, _INODE = 1, 9
 """Columns of ``/proc/PID/net/udp`` (proc_pid_net(5))."""
 _SOCKET = "socket:["
-_BUSES, _HEX_DIGITS = bytes((225, 0, 0)), 8
+_BUSES = bytes((225, 0, 0))
 
 
 def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | None:
@@ -36,20 +36,16 @@ def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | Non
 def joined(process: Path = _PROC / "self") -> set[int] | None:
     """The CIDs whose buses programs have joined in the network of a process; None if the kernel does not say."""
     try:
-        words = [line.split()[0] for line in (process / "net" / "igmp").read_text().splitlines()]
+        lines = (process / "net" / "igmp").read_text().splitlines()
     except OSError:
         return None
-    groups = [int(word, 16).to_bytes(4, sys.byteorder) for word in words if _is_group(word)]
+    groups = [int(line.split()[0], 16).to_bytes(4, sys.byteorder) for line in lines if line.startswith("\t")]
     return {parts[3] for parts in groups if parts[:3] == _BUSES and parts[3]}
 
 
 def buses(processes: Iterable[int], proc: Path = _PROC) -> set[int]:
     """The CIDs whose buses programs have joined in the networks of processes, as far as the kernel says."""
     return set[int]().union(*(joined(proc / str(pid)) or () for pid in processes))
-
-
-def _is_group(word: str) -> bool:
-    return len(word) == _HEX_DIGITS and set(word) <= set("0123456789ABCDEF")
 
 
 def _sockets(process: Path) -> set[str]:
