@@ -124,7 +124,7 @@ def _alone() -> Iterator[Path]:
 
 
 def _created(path: Path) -> int:
-    """The descriptor of a new file, which whoever shares the folder can read and write, whatever the user's umask."""
+    """The descriptor of a new file, which all users of the folder can read and write, whatever the umask is."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE)
     os.fchmod(descriptor, _MODE)
     with contextlib.suppress(OSError):  # of a group that this user is not in

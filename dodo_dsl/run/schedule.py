@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import heapq
 import os
-from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 
@@ -52,34 +51,14 @@ class CorePool:
     """Cores that tests take and give back, first come, first served."""
 
     def __init__(self, capacity: int) -> None:
-        self._capacity = self._free = capacity
-        self._waiting: deque[tuple[int, asyncio.Future[None]]] = deque()
+        self._capacity, self._free, self._turn = capacity, asyncio.Semaphore(capacity), asyncio.Lock()
 
     @contextlib.asynccontextmanager
     async def take(self, need: int) -> AsyncIterator[None]:
         """Waits until ``need`` cores are free; a test that needs more than there are takes all."""
-        need = min(need, self._capacity)
-        turn = asyncio.get_running_loop().create_future()
-        self._waiting.append((need, turn))
-        self._serve()
-        try:
-            await turn
-        except asyncio.CancelledError:
-            if turn.done() and not turn.cancelled():
-                self._give(need)
-            raise
-        try:
+        with contextlib.ExitStack() as taken:
+            async with self._turn:
+                for _ in range(min(need, self._capacity)):
+                    await self._free.acquire()
+                    taken.callback(self._free.release)
             yield
-        finally:
-            self._give(need)
-
-    def _give(self, need: int) -> None:
-        self._free += need
-        self._serve()
-
-    def _serve(self) -> None:
-        while self._waiting and (self._waiting[0][1].done() or self._waiting[0][0] <= self._free):
-            need, turn = self._waiting.popleft()
-            if not turn.done():
-                self._free -= need
-                turn.set_result(None)
