@@ -64,12 +64,12 @@ class Lease:
 
     name: str
     descriptor: int
-    path: Path
+    record: Path
 
     def release(self) -> None:
         """Gives up this process's hold, and leaves nothing to be removed."""
         with contextlib.suppress(OSError):  # the next run removes the rest
-            self.path.unlink(missing_ok=True)
+            self.record.unlink(missing_ok=True)
         os.close(self.descriptor)
 
     def leave(self) -> None:
