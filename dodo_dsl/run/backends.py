@@ -76,7 +76,7 @@ class Processes:
 
         A ``session`` spares rigs that stay fit their checks between tests.
 
-        ``loaded`` gives a fork server that was started while tests were compiled.
+        ``loaded`` gives a fork server that was started with the same ``descriptors`` while tests were compiled.
         """
         self._cids = cids
         self._roots = roots
