@@ -56,8 +56,7 @@ def known_seconds(times: Sequence[Path]) -> dict[str, float]:
 
 def at_once(order: Schedule, jobs: Sequence[Job]) -> str:
     """How many tests run at a time, in words."""
-    least = max(min(order.need(job) for job in jobs), 0.01)
-    most = min(1 + int((order.capacity - max(least, order.setup)) / least), len(jobs))
+    most = min(order.capacity // min(order.need(job) for job in jobs), len(jobs))
     return f"{'up to ' * (len(jobs) > 1)}{max(most, 1)} at a time"
 
 
@@ -67,17 +66,6 @@ def run_forecast(order: Schedule, jobs: Sequence[Job], backend: str) -> str:
     known = all(history.seconds(j.plan.spec, j.test, backend, j.plan.clock) is not None for j in jobs)
     seconds = order.forecast(order.ordered(jobs))
     return progress.about(seconds) if known else progress.about(seconds).replace("about", "at most")
-
-
-def usage(backend: str) -> Callable[[Job], float | None]:
-    """How many cores a job used according to the history."""
-    history = History()
-
-    @functools.cache
-    def known(spec: str, test: str, clock: str) -> float | None:
-        return history.cores(spec, test, backend, clock)
-
-    return lambda job: known(job.plan.spec, job.test, job.plan.clock)
 
 
 def expectation(backend: str) -> Callable[[Job], float]:

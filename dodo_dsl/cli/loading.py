@@ -50,7 +50,6 @@ def loading(options: argparse.Namespace, descriptor: int) -> Iterator[Loading]:
                 unneeded.kill()
         else:
             load.fork_server = load.fork_server or ForkServer()
-            load.fork_server.hold(descriptor)
         yield load
     finally:
         if left := load.take():

@@ -16,7 +16,7 @@ from typing import TextIO, cast
 from dodo_dsl.cli import display, progress, run_report, selection
 from dodo_dsl.cli.display import Verbosity, chatter
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
-from dodo_dsl.cli.forecast import at_once, expectation, run_forecast, usage
+from dodo_dsl.cli.forecast import at_once, expectation, run_forecast
 from dodo_dsl.cli.loading import Loading, loading
 from dodo_dsl.cli.numbers import positive, seconds, seed
 from dodo_dsl.cli.provenance import Origin, origin, recording
@@ -204,7 +204,7 @@ def runner_of(
     """The runner of these jobs, announced."""
     plans = [job.plan for job in jobs]
     backend = options.backend or choose_backend(plans)
-    order = schedule(options.jobs, expectation(backend), usage(backend))
+    order = schedule(options.jobs, expectation(backend))
     stdout.write(f"{progress.count(len(jobs))}, {at_once(order, jobs)}, {backend} backend; ")
     stdout.write(f"{run_forecast(order, jobs, backend)}\n")
     shown = progress.choose(stdout, [p.slug for p in plans], options.verbosity)

@@ -28,7 +28,6 @@ from dodo_dsl.plan.runs import named, runs
 from dodo_dsl.plan.test_files import file_problem
 from dodo_dsl.report.results import FILE_NAME
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.history import History
 from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.load import Settings, of_test
@@ -100,11 +99,8 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
     report = _usable(options.report, [named(p).slug for p in plans])
     families = {plan.slug: tests.get(plan.slug, named(plan).slug) for plan in plans}
     found: dict[str, Job] = {}
-    history = History()
     for run in runs(plans, settings.repeat):
         plan = named(run.plan)
-        if not plan.lockstep and history.is_timed(plan.spec, families[run.test]):
-            plan = replace(plan, timed=plan.timed or ("application",))
         job = Job(plan, folders[run.test], report / plan.slug, families[run.test], work=folder)
         first = found.get(plan.slug)
         found[plan.slug] = replace(first, others=(*first.others, job)) if first else job

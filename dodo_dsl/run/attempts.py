@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -37,15 +38,14 @@ class Attempts:
         self._stopped, self._standing = stopped, standing
         self._made: dict[str, int] = {}
 
-    async def outcome(self, job: Job, begun: Callable[[], None] = lambda: None, alone: bool = False) -> Outcome:
+    async def outcome(self, job: Job, alone: bool = False) -> Outcome:
         """That of the last attempt; earlier ones are kept in the report, too.
 
-        What a busy machine left undecided is tried again when the test is ``alone``, and not at once. ``begun`` is
-        called when set-up is over.
+        What a busy machine left undecided is tried again when the test is ``alone``, and not at once.
         """
         notes: tuple[str, ...] = ()
         for left in range(self._retries, -1, -1):
-            outcome = await self._attempt(job, begun)
+            outcome = await self._attempt(job)
             is_over = outcome.outcome != "error" or (is_undecided(outcome) and not alone)
             if is_over or self._stopped() or not left:
                 break
@@ -64,15 +64,10 @@ class Attempts:
             return f"because its report cannot be moved: {system_error(error)}"
         return ""
 
-    async def _attempt(self, job: Job, begun: Callable[[], None]) -> Outcome:
+    async def _attempt(self, job: Job) -> Outcome:
         slug, outcome = job.plan.slug, None
         self._made[slug] = self._made.get(slug, 0) + 1
-
-        def say(text: str) -> None:
-            self._phase(slug, text)
-
-        def stands(standing: Standing) -> None:
-            self._standing(slug, standing)
+        say, stands = functools.partial(self._phase, slug), functools.partial(self._standing, slug)
 
         def forget_pictures() -> None:
             with contextlib.suppress(OSError):
@@ -80,7 +75,7 @@ class Attempts:
 
         try:
             async with opened(job, say, lambda one: self._backends.open(one, say, self._keep)) as (chosen, backend):
-                engine = Engine(chosen.plan, backend, say, begun, stands, forget_pictures)
+                engine = Engine(chosen.plan, backend, say, stands, forget_pictures)
                 outcome, kept = await engine.run(self._keep)
                 self.kept.extend(kept)
                 if engine.state.is_unanswered and not self._keep and (why := await asyncio.to_thread(_silent, job)):

@@ -203,7 +203,7 @@ def _findings(check: Callable[[], Iterator[Capability]]) -> Iterator[Capability]
 
 def left_behind() -> Iterator[Capability]:
     """What killed runs left."""
-    left = [f"test {about.get('test', '?')}" for prefix in ("cid-", leases.PROJECT) for about in _orphans(prefix)]
+    left = [f"test {about.get('test', '?')}" for prefix in (leases.CID, leases.PROJECT) for about in _orphans(prefix)]
     if left:
         yield Capability("left behind", "warning", f"by killed runs: {', '.join(left)}", "dodo doctor --clean")
     else:

@@ -38,8 +38,7 @@ LISTEN_PATIENCE_S, LISTEN_PERIOD_S = 10.0, 0.02
 class Engine:
     """Drives one backend through one Plan. ``say`` is called with each phase, for live progress.
 
-    ``begun`` is called when set-up is over and the test begins, ``stands`` with how far it is, ``passed`` before a test
-    is taken down that has passed.
+    ``stands`` is called with how far it is, ``passed`` before a test is taken down that has passed.
 
     All times are of the running event loop's clock, in s.
     """
@@ -47,7 +46,6 @@ class Engine:
     plan: Plan
     backend: Backend
     say: Callable[[str], None]
-    begun: Callable[[], None] = lambda: None
     stands: Callable[[Standing], None] = lambda _: None
     passed: Callable[[], None] = lambda: None
     state: RunState = field(init=False)
@@ -64,7 +62,6 @@ class Engine:
         kept: list[str] = []
         try:
             await self._set_up()
-            self.begun()
             self._meter.begin()
             await self._execute()
             await self._measure()

@@ -16,7 +16,7 @@ import msgspec
 
 from dodo_dsl import atomic
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.outcome import MachineLoad, Outcome
+from dodo_dsl.outcome import Outcome
 from dodo_dsl.state_folder import NoStateFolder, state_path
 
 _MAX_BYTES = 4_000_000
@@ -38,12 +38,8 @@ class PastRun:
     outcome: str
     setup_s: float
     execution_s: float
-    cores: float | None = None
-    """Processor seconds a second of execution, of application and services; None if it was not measured."""
     checks: Mapping[str, float] = field(default_factory=dict)
     """Values by name, of names that one check has."""
-    timed: bool = False
-    """Whether the application acted by its own clock in lockstep."""
     repository: str = ""
     """The folder of the repository that it ran in."""
 
@@ -88,11 +84,6 @@ class History:
         took = [run.setup_s + run.execution_s for run in self._alike(spec, test, backend, clock)[-_RECENT:]]
         return statistics.median(took) if took else None
 
-    def cores(self, spec: str, test: str, backend: str, clock: str) -> float | None:
-        """The most cores that the latest runs used on average; None when that was never measured."""
-        runs = self._alike(spec, test, backend, clock)[-_RECENT:]
-        return max((r.cores for r in runs if r.cores is not None), default=None)
-
     def times(self, tests: Iterable[tuple[str, str]], backend: str) -> dict[str, list[tuple[float, float]]]:
         """Seconds of set-up and execution of all runs of ``tests``, which are pairs of spec and name."""
         found: dict[str, list[tuple[float, float]]] = {}
@@ -108,17 +99,12 @@ class History:
         runs = [run for run in self._alike(spec, test, backend, clock) if run.checks]
         return [{"when": r.when, "outcome": r.outcome, "checks": dict(r.checks)} for r in runs[-_SHOWN:]]
 
-    def is_timed(self, spec: str, test: str) -> bool:
-        """Whether the application acted by its own clock in the latest run of a test in lockstep."""
-        seen = [run.timed for run in self._of[spec, test] if run.clock == "lockstep"]
-        return bool(seen and seen[-1])
-
     def add(self, outcomes: Iterable[tuple[str, Outcome]]) -> None:
         """Adds pairs of a test's name and its outcome; errors are left out, because they say nothing about its time."""
         self._take(
             PastRun(
                 int(self._clock()), o.spec, test, o.level, o.backend, o.clock, o.outcome, o.setup_s, o.execution_s,
-                _cores_used(o.machine), _values(o.checks), bool(o.response and o.response.unasked), self._repository,
+                _values(o.checks), self._repository,
             )
             for test, o in outcomes
             if o.outcome != "error" and o.setup_s is not None and o.execution_s is not None
@@ -138,12 +124,6 @@ class History:
     def _shorten(self) -> None:
         lines = self.path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
         atomic.write_text(self.path, "".join(lines[len(lines) // 2 :]))
-
-
-def _cores_used(load: MachineLoad | None) -> float | None:
-    if load is None or load.application is None or load.services is None:
-        return None
-    return round((load.application.ran_s + load.services.ran_s) / load.duration_s, 3)
 
 
 def _values(checks: Sequence[Mapping[str, Any]]) -> dict[str, float]:
@@ -173,6 +153,6 @@ def _read_at(path: Path, *_stamp: int) -> tuple[PastRun, ...]:
 def _past_run(line: bytes) -> PastRun | None:
     with contextlib.suppress(msgspec.DecodeError):
         run = msgspec.json.decode(line, type=PastRun)
-        if min(run.setup_s, run.execution_s, run.cores or 0.0) >= 0:
+        if min(run.setup_s, run.execution_s) >= 0:
             return run
     return None

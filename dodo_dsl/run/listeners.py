@@ -1,18 +1,17 @@
 """Which programs of a test listen on an OpenDLV bus, by what the kernel says of their sockets."""
 
-import socket
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from dodo_dsl.opendlv.address import PORT, group
+from dodo_dsl.opendlv.address import PORT
 from dodo_dsl.run.machine_load.processes import living, owners
 
 _PROC = Path("/proc")
 _LOCAL, _INODE = 1, 9
 """Columns of ``/proc/PID/net/udp`` (proc_pid_net(5))."""
 _SOCKET = "socket:["
-_BUSES, _HEX_DIGITS = bytes((225, 0, 0)), 8
+_BUSES = bytes((225, 0, 0))
 
 
 def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | None:
@@ -34,31 +33,19 @@ def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | Non
     return found if hidden <= seen else None
 
 
-def members(cid: int, process: Path = _PROC / "self") -> int | None:
-    """How many sockets have joined a bus in the network of a process; None if the kernel does not say."""
-    wanted = f"{int.from_bytes(socket.inet_aton(group(cid)[0]), sys.byteorder):08X}"
+def joined(process: Path = _PROC / "self") -> set[int] | None:
+    """The CIDs whose buses programs have joined in the network of a process; None if the kernel does not say."""
     try:
-        rows = [line.split() for line in (process / "net" / "igmp").read_text().splitlines()]
+        lines = (process / "net" / "igmp").read_text().splitlines()
     except OSError:
         return None
-    return sum(int(words[1]) for words in rows if words[0] == wanted)
+    groups = [int(line.split()[0], 16).to_bytes(4, sys.byteorder) for line in lines if line.startswith("\t")]
+    return {parts[3] for parts in groups if parts[:3] == _BUSES and parts[3]}
 
 
 def buses(processes: Iterable[int], proc: Path = _PROC) -> set[int]:
     """The CIDs whose buses programs have joined in the networks of processes, as far as the kernel says."""
-    found = set()
-    for pid in processes:
-        try:
-            words = [line.split() for line in (proc / str(pid) / "net" / "igmp").read_text().splitlines()]
-        except OSError:
-            continue
-        groups = [int(each[0], 16).to_bytes(4, sys.byteorder) for each in words if _is_group(each[0])]
-        found |= {parts[3] for parts in groups if parts[:3] == _BUSES and parts[3]}
-    return found
-
-
-def _is_group(word: str) -> bool:
-    return len(word) == _HEX_DIGITS and set(word) <= set("0123456789ABCDEF")
+    return set[int]().union(*(joined(proc / str(pid)) or () for pid in processes))
 
 
 def _sockets(process: Path) -> set[str]:

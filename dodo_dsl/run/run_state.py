@@ -306,7 +306,7 @@ class RunState:
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
         findings = (*answers.findings, *use.findings)
-        considered, load = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
+        considered, load = consider(decide(self.facts, findings), self._load())
         found = self._explained(self._elsewhere(self._timed(considered), backend.cid))
         finding = self._without_display(self._with_told(self._with_printed(found)))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)

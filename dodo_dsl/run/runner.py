@@ -2,9 +2,10 @@
 
 import asyncio
 import contextlib
+import functools
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, Self
 
@@ -61,7 +62,7 @@ def _nothing(_job: Job, _outcome: Outcome) -> None:
 class Runner:
     """Runs jobs, as many at once as ``schedule`` allows, in its order. Times are of the event loop's clock, in s.
 
-    Tests for which the machine was too busy run once more at the end, one after the other.
+    Tests for which the machine was too busy run once more behind all that wait, with all cores.
     """
 
     def __init__(
@@ -80,7 +81,6 @@ class Runner:
         self._attempts = Attempts(
             backends, progress.phase, policy.retries, keep, lambda: self.interrupted, progress.standing
         )
-        self._undecided: dict[str, tuple[Job, Outcome]] = {}
         self._stop = False
         self._finished: Finished = _nothing
 
@@ -110,9 +110,6 @@ class Runner:
         try:
             with _signals_call(lambda: self._interrupt(tasks)):
                 await asyncio.gather(*tasks.values())
-                for job, first in list(self._undecided.values()):
-                    tasks[job.plan.slug] = asyncio.ensure_future(self._again(job, first))
-                    await tasks[job.plan.slug]
                 outcomes = [tasks[job.plan.slug].result() for job in jobs]
         finally:
             self.backends.close()
@@ -127,65 +124,53 @@ class Runner:
 
     async def _one(self, job: Job) -> Outcome | None:
         """A test's outcome, or None when no further test was to begin."""
-        try:
-            need = self.schedule.need(job)
-            async with self._cores.take(max(need, self.schedule.setup)) as share:
-                self._waiting.remove(job)
-                if self._stop or self.interrupted:
-                    self.skipped.append(job)
-                    return None
-                self._began[job.plan.slug] = (job, _now())
-                outcome = await self._attempts.outcome(job, lambda: share.shrink(need))
-        except asyncio.CancelledError:
-            self._began.pop(job.plan.slug, None)
+
+        outcome = await self._turn(job, self.schedule.need(job), functools.partial(self._attempts.outcome, job))
+        if outcome is None:
             self.skipped.append(job)
             return None
-        except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
-            outcome = error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
         if is_undecided(outcome) and not self.interrupted and not self.keep:
-            self._began.pop(job.plan.slug)
-            self._undecided[job.plan.slug] = (job, outcome)
             self.progress.phase(job.plan.slug, "waiting for another attempt alone, because the machine was too busy")
-            return outcome
-        return self._finish(job, outcome)
-
-    async def _again(self, job: Job, first: Outcome) -> Outcome:
-        """The outcome of a test for which the machine was too busy: of another attempt, if nothing forbids it."""
-        del self._undecided[job.plan.slug]
-        if self._stop or self.interrupted:
-            return self._finish(job, first)
-        self._began[job.plan.slug] = (job, _now())
-        if problem := self._attempts.set_aside(job):
-            return self._finish(job, replace(first, notes=(*first.notes, f"not tried again alone, {problem}")))
-        note = f"tried again alone, because the machine was too busy: {first.reason}"
-        try:
-            self.progress.phase(job.plan.slug, "trying again alone")
-            outcome = await self._attempts.outcome(job, alone=True)
-        except asyncio.CancelledError:
-            outcome = error_outcome(
-                job.plan, self.backends.name, "the run was interrupted before this test began again"
-            )
-        except Exception as error:  # noqa: BLE001  (as above)
-            outcome = error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
-        return self._finish(job, replace(outcome, notes=(*first.notes, note, *outcome.notes)))
-
-    def _finish(self, job: Job, outcome: Outcome) -> Outcome:
-        self._began.pop(job.plan.slug, None)
+            self._waiting.append(job)
+            again = functools.partial(self._again, job, outcome)
+            outcome = await self._turn(job, self.schedule.capacity, again) or outcome
         self._stop |= self.policy.fail_fast and outcome.outcome != "passed"
         self.progress.done(outcome)
         self._finished(job, outcome)
         self._show_rest()
         return outcome
 
+    async def _turn(self, job: Job, cores: int, attempt: Callable[[], Awaitable[Outcome]]) -> Outcome | None:
+        """The outcome of an attempt with some cores, in its turn; None when no further one was to begin."""
+        try:
+            async with self._cores.take(cores):
+                self._waiting.remove(job)
+                if self._stop or self.interrupted:
+                    return None
+                self._began[job.plan.slug] = (job, _now())
+                return await attempt()
+        except asyncio.CancelledError:
+            return None
+        except Exception as error:  # noqa: BLE001  (one job must not cost the results of the others)
+            return error_outcome(job.plan, self.backends.name, error_reason(error, job.report))
+        finally:
+            self._began.pop(job.plan.slug, None)
+
+    async def _again(self, job: Job, first: Outcome) -> Outcome:
+        """The outcome of a test for which the machine was too busy."""
+        if problem := self._attempts.set_aside(job):
+            return replace(first, notes=(*first.notes, f"not tried again alone, {problem}"))
+        self.progress.phase(job.plan.slug, "trying again alone")
+        outcome = await self._attempts.outcome(job, alone=True)
+        note = f"tried again alone, because the machine was too busy: {first.reason}"
+        return replace(outcome, notes=(*first.notes, note, *outcome.notes))
+
     def _show_rest(self) -> None:
         if self.interrupted:
             return
-        now = _now()
-        running = [(job, now - began) for job, began in self._began.values()]
-        undecided = [job for job, _ in self._undecided.values()]
-        if tests := len(running) + len(self._waiting) + len(undecided):
-            alone = sum(map(self.schedule.expected, undecided))
-            self.progress.rest(self.schedule.forecast(self._waiting, running) + alone, tests)
+        running = [(job, _now() - began) for job, began in self._began.values()]
+        if tests := len(running) + len(self._waiting):
+            self.progress.rest(self.schedule.forecast(self._waiting, running), tests)
 
 
 @contextlib.contextmanager

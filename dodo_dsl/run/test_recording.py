@@ -189,39 +189,45 @@ def long_pause(plan: Plan, folder: Path, recording: Path) -> str:
     Long is more than ten periods of the frames, or of the message where that comes less often. ``folder`` is the
     compiled test's. Raises OSError and OdvdError.
     """
-    messages = MessageSet.load(*(folder / FILES / path for path in plan.messages))
-    came = _came(recording)
-    begin = came[1][came[0] == messages.id(BEGIN)]
+    came, messages = _came(recording), MessageSet.load(*(folder / FILES / path for path in plan.messages))
+    came = came[:, came[1] > 0]  # what was on the bus
+    begins = _of(BEGIN, came, messages)[1] / MICROSECONDS
     worst, text = 0.0, ""
     for service in plan.application.services:
         for output in service.outputs:
-            name, _, stamp = output.partition("/")
-            if name not in messages.names():
-                continue
-            chosen = (came[0] == messages.id(name)) & (came[2] == int(stamp) if stamp else True)
-            times = np.sort(came[1][chosen & (came[1] >= (begin[0] if len(begin) else 0))]) / MICROSECONDS
+            times = np.sort(_of(output, came, messages)[1]) / MICROSECONDS
+            times = times[times >= begins[0]] if len(begins) else times
             if len(times) < _LEAST_MESSAGES:
                 continue
             pauses = np.diff(times)
             periods = float(pauses.max()) / max(_period_s(plan), float(np.median(pauses)))
             if periods > max(worst, MOST_PERIODS):
-                at = times[int(pauses.argmax())] - (begin[0] / MICROSECONDS if len(begin) else times[0])
+                at = times[int(pauses.argmax())] - (begins[0] if len(begins) else times[0])
+                name = output.partition("/")[0].rpartition(".")[2]
                 worst = periods
                 text = (
-                    f"application service '{service.name}' sent no {name.rpartition('.')[2]} for "
+                    f"application service '{service.name}' sent no {name} for "
                     f"{pauses.max():.3g} s, as long as {periods:.0f} frames, after {at:.1f} s"
                 )
     return text
 
 
 def _came(recording: Path) -> Numbers:
-    """Ids, times of receipt in us, and sender stamps of all messages that were on the bus: (3, messages)."""
+    """Ids, times of receipt in us, and sender stamps of all messages: (3, messages)."""
     parts = [np.empty((3, 0), np.int64)]
     with regular_file.opened(recording) as stream:
         for batch in Scanner(stream).batches():
-            rows = batch.table[Fact.DATA_TYPE], batch.times[1], batch.table[Fact.SENDER_STAMP]
-            parts.append(np.stack(rows)[:, batch.times[1] > 0])
+            parts.append(np.stack((batch.table[Fact.DATA_TYPE], batch.times[1], batch.table[Fact.SENDER_STAMP])))
     found: Numbers = np.concatenate(parts, axis=1)
+    return found
+
+
+def _of(message: str, came: Numbers, messages: MessageSet) -> Numbers:
+    """Those of a message, under any sender stamp if it names none."""
+    name, _, stamp = message.partition("/")
+    is_known = name in messages.names()
+    chosen = (came[0] == messages.id(name)) & (not stamp or came[2] == int(stamp)) if is_known else []
+    found: Numbers = came[:, chosen]
     return found
 
 
@@ -232,24 +238,18 @@ def _period_s(plan: Plan) -> float:
     return 1 / min(rates) if rates and min(rates) > 0 else 0.0
 
 
-Came = set[tuple[int, int]]
-"""Ids and sender stamps of messages."""
-
-
 def silent_consumer(plan: Plan, folder: Path, recording: Path) -> str:
     """The first program that got messages and sent none, in half a sentence, or empty; ``folder`` is the test's.
 
-    Raises OSError, also for what is not a recording, and OdvdError.
+    Raises OSError and OdvdError.
     """
-    messages = MessageSet.load(*(folder / FILES / path for path in plan.messages))
-    with Recording(recording) as recorded:
-        came = set(map(tuple, np.unique(recorded.index[["data_type", "sender_stamp"]]).tolist()))
+    came, messages = _came(recording), MessageSet.load(*(folder / FILES / path for path in plan.messages))
     services = plan.application.services
     for consumer in services:
-        if consumer.outputs and not any(_is_among(came, message, messages) for message in consumer.outputs):
+        if consumer.outputs and not any(_of(message, came, messages).size for message in consumer.outputs):
             for message in consumer.inputs:
                 producer = _producer(message, [s for s in services if s is not consumer])
-                if producer and _is_among(came, message, messages):
+                if producer and _of(message, came, messages).size:
                     return f"{message} came from '{producer}', but '{consumer.name}', which consumes it, sent nothing"
     return ""
 
@@ -263,10 +263,3 @@ def _producer(message: str, services: Sequence[ApplicationService]) -> str:
             if its_name == name and (its_stamp == stamp or not its_stamp or not stamp):
                 return service.name
     return ""
-
-
-def _is_among(came: Came, message: str, messages: MessageSet) -> bool:
-    name, _, stamp = message.partition("/")
-    if name not in messages.names():
-        return False
-    return any(id_ == messages.id(name) and (not stamp or int(stamp) == its_stamp) for id_, its_stamp in came)

@@ -111,7 +111,8 @@ def test_a_failure_on_a_busy_machine_is_an_error_and_a_pass_stays_one() -> None:
     assert (failed.outcome, failed.reason) == (
         "error",
         "the machine was too busy to judge: app waited 1.5 s of 5.0 s for a processor, others took 90 % of it; "
-        "it found: hit wall left; run it with --clock lockstep, or fewer tests at once (-j 1)",
+        "it found: hit wall left; run it with --clock lockstep, or virtual if it has timers, or fewer tests at once "
+        "(-j 1)",
     )
     passed = on(BUSY, (5.0, PASSED), (5.0, ENDED))
     assert (passed.outcome, passed.reason) == ("passed", "it drove")

@@ -8,7 +8,7 @@ from typing import Literal
 
 import pytest
 
-from dodo_dsl.outcome import MachineLoad, Outcome, Response, Wait
+from dodo_dsl.outcome import Outcome
 from dodo_dsl.run import history
 from dodo_dsl.run.history import History
 from dodo_dsl.run.outcomes import error_outcome
@@ -52,21 +52,6 @@ def test_the_forecast_is_the_median_of_the_latest_runs(tmp_path: Path) -> None:
     assert found.seconds("a/a.dodo.yml", "a", "process", "realtime") == 4.0
 
 
-def test_the_most_cores_that_the_latest_runs_used(tmp_path: Path) -> None:
-    """A run on a busy machine used fewer than it needs; runs of earlier versions measured none."""
-    path = tmp_path / "history.jsonl"
-    path.write_text(json.dumps(LINE) + "\n")
-    found = History(path)
-    assert found.cores("s", "t", "process", "realtime") is None
-    for ran_s in (90.0, 1.0, 4.0, 2.0, 1.0, 1.0):
-        load = MachineLoad(10.0, 2, Wait(ran_s, 0.0, 0.0, "app"), Wait(2.0, 0.0, 0.0, "camera"), 0.0, 0.0)
-        found.add([("a", replace(took(1.0, 10.0)[1], machine=load))])
-    found.add([("a", replace(took(1.0, 10.0)[1], machine=MachineLoad(10.0)))])
-    found.save()
-    assert History(path).cores("a/a.dodo.yml", "a", "process", "realtime") == 0.6
-    assert found.cores("a/a.dodo.yml", "a", "process", "lockstep") is None
-
-
 def test_a_test_of_another_repository_is_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number, name in enumerate(("one", "other", "one/below")):
         (tmp_path / name).mkdir()
@@ -87,23 +72,9 @@ def test_times_are_apart_by_clock() -> None:
     assert found.times([], "process") == {}
 
 
-def test_the_latest_run_in_lockstep_tells_whether_the_application_has_a_clock_of_its_own(tmp_path: Path) -> None:
-    path = tmp_path / "history.jsonl"
-    path.write_text(json.dumps({**LINE, "clock": "lockstep"}) + "\n")
-    found, (name, outcome) = History(path), took(1.0, 2.0)
-    assert not found.is_timed("s", "t"), "a run of an earlier version, which did not look"
-    stepped = replace(outcome, clock="lockstep")
-    for unasked, is_timed in ((0, False), (2, True), (0, False)):
-        response = Response(9, 0.1, 0.1, 0.1, 0.1, None, None, None, 0, None, "", pauses=2, unasked=unasked)
-        found.add([(name, replace(stepped, response=response)), (name, outcome)])
-        assert found.is_timed(outcome.spec, name) is is_timed
-    found.save()
-    assert [run.timed for run in History(path).runs] == [False, False, False, True, False, False, False]
-
-
 @pytest.mark.parametrize(
     "change",
-    [{"spec": ["s"]}, {"setup_s": math.inf}, {"setup_s": math.nan}, {"execution_s": -1}, {"cores": -1}, {"cores": "x"}],
+    [{"spec": ["s"]}, {"setup_s": math.inf}, {"setup_s": math.nan}, {"execution_s": -1}, {"execution_s": "x"}],
 )
 def test_lines_that_no_run_wrote_are_skipped(tmp_path: Path, change: dict[str, object]) -> None:
     path = tmp_path / "history.jsonl"

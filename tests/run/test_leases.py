@@ -1,13 +1,12 @@
 """Leases: held, shared, waited for, left to others, and with records that are damaged or another user's."""
 
 import asyncio
+import contextlib
 import fcntl
-import json
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,65 +16,42 @@ from dodo_dsl.run.leases import Lease, LeaseTimeout
 from tests.run.desk import ROOT
 from tests.run.scripted import run
 
-ASKS_AS_NOBODY = """
-import os
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path))
+    return tmp_path
+
+
+TAKES = """
+import os, sys
 from dodo_dsl.run import leases
-if os.getuid() == 0:
-    os.setresgid(65534, 65534, 65534)
-    os.setresuid(65534, 65534, 65534)
-print(leases.holder("cid-121"))
+os.umask(0o077)
+os.setgroups([65111])
+os.setresgid(*[int(sys.argv[2])] * 3)
+os.setresuid(*[int(sys.argv[2])] * 3)
+lease = leases.try_lease(sys.argv[1], {"test": "of " + str(os.getuid())})
+print("taken" if lease else leases.holder(sys.argv[1]), flush=True)
+sys.stdin.read()
 """
 
 
-@pytest.fixture
-def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A lease folder that every user can read."""
-    with tempfile.TemporaryDirectory() as name:
-        Path(name).chmod(0o755)
-        monkeypatch.setenv("DODO_LEASES", name)
-        yield Path(name)
-
-
-def ask_as_nobody(folder: Path) -> str:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder)}
-    command = [sys.executable, "-c", ASKS_AS_NOBODY]
-    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stderr
-    return result.stdout.strip()
-
-
-def test_another_users_process_is_named(folder: Path) -> None:
-    """Process 1 is nobody's to signal, and lives."""
-    (folder / "cid-121.1.json").write_text(json.dumps({"pid": 1, "test": "theirs"}))
-    assert ask_as_nobody(folder) == "test theirs of process 1"
-
-
-def test_another_users_record_that_cannot_be_read_names_nobody(folder: Path) -> None:
-    (folder / "cid-121.1.json").write_text(json.dumps({"pid": 1, "test": "theirs"}))
-    (folder / "cid-121.1.json").chmod(0o000)
-    assert ask_as_nobody(folder) == "another process"
-
-
-@pytest.mark.parametrize("text", ["", "[]", "3", '{"pid": 1e400}', '{"pid": 9999999999999999999999}', "[" * 100_000])
-def test_damaged_records_name_nobody_and_are_removed(folder: Path, text: str) -> None:
-    (folder / "cid-121.1.json").write_text(text)
-    leases.forget_dead()
-    assert leases.holder("cid-121") == "another process"
-    for lease, about in leases.orphans("cid-"):
-        assert isinstance(about, dict)
-        lease.release()
-    assert list(folder.glob("*.json")) == []
-
-
-def test_lease_whose_record_cannot_be_written_is_not_held(folder: Path) -> None:
-    record = folder / f"cid-121.{os.getpid()}.json"
-    record.mkdir()
-    with pytest.raises(OSError, match="Is a directory"):
-        leases.try_lease("cid-121", {})
-    record.rmdir()
-    lease = leases.try_lease("cid-121", {})
-    assert lease is not None
-    lease.release()
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can be two users")
+def test_users_of_a_group_exclude_each_other_and_name_the_holder() -> None:
+    """In a folder of root's, as an operator of rigs names it."""
+    with tempfile.TemporaryDirectory() as name, contextlib.ExitStack() as stack:
+        os.chown(name, 0, 65_111)
+        Path(name).chmod(0o770)
+        said = []
+        for user, lease in (("65001", "cid-121"), ("65002", "cid-121"), ("65002", "cid-122")):
+            one = subprocess.Popen(
+                [sys.executable, "-c", TAKES, lease, user], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                env={**os.environ, "PYTHONPATH": str(ROOT), "DODO_LEASES": name},
+            )  # fmt: skip
+            stack.callback(one.communicate, "")
+            assert one.stdout is not None
+            said.append(one.stdout.readline().strip().partition(" of process")[0])
+    assert said == ["taken", "test of 65001", "taken"]
 
 
 def take(name: str, shared: bool = False) -> Lease:
@@ -91,7 +67,7 @@ def test_a_lease_excludes_others_until_it_is_released(folder: Path) -> None:
     held.release()
     assert leases.holder("cid-121") == "another process"
     take("cid-121").release()
-    assert [path.name for path in folder.iterdir()] == ["cid-121.lock"]
+    assert [path.name for path in folder.iterdir()] == ["leases.lock"]
 
 
 def test_shared_leases_exclude_only_exclusive_ones(folder: Path) -> None:
@@ -103,11 +79,6 @@ def test_shared_leases_exclude_only_exclusive_ones(folder: Path) -> None:
     held = take("machine")
     assert leases.try_lease("machine", {}, shared=True) is None
     held.release()
-
-
-def test_a_lease_of_a_random_name_leaves_no_file(folder: Path) -> None:
-    take("run-abc").release()
-    assert list(folder.iterdir()) == []
 
 
 def test_what_was_left_belongs_to_those_who_inherited_it_and_then_to_nobody(folder: Path) -> None:
@@ -176,7 +147,7 @@ def test_waiters_are_served_in_the_order_in_which_they_came(folder: Path) -> Non
     assert said["b"] == [f"waiting for test mine {mine}, and 1 waits before this one", f"waiting for test a {mine}"]
     assert said["c"][0] == f"waiting for test mine {mine}, and 2 wait before this one"
     assert len(said["c"]) == 3 and said["late"][0].endswith("and 3 wait before this one")
-    assert [path.name for path in folder.iterdir()] == ["cid-121.lock"]
+    assert [path.name for path in folder.iterdir()] == ["leases.lock"]
 
 
 def test_who_waits_for_any_is_served_by_the_first_that_is_free_and_holds_up_no_other(folder: Path) -> None:
@@ -267,24 +238,39 @@ def test_a_waiter_that_is_killed_is_skipped_and_its_ticket_removed(folder: Path)
     assert list(folder.glob("queue.*")) == []
 
 
-@pytest.mark.parametrize("text", ["[]", "3", '{"names": 3, "shared": 0, "turn": 0}', "[" * 100_000])
-def test_a_damaged_ticket_holds_up_nobody(folder: Path, text: str) -> None:
-    """Nobody holds the one; the other's process lives."""
-    (folder / "queue.1.1.1").write_text(text)
-    with (folder / "queue.2.1.1").open("w") as file:
-        file.write(text)
-        file.flush()
-        fcntl.flock(file, fcntl.LOCK_EX)
-        assert wait(["cid-121"]) == ("cid-121", 0.0, [])
-    leases.forget_dead()
-    assert list(folder.glob("queue.*")) == []
+@pytest.mark.parametrize("text", ["", "[]", '{"names": 3}', "[" * 100_000])
+def test_a_damaged_file_stands_for_its_name_as_long_as_somebody_has_it(folder: Path, text: str) -> None:
+    for name in ("queue.1.1.1", "cid-121.1.1.json"):
+        (folder / name).write_text(text)
+    with (folder / "cid-122.1.1.json").open("w") as file, (folder / "queue.2.1.1").open("w") as other:
+        for each in (file, other):
+            each.write(text)
+            each.flush()
+            fcntl.flock(each, fcntl.LOCK_EX)
+        assert wait(["cid-122", "cid-121"]) == ("cid-121", 0.0, [])
+        assert leases.holder("cid-122") == "another process"
+        ((orphan, about),) = leases.orphans("cid-")
+        assert (orphan.name, about) == ("cid-121", {})
+        orphan.release()
+    assert [path.name for path in folder.glob("queue.*")] == ["queue.2.1.1"]
+
+
+def test_a_lease_that_cannot_be_written_is_not_held(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", full)
+        with pytest.raises(OSError, match="No space left"):
+            leases.try_lease("cid-121", {})
+    take("cid-121").release()
 
 
 def test_all_that_is_waited_for_within_a_turn_keeps_its_place(folder: Path) -> None:
     """A test that has waited for one lease is not the last again for the next."""
     with leases.arrived():
         since = leases.arrival_time()
-        with leases.ticket(folder, ["cid-121"], since):
+        with leases.ticket(["cid-121"], since):
             (asyncio.run(leases.lease_any(["cid-121"], {}, print))).release()
     assert leases.arrival_time() > since
 
@@ -298,9 +284,9 @@ def test_waiting_has_a_limit(folder: Path) -> None:
     held.release()
 
 
-def test_records_of_dead_processes_are_forgotten(folder: Path) -> None:
-    """The largest number of a process that a kernel may be set to, and this very process."""
-    for pid in (1 << 22, os.getpid()):
-        (folder / f"machine.{pid}.json").write_text(json.dumps({"pid": pid}))
-    leases.forget_dead()
-    assert [path.name for path in folder.iterdir()] == [f"machine.{os.getpid()}.json"]
+def test_what_dead_holders_had_and_cannot_have_left_is_removed(folder: Path) -> None:
+    for name in ("machine", "device-1-3", "cid-121", "run-a", "docker-b"):
+        take(name).leave()
+    take("cid-122").release()
+    left = {path.name.partition(".")[0] for path in folder.glob("*.json")}
+    assert left == {"cid-121", "run-a", "docker-b"}

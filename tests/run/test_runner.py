@@ -42,9 +42,7 @@ class Scene:
     folder: Path
     backends: ScriptedBackends = field(default_factory=ScriptedBackends)
     policy: Policy = field(default_factory=Policy)
-    capacity: float = 4.0
-    need: float = 1.0
-    setup: float = 0.0
+    capacity: int = 4
     lengths: dict[str, float] = field(default_factory=dict)
     progress: Recorded = field(default_factory=Recorded)
     signals: tuple[tuple[float, int], ...] = ()
@@ -53,7 +51,7 @@ class Scene:
     """When attempts began, and how many tests ran then."""
 
     def run(self, *plans: Plan, keep: bool = False) -> list[Outcome]:
-        order = Schedule(self.capacity, lambda job: self.need, self._expected, self.setup)
+        order = Schedule(self.capacity, lambda _: 1, self._expected)
         self.runner = Runner(self.progress, self.backends, order, self.policy, keep)
         return run(self._run(jobs(self.folder, *plans)))
 
@@ -85,7 +83,7 @@ def by_slug(**stages: object) -> Callable[[Plan, int], ScriptedBackend]:
 
 
 def test_the_longest_begins_first_and_outcomes_keep_the_order_of_the_jobs(scene: Scene) -> None:
-    scene.lengths, scene.capacity = {"a": 1.0, "b": 3.0, "c": 2.0}, 1.0
+    scene.lengths, scene.capacity = {"a": 1.0, "b": 3.0, "c": 2.0}, 1
     assert [outcome.slug for outcome in scene.run(*plans("abc"))] == ["a", "b", "c"]
     assert scene.backends.began[-1:] == ["a"]
     assert scene.progress.notes == ["prepared 3"]
@@ -94,23 +92,17 @@ def test_the_longest_begins_first_and_outcomes_keep_the_order_of_the_jobs(scene:
 
 
 def test_each_test_is_handed_on_as_soon_as_it_has_ended(scene: Scene) -> None:
-    scene.capacity, seen = 1.0, []
+    scene.capacity, seen = 1, []
     scene.finished = lambda job, outcome: seen.append((job.plan.slug, outcome.outcome, len(scene.backends.began)))
     scene.run(*plans("ab"))
     assert seen == [("a", "passed", 1), ("b", "passed", 2)]
 
 
-@pytest.mark.parametrize(("capacity", "most"), [(1.0, 1), (2.5, 2), (9.0, 5)])
-def test_as_many_run_at_once_as_there_is_room_for(scene: Scene, capacity: float, most: int) -> None:
+@pytest.mark.parametrize(("capacity", "most"), [(1, 1), (2, 2), (9, 5)])
+def test_as_many_run_at_once_as_there_is_room_for(scene: Scene, capacity: int, most: int) -> None:
     scene.capacity = capacity
     assert [outcome.outcome for outcome in scene.run(*plans("abcde"))] == ["passed"] * 5
     assert scene.backends.most == most
-
-
-def test_set_up_takes_cores_that_tests_give_back_when_they_begin(scene: Scene) -> None:
-    scene.setup, scene.need, scene.capacity = 1.0, 0.5, 2.0
-    assert [outcome.outcome for outcome in scene.run(*plans("abcde"))] == ["passed"] * 5
-    assert scene.backends.most == 3
 
 
 def test_a_kept_test_is_explained(scene: Scene) -> None:
@@ -120,7 +112,7 @@ def test_a_kept_test_is_explained(scene: Scene) -> None:
 
 @pytest.mark.parametrize(("fail_fast", "began"), [(True, ["a"]), (False, ["a", "b", "c"])])
 def test_fail_fast_begins_no_further_test(scene: Scene, fail_fast: bool, began: list[str]) -> None:
-    scene.lengths, scene.capacity, scene.policy = {"a": 3.0, "b": 2.0}, 1.0, Policy(fail_fast)
+    scene.lengths, scene.capacity, scene.policy = {"a": 3.0, "b": 2.0}, 1, Policy(fail_fast)
     scene.backends.make = by_slug(a=drives(1.0, FAILED))
     outcomes = scene.run(*plans("abc"))
     assert (scene.backends.began, [outcome.slug for outcome in outcomes]) == (began, began)
@@ -174,7 +166,7 @@ def test_without_retries_an_error_stays(logged: Scene) -> None:
 
 TOO_BUSY = (
     "the machine was too busy to judge: app waited 0.3 s of 1.0 s for a processor, others took 90 % of it; "
-    "it found: hit wall left; run it with --clock lockstep, or fewer tests at once (-j 1)"
+    "it found: hit wall left; run it with --clock lockstep, or virtual if it has timers, or fewer tests at once (-j 1)"
 )
 
 
@@ -220,7 +212,7 @@ def always_too_busy(tested: Plan, _: int) -> ScriptedBackend:
 @pytest.mark.parametrize("retries", [0, 2])
 def test_a_machine_that_stays_too_busy_is_an_error(scene: Scene, retries: int) -> None:
     """Retries of errors are made when the test is alone."""
-    scene.backends.make, scene.policy, scene.capacity = always_too_busy, Policy(retries=retries), 1.0
+    scene.backends.make, scene.policy, scene.capacity = always_too_busy, Policy(retries=retries), 1
     a, b = scene.run(*plans("ab"))
     assert endings([a, b]) == [("a", "error", TOO_BUSY), ("b", "error", TOO_BUSY)]
     assert scene.backends.began == ["a", "b", *"a" * (retries + 1), *"b" * (retries + 1)]
@@ -231,7 +223,7 @@ def test_a_machine_that_stays_too_busy_is_an_error(scene: Scene, retries: int) -
 def test_a_busy_machine_stops_no_run_and_fail_fast_stops_the_second_attempts(
     scene: Scene, verdict: VerdictEvent, began: list[str]
 ) -> None:
-    scene.policy, scene.capacity = Policy(fail_fast=True), 1.0
+    scene.policy, scene.capacity = Policy(fail_fast=True), 1
 
     def make(tested: Plan, attempt: int) -> ScriptedBackend:
         return always_too_busy(tested, attempt) if tested.slug == "a" else ScriptedBackend(tested, drives(1.0, verdict))
@@ -336,7 +328,7 @@ def test_a_verdict_outlives_what_breaks_after_it(scene: Scene, problem: Exceptio
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_what_runs_and_what_waits(scene: Scene, number: int) -> None:
-    scene.capacity, scene.signals, scene.policy = 1.0, ((4.0, number), (4.5, number)), Policy(retries=1)
+    scene.capacity, scene.signals, scene.policy = 1, ((4.0, number), (4.5, number)), Policy(retries=1)
     before = signal.signal(number, lambda *_: None)
     mine = signal.getsignal(number)
     try:

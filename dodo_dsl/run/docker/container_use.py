@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl.application.model import FILES, SANDBOX
-from dodo_dsl.run.listeners import listening, members
+from dodo_dsl.run.listeners import joined, listening
 from dodo_dsl.run.machine_load.processes import PROC
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used, UseReader
 from dodo_dsl.run.process import process_group
@@ -76,7 +76,7 @@ class ContainerUse:
             return None
         found = listening(services, self._proc)
         if found is None:
-            found = {name for pid, name in services.items() if members(cid, self._proc / str(pid)) != 0}
+            found = {n for pid, n in services.items() if (cids := joined(self._proc / str(pid))) is None or cid in cids}
         return found
 
     def first(self, names: Collection[str]) -> dict[int, str] | None:

@@ -34,16 +34,11 @@ MOST_LATE = 0.1
 LEAST_CROWDED = 0.1
 """Share of the test's time in which others must have filled the machine for lateness to be their fault."""
 _MAX_FOUND = 300
-WAY_OUT = "run it with --clock lockstep, or fewer tests at once (-j 1)"
-TIMED_WAY_OUT = (
-    "the application acts by its own clock: run it on a quiet machine (-j 1), or with --clock virtual, not in lockstep"
-)
+_WAY_OUT = "run it with --clock lockstep, or virtual if it has timers, or fewer tests at once (-j 1)"
 
 
-def consider(finding: Finding, load: MachineLoad | None, is_timed: bool = False) -> tuple[Finding, MachineLoad | None]:
+def consider(finding: Finding, load: MachineLoad | None) -> tuple[Finding, MachineLoad | None]:
     """An error in place of a failure that may be due to a busy machine; anything else as it is. The load says so, too.
-
-    ``is_timed`` means that the application acts by its own clock, so that lockstep does not help.
 
     Only findings that depend on time can turn. An application that waits for a tenth of the time answers each picture
     of a 10 Hz camera 10 ms later on average, some much later, as waits come in bursts: on two cores with four busy
@@ -57,7 +52,7 @@ def consider(finding: Finding, load: MachineLoad | None, is_timed: bool = False)
     if load is None or finding.result != "failed" or not finding.is_verdict or not (why := too_busy(load)):
         return finding, load
     found = finding.reason if len(finding.reason) <= _MAX_FOUND else f"{finding.reason[:_MAX_FOUND]}..."
-    reason = f"the machine was too busy to judge: {why}; it found: {found}; {TIMED_WAY_OUT if is_timed else WAY_OUT}"
+    reason = f"the machine was too busy to judge: {why}; it found: {found}; {_WAY_OUT}"
     return replace(finding, result="error", reason=reason), replace(load, undecided=True)
 
 

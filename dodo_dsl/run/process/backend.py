@@ -20,9 +20,8 @@ from dodo_dsl.run import application_time
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
 from dodo_dsl.run.machine_load.service_use import Snapshot
-from dodo_dsl.run.process.commands import Command, Commands, changes, needed_paths
+from dodo_dsl.run.process.commands import Command, Commands, needed_paths
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
-from dodo_dsl.run.process.environment import own_environment
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
@@ -170,11 +169,8 @@ class ProcessSide:
         self._pids[command.name] = asyncio.get_running_loop().create_future()
         hidden = command.masked if self._is_on_host and self._is_apart else ()
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module, "masked": hidden}
-        try:
-            message = {"do": "start", "id": command.name, "confined": self._confined(command), **words}
-            self._sandbox.send({**message, "env": changes(own_environment(), command.environment)}, (output.writer,))
-        except ValueError as error:
-            self._watched.not_started(command.name, str(error))
+        own = {"id": command.name, "env": dict(command.environment), "confined": self._confined(command)}
+        self._sandbox.start({**own, **words}, output.writer)
         output.release_writer()
 
     def _output(self, command: Command) -> ServiceOutput:

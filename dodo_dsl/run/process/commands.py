@@ -23,9 +23,6 @@ from dodo_dsl.run.process.environment import (
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot, named_paths, package_path
 from dodo_dsl.run.rigs.permission import masked
 
-OWN_VARIABLES = ("PYTHONPATH", SLOT_VARIABLE)
-"""Variables with other values in the sandbox than in the runner: they are always set."""
-
 _NUL = "\0"
 
 
@@ -167,10 +164,3 @@ def own_module(process: Sequence[str]) -> str:
     package, _, name = process[2].partition(".")
     is_ours = package == "services" and name.isidentifier()
     return process[2] if is_ours and (package_data.root() / package / name / "__main__.py").is_file() else ""
-
-
-def changes(base: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str | None]:
-    """The variables to set, or with None to remove, to turn ``base`` into ``wanted``: the sandbox has ``base``."""
-    removed: dict[str, str | None] = {name: None for name in base if name not in wanted}
-    different = {name: value for name, value in wanted.items() if base.get(name) != value}
-    return {**removed, **different, **{name: wanted.get(name) for name in OWN_VARIABLES}}

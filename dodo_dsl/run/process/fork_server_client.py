@@ -20,13 +20,12 @@ class ForkServer:
     It loads for a second before it serves; what is asked of it meanwhile waits.
     """
 
-    def __init__(self, descriptors: tuple[int, ...] = ()) -> None:
-        """``descriptors`` are those of leases that sandboxes hold, too, as with ``hold``."""
+    def __init__(self) -> None:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "dodo_dsl.run.process.fork_server", str(theirs.fileno())],
-                pass_fds=(theirs.fileno(), *descriptors),
+                pass_fds=(theirs.fileno(),),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -75,11 +74,16 @@ class ForkServer:
 def serving(
     loaded: ForkServer | None, modules: Iterable[str] | None, descriptors: tuple[int, ...]
 ) -> ForkServer | None:
-    """The one that loads these services: ``loaded``, or a new one; with no modules none, and ``loaded`` ends."""
+    """The one that loads these services: ``loaded``, or a new one; with no modules none, and ``loaded`` ends.
+
+    Its sandboxes hold the leases of the ``descriptors``, too.
+    """
     if modules is None:
         if loaded is not None:
             loaded.kill()
         return None
-    server = loaded or ForkServer(descriptors)
+    server = loaded or ForkServer()
+    for descriptor in descriptors:
+        server.hold(descriptor)
     server.load(modules)
     return server

@@ -37,28 +37,8 @@ class IsolationRefusal:
 async def isolation_refusal(fork_server: ForkServer | None = None) -> IsolationRefusal | None:
     """Why tests and applications cannot have their own namespaces on this machine; None when they can.
 
-    What is missing is found by its own trial.
+    What is missing is found by a trial: a program that does nothing is an application.
     """
-    if not (why := await _trial(fork_server)):
-        return None
-    if shutil.which(PROGRAM) is None:
-        return IsolationRefusal(f"there is no program '{PROGRAM}'", "install bubblewrap")
-    if await asyncio.to_thread(_refuses_namespaces):
-        in_container = "allow this container to make namespaces (docker run --privileged, for example)"
-        remedy = "allow user namespaces" if os.getuid() else in_container
-        return IsolationRefusal(f"the kernel refuses namespaces: {why}", remedy)
-    return IsolationRefusal(f"a trial, to run 'true' in a sandbox as applications have it, ended with: {why}")
-
-
-def _refuses_namespaces() -> bool:
-    words = ["/usr/bin/unshare", "--user", "--mount", "--pid", "--fork", "/bin/true"]
-    with contextlib.suppress(OSError):
-        return subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, check=False).returncode != 0
-    return False
-
-
-async def _trial(fork_server: ForkServer | None) -> str:
-    """What goes wrong when a program that does nothing is an application; empty when nothing does."""
     ended: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
 
     def take(message: dict[str, Any]) -> None:
@@ -70,23 +50,23 @@ async def _trial(fork_server: ForkServer | None) -> str:
         try:
             await client.open(Slot(0), output.fileno(), Entered.with_own(0))
         except BackendError as error:
-            return str(error)
-        start = {
-            "do": "start",
-            "id": "true",
-            "argv": ["true"],
-            "env": {"PATH": os.defpath},
-            "cwd": "/",
-            "fork": False,
-            "masked": (),
-        }
-        client.send({**start, "confined": asdict(Confinement("/usr", INTERPRETER))}, (output.fileno(),))
+            if fork_server is not None and not fork_server.is_alive:
+                return IsolationRefusal(f"{error}, with the process that starts it")
+            in_container = "allow this container to make namespaces (docker run --privileged, for example)"
+            remedy = "allow user namespaces" if os.getuid() else in_container
+            return IsolationRefusal(f"the kernel refuses namespaces: {error}", remedy)
+        words = {"id": "true", "argv": ["true"], "env": {"PATH": os.defpath}, "cwd": "/", "fork": False, "masked": ()}
+        client.start({**words, "confined": asdict(Confinement("/usr", INTERPRETER))}, output.fileno())
         answer = await ended
         await client.close()
         output.seek(0)
         said = output.read(1000).decode(errors="replace").strip()
-    code = answer.get("code", 1)
-    return str(answer.get("why", "")) or (said or f"exit code {code}" if code else "")
+    if answer.get("code") == 0:
+        return None
+    if shutil.which(PROGRAM) is None:
+        return IsolationRefusal(f"there is no program '{PROGRAM}'", "install bubblewrap")
+    why = answer.get("why") or said or f"exit code {answer.get('code')}"
+    return IsolationRefusal(f"a trial, to run 'true' in a sandbox as applications have it, ended with: {why}")
 
 
 def process_namespace_refusal() -> str:
@@ -141,9 +121,9 @@ async def host_slot(
     try:
         held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
         order = [plan.cid, *(c for c in cids if c != plan.cid)]
-        lease = await leases.lease_any([f"cid-{c}" for c in order], about, say, attempt=attempt)
+        lease = await leases.lease_any([f"{leases.CID}{c}" for c in order], about, say, attempt=attempt)
         held.append(lease)
-        cid = int(lease.name.removeprefix("cid-"))
+        cid = int(lease.name.removeprefix(leases.CID))
         foreigner = await asyncio.get_running_loop().run_in_executor(None, listen, cid)
         if foreigner:
             raise BackendError(

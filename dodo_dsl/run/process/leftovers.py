@@ -20,9 +20,8 @@ _END_S, _KILL_S = 3.0, 2.0
 def reap() -> list[str]:
     """Removes what killed runs left on the host, by leases that nobody holds; returns a phrase for each test."""
     removed = []
-    leases.forget_dead()
     process_group.remove_unused()
-    for lease, about in leases.orphans("cid-"):
+    for lease, about in leases.orphans(leases.CID):
         slot = str(about.get("slot", ""))
         if SLOT_NAME.fullmatch(slot):
             killed = end_slot(slot)

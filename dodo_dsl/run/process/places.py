@@ -106,8 +106,3 @@ def own_user() -> int | None:
     if users := next(there, None):
         return secrets.choice(users)
     raise OSError(errno.EPERM, f"this container has no user ids from {OWN_USERS[1][0]} to {OWN_USERS[1][-1]}")
-
-
-def is_own(user: int) -> bool:
-    """Whether an id is one that tests take for their applications."""
-    return any(user in ids for ids in OWN_USERS)

@@ -12,7 +12,6 @@ OURS = 2
 _PREFIX = "dodo-"
 _PIDS, _CPUACCT = "pids", "cpuacct"
 _USAGE, _STAT = "cpuacct.usage", "cpu.stat"
-_MOST = 4096
 _UNUSED_S = 60.0
 _TRIES, _TRY_S = 20, 0.01
 
@@ -27,7 +26,7 @@ class ProcessGroup:
         (folder / "pids.max").write_text(f"{limit}\n")
         self._folders = [folder, *([account] if account else [])]
         self._members = [os.open(each / "cgroup.procs", os.O_WRONLY | os.O_CLOEXEC) for each in self._folders]
-        self._usage = _opened(account / _USAGE if account else folder / _STAT)
+        self._usage = account / _USAGE if account else folder / _STAT
 
     def join(self) -> bool:
         """Between fork and exec: whether this process could enter, with all that it starts."""
@@ -37,22 +36,14 @@ class ProcessGroup:
 
     def used_s(self) -> float | None:
         """Processor time in s of all that were ever in it; None if it is not counted."""
-        with contextlib.suppress(OSError):
-            return None if self._usage is None else _seconds(os.pread(self._usage, _MOST, 0).decode())
-        return None
+        return _seconds(_text(self._usage))
 
     def remove(self) -> None:
         """When all of its processes have ended; the next run removes what is left."""
-        for descriptor in (*self._members, *([] if self._usage is None else [self._usage])):
+        for descriptor in self._members:
             os.close(descriptor)
         for folder in self._folders:
             _remove(folder)
-
-
-def _opened(file: Path) -> int | None:
-    with contextlib.suppress(OSError):
-        return os.open(file, os.O_RDONLY | os.O_CLOEXEC)
-    return None
 
 
 def _remove(folder: Path) -> None:

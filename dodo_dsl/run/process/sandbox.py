@@ -4,10 +4,10 @@ It is process 1 of its own namespaces (``network``), or their parent on the host
 over a socket; when that closes, for whatever reason, the sandbox ends everything that it started, and itself. If it is
 killed, the kernel sends SIGTERM to what it started. It has one thread: that signal depends on the starting thread.
 
-    runner to sandbox   {"do": "start", "id", "argv", "env", "cwd", "fork"} with the output's descriptor,
-                        "env" being what differs from the sandbox's own (null removes), "fork" whether argv
-                        is a Python module for which a fork of the sandbox will do, "masked" the device files
-                        that it must not see, "confined" the application's confinement or null;
+    runner to sandbox   {"do": "start"} with the output's descriptor, and that of a file with {"id", "argv", "env",
+                        "cwd", "fork", "masked", "confined"}, "fork" being whether argv is a Python module for
+                        which a fork of the sandbox will do, "masked" the device files that it must not see,
+                        "confined" the application's confinement or null;
                         {"do": "close"}; {"do": "listeners"};
                         {"do": "relay", "cid", "folder"}; {"do": "send", "to": [name, ...], "data"};
                         {"do": "use", "names": services of which memory is measured, too};
@@ -32,7 +32,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -133,9 +132,10 @@ class Sandbox:
                 os.close(descriptor)
         return True
 
-    def _do_start(self, descriptors: list[int], **command: Any) -> None:
-        name, words, output = command["id"], command["argv"], descriptors[0]
-        environment = {k: v for k, v in {**os.environ, **command["env"]}.items() if v is not None}
+    def _do_start(self, descriptors: list[int]) -> None:
+        output, file = descriptors
+        command = json.loads(os.pread(file, os.fstat(file).st_size, 0))
+        name, words, environment = command["id"], command["argv"], command["env"]
         is_fork = self.forks and command["fork"] and not command["masked"]
         start = self.children.fork if is_fork else functools.partial(self.children.start, masked=command["masked"])
         try:

@@ -2,15 +2,14 @@
 
 import asyncio
 import contextlib
-import errno
 import json
 import os
 import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -20,7 +19,7 @@ from dodo_dsl.run.process.sandbox import HOST, MAX_MESSAGE
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Entered, Slot, package_path
 from dodo_dsl.run.protocol import BackendError
 
-CLOSE_S = 10.0
+SEND_S = 10
 
 
 class SandboxClient:
@@ -51,33 +50,28 @@ class SandboxClient:
 
         ``entered`` are its namespaces; None on the host.
         """
-        answer: dict[str, Any] = {}
-        server = self._fork_server if entered else None
-        for each in (server, None) if server else (None,):  # it may have ended
-            answer = await self._start(slot, log, entered.word() if entered else HOST, each)
-            if "up" in answer:
-                break
+        answer = await self._start(slot, log, entered)
+        if "up" not in answer:
             self._close_socket()
-        else:
             raise BackendError(f"the test's sandbox does not start: {answer['down']}")
         self.pid = answer["up"]
         with contextlib.suppress(ProcessLookupError):
             self._end = os.pidfd_open(answer["up"])
 
-    async def _start(self, slot: Slot, log: int, entered: str, server: ForkServer | None) -> dict[str, Any]:
+    async def _start(self, slot: Slot, log: int, entered: Entered | None) -> dict[str, Any]:
         """The first message of a new sandbox, which a fork server forks, where there is one."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        ours.setblocking(False)
+        ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", SEND_S, 0))  # it may be busy
         self._socket, self._up = ours, asyncio.get_running_loop().create_future()
         asyncio.get_running_loop().add_reader(ours, self._receive)
         with theirs:
-            if server is not None:
+            if entered and self._fork_server is not None:
                 with contextlib.suppress(OSError):
-                    server.fork(theirs, log, slot.name, entered)
+                    self._fork_server.fork(theirs, log, slot.name, entered.word())
             else:
                 module = [sys.executable, "-P", "-m", "dodo_dsl.run.process.sandbox"]
                 self._child = subprocess.Popen(
-                    [*module, str(theirs.fileno()), entered],
+                    [*module, str(theirs.fileno()), entered.word() if entered else HOST],
                     pass_fds=(theirs.fileno(), *slot.descriptors),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -95,7 +89,7 @@ class SandboxClient:
     def _receive(self) -> None:
         assert self._socket is not None
         try:
-            data = self._socket.recv(MAX_MESSAGE)
+            data = self._socket.recv(MAX_MESSAGE, socket.MSG_DONTWAIT)
         except BlockingIOError:
             return
         except OSError:
@@ -120,16 +114,21 @@ class SandboxClient:
         if self._up is not None and not self._up.done():
             self._up.set_result(answer)
 
+    def start(self, command: dict[str, Any], output: int) -> None:
+        """Starts a process with an output, by a file, as words and variables may be longer than a message."""
+        with os.fdopen(os.memfd_create("command"), "wb") as file:
+            file.write(json.dumps(command).encode())
+            file.flush()
+            self.send({"do": "start"}, (output, file.fileno()))
+
     def send(self, message: dict[str, Any], descriptors: tuple[int, ...] = ()) -> None:
-        """Sends a message with descriptors; raises ValueError when it is longer than the sandbox reads at once."""
+        """Sends a message with descriptors."""
         assert self._socket is not None
-        data = json.dumps(message).encode()
-        if len(data) > MAX_MESSAGE:
-            raise ValueError(f"{len(data):,} bytes of words and variables, expected at most {MAX_MESSAGE:,}")
         try:
-            send_with_patience(self._socket, data, descriptors)
+            socket.send_fds(self._socket, [json.dumps(message).encode()], list(descriptors))
         except OSError as error:
-            self._on_lost(f"the test's sandbox cannot be reached: {error.strerror}")
+            why = f"it has read nothing for {SEND_S} s" if isinstance(error, BlockingIOError) else error.strerror
+            self._on_lost(f"the test's sandbox cannot be reached: {why}")
 
     async def close(self) -> None:
         """Ends everything in the sandbox, and itself."""
@@ -138,7 +137,7 @@ class SandboxClient:
             self.send({"do": "close"})
             await asyncio.get_running_loop().run_in_executor(None, self._wait)
             with contextlib.suppress(OSError):
-                while data := self._socket.recv(MAX_MESSAGE):  # how the last of them ended
+                while data := self._socket.recv(MAX_MESSAGE, socket.MSG_DONTWAIT):  # how the last of them ended
                     self._take(json.loads(data))
         self._close_socket()
 
@@ -156,18 +155,3 @@ class SandboxClient:
         """Lets the sandbox outlive the runner, with the descriptors of outputs, then of their logs."""
         self._closing = True
         self.send({"do": "keep"}, descriptors)
-
-
-def send_with_patience(channel: socket.socket, data: bytes, descriptors: tuple[int, ...]) -> None:
-    """Sends one message; waits for a sandbox that is busy starting processes, but not longer than CLOSE_S."""
-    deadline = time.monotonic() + CLOSE_S
-    while True:
-        try:
-            socket.send_fds(channel, [data], list(descriptors))
-        except BlockingIOError:
-            left = deadline - time.monotonic()
-            if left <= 0:
-                raise OSError(errno.ETIMEDOUT, f"it has read nothing for {CLOSE_S:g} s") from None
-            select.select([], [channel], [], left)
-        else:
-            return

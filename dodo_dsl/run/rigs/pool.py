@@ -34,17 +34,17 @@ async def _chosen(job: Job, say: Say, tickets: contextlib.ExitStack) -> Job:
     usable = _usable([job, *job.others])
     by_rig = {one.plan.rig: _lease_names(one) for one in usable}
     names = [name for found in by_rig.values() for name in found]
-    place, since = leases.lease_folder(), leases.arrival_time()
+    since = leases.arrival_time()
 
     def free() -> Job | None:
-        return next((one for one in usable if _is_free(by_rig[one.plan.rig], place, since)), None)
+        return next((one for one in usable if _is_free(by_rig[one.plan.rig], since)), None)
 
-    with leases.ticket(place, names, since):
+    with leases.ticket(names, since):
         try:
             chosen = await leases.in_turn(free, names, say, False, leases.DEFAULT_PATIENCE_S, since)
         except leases.LeaseTimeout as error:
             raise BackendError(f"none of the rigs {', '.join(by_rig)} came free: {error}") from error
-        tickets.enter_context(leases.ticket(place, by_rig[chosen.plan.rig], since, turn=True))
+        tickets.enter_context(leases.ticket(by_rig[chosen.plan.rig], since, turn=True))
     say(f"on rig '{chosen.plan.rig}'")
     return chosen
 
@@ -53,9 +53,8 @@ def _lease_names(job: Job) -> list[str]:
     return [f"cid-{job.plan.cid}", *device_leases(devices_of(job.plan))]
 
 
-def _is_free(names: Sequence[str], place: Path, since: int) -> bool:
-    waited_for = leases.ahead_in_line(place, names, since)
-    return not waited_for and all(leases.is_free(name) for name in names) and not is_claimed(names[0])
+def _is_free(names: Sequence[str], since: int) -> bool:
+    return not leases.ahead(names, since) and not is_claimed(names[0])
 
 
 def _usable(jobs: Sequence[Job]) -> list[Job]:

@@ -14,7 +14,6 @@ from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.emit.output_folder import PLAN_FILE
 from dodo_dsl.plan.plan_json import from_json, to_json
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.history import History
 from dodo_dsl.spec.deployment import Deployment
 from tests.check import examples
 
@@ -47,15 +46,6 @@ def test_a_changed_clock_replaces_what_was_wrong_in_the_first(folder: Path) -> N
     assert jobs[0].plan.clock == "realtime"
     assert jobs[0].plan.lockstep is None
     assert "dodo-clock" not in {service.name for service in jobs[0].plan.services}
-
-
-def test_of_an_application_that_acted_by_its_own_clock_the_next_run_in_real_time_knows(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(History, "is_timed", lambda *_: True)
-    (steady,), _ = prepared(folder, "--clock", "realtime")
-    (stepped,), _ = prepared(folder)
-    assert (steady.plan.timed, stepped.plan.timed) == (("application",), ())
 
 
 def test_a_declared_timer_is_in_the_plan(folder: Path) -> None:

@@ -5,7 +5,6 @@ import contextlib
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,8 +27,8 @@ def started(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ForkServer]]:
     servers: list[ForkServer] = []
     start = ForkServer.__init__
 
-    def remembered(self: ForkServer, descriptors: tuple[int, ...] = ()) -> None:
-        start(self, descriptors)
+    def remembered(self: ForkServer) -> None:
+        start(self)
         servers.append(self)
 
     monkeypatch.setattr(fork_server_client.ForkServer, "__init__", remembered)
@@ -40,7 +39,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ForkServer]]:
 
 def test_one_that_has_begun_is_taken(started: list[ForkServer]) -> None:
     begin(["sil-closed-straight"])
-    with tempfile.TemporaryFile() as lease, loading(options(), lease.fileno()) as load:
+    with loading(options(), 0) as load:
         assert started == [load.fork_server]
 
 
@@ -86,11 +85,7 @@ def test_none_where_none_is_needed(chosen: dict[str, str]) -> None:
 
 
 def test_an_error_ends_one_that_nobody_took() -> None:
-    with (
-        tempfile.TemporaryFile() as lease,
-        pytest.raises(ValueError, match="no such test"),
-        loading(options(), lease.fileno()) as load,
-    ):
+    with pytest.raises(ValueError, match="no such test"), loading(options(), 0) as load:
         server = load.fork_server
         assert server is not None and server.is_alive
         raise ValueError("no such test")
@@ -98,11 +93,10 @@ def test_an_error_ends_one_that_nobody_took() -> None:
 
 
 def test_it_stays_with_who_took_it() -> None:
-    with tempfile.TemporaryFile() as lease:
-        with loading(options(), lease.fileno()) as load:
-            server = load.take()
-        assert server is not None and server.is_alive
-        server.kill()
+    with loading(options(), 0) as load:
+        server = load.take()
+    assert server is not None and server.is_alive
+    server.kill()
     assert not server.is_alive
 
 

@@ -16,7 +16,6 @@ from dodo_dsl.outcome import (
 )
 from dodo_dsl.plan.model import Lockstep
 from dodo_dsl.run.machine_load.judgement import (
-    TIMED_WAY_OUT,
     UNSEEN,
     UNSEEN_USE,
     consider,
@@ -49,9 +48,7 @@ def test_a_failure_on_a_busy_machine_is_an_error(load: MachineLoad, why: str) ->
     finding, found = consider(FAILED, load)
     assert (finding.result, finding.service, found) == ("error", "judge", replace(load, undecided=True))
     assert finding.reason.startswith(f"the machine was too busy to judge: {why}")
-    way = "; it found: only 43 frames had an answer (at least 50); run it with --clock lockstep, or fewer tests at once"
-    assert f"{way} (-j 1)" in finding.reason
-    assert consider(FAILED, load, is_timed=True)[0].reason.endswith(f"(at least 50); {TIMED_WAY_OUT}")
+    assert "; it found: only 43 frames had an answer (at least 50); run it with --clock lockstep" in finding.reason
     assert f"it found: {'x' * 300}...; run it" in consider(replace(FAILED, reason="x" * 2000), load)[0].reason
     for other in (replace(FAILED, result="passed"), replace(FAILED, result="error"), CRASHED):
         assert consider(other, load) == (other, load), "does not depend on time"

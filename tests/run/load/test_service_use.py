@@ -1,13 +1,10 @@
 """What services use and wait for, by a ``/proc`` that is written for each test, and by the kernel's own."""
 
-import json
 import os
 import shutil
 import sys
-from dataclasses import asdict
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from dodo_dsl.run.machine_load.processes import above, memory
@@ -168,11 +165,6 @@ def test_cores_are_busy_with_whatever_keeps_others_off(proc: Proc) -> None:
     assert (busy_s(STAT, [0, 2]), busy_s(STAT, [10]), busy_s("", [])) == (None, None, 0)
     (proc.root / "self" / "schedstat").unlink()
     assert proc.used().busy_s is None, "a kernel that does not count who waits"
-
-
-def test_snapshots_are_the_same_behind_json() -> None:
-    taken = Snapshot(1.5, {"app": Used(0.5, 0.25, 7)}, 2, 3.5)
-    assert msgspec.convert(json.loads(json.dumps(asdict(taken))), Snapshot) == taken
 
 
 def test_what_only_a_descriptor_holds_counts_once() -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.commands import changes
 from dodo_dsl.run.process.environment import application_environment, base_environment, own_environment
 
 OUTSIDE = {
@@ -44,9 +43,3 @@ def test_an_application_gets_what_is_passed() -> None:
 def test_own_services_get_all_but_secrets() -> None:
     assert set(OUTSIDE) - set(own_environment()) == {"CI_JOB_TOKEN", "LICENSE_KEY"}
     assert set(OUTSIDE) - set(base_environment(("LICENSE_KEY",))) == {"CI_JOB_TOKEN"}
-
-
-def test_what_a_sandbox_has_to_change() -> None:
-    changed = changes({"A": "1", "B": "2", "C": "3"}, {"A": "1", "B": "4", "D": "5"})
-    assert {name: changed[name] for name in "BCD"} == {"B": "4", "C": None, "D": "5"}
-    assert "A" not in changed

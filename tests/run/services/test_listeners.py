@@ -1,14 +1,12 @@
 """Which programs listen on a bus: by the kernel's own ``/proc``, and by one that is written for the test."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.opendlv.session import Session
-from dodo_dsl.run.listeners import buses, listening, members
+from dodo_dsl.run.listeners import buses, joined, listening
 from tests.run.load.test_service_use import Proc
 
 ROW = "  72: {local} 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 {inode} 2 0 0"
@@ -58,21 +56,9 @@ def test_nobody_knows_where_the_kernel_hides_a_service_s_sockets(
 
 
 def test_the_kernel_s_own_sockets(cid: int) -> None:
-    before, me = members(cid), {os.getpid(): "me"}
-    assert (listening(me), before) == (set(), 0)
+    me = {os.getpid(): "me"}
+    assert (listening(me), cid in buses([os.getpid()])) == (set(), False)
     with Session(cid):
-        assert (listening(me), members(cid)) == ({"me"}, 1)
-    assert (listening(me), members(cid)) == (set(), 0)
-
-
-def test_the_buses_that_programs_have_joined(cid: int) -> None:
-    assert cid not in buses([os.getpid()])
-    with Session(cid):
-        assert cid in buses([os.getpid(), 0])
-    assert buses([0]) == set()
-
-
-def test_a_network_that_cannot_be_seen_has_no_known_members() -> None:
-    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
-        pass
-    assert members(130, Path("/proc") / str(ended.pid)) is None
+        assert (listening(me), cid in buses([os.getpid(), 0])) == ({"me"}, True)
+    assert (listening(me), cid in buses([os.getpid()])) == (set(), False)
+    assert (buses([0]), joined(Path("/proc/0"))) == (set(), None), "a network that cannot be seen"

@@ -1,12 +1,9 @@
 """What an application may read, and what of its own folder it does not see."""
 
 import itertools
-import json
 import sys
-from dataclasses import asdict
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from dodo_dsl.run.process import confinement as module
@@ -63,11 +60,6 @@ def test_a_repository_where_every_application_sees_the_machine_is_hidden_around_
     assert "/usr/share/perl5" not in argv
 
 
-def test_it_goes_to_the_sandbox_and_back() -> None:
-    one = Confinement("/app", ("/usr/x",), ("/app/tests",), SandboxLimits(memory=5, reads=("a",)), ("/dev/x",))
-    assert msgspec.convert(json.loads(json.dumps(asdict(one))), Confinement) == one
-
-
 def test_a_program_elsewhere_is_shown_and_its_folder_is_not() -> None:
     argv = sandbox_words(Confinement("/app"), MOUNTS, "/srv/bin/drive", {})
     bound = [argv[n + 1] for n, word in enumerate(argv) if word == "--ro-bind-try"]
@@ -84,12 +76,6 @@ def test_what_gives_it_the_time_can_be_written_to_and_not_replaced() -> None:
         *("--ro-bind", "/dev/null", "/dev/shm/t/command"),
         *("--ro-bind", "/dev/null", "/dev/shm/t/reply"),
     ]
-
-
-def test_on_the_host_it_sees_what_dodo_sees_in_a_process_namespace() -> None:
-    argv = sandbox_words(Confinement("/app"), None, "/usr/bin/true", {})
-    assert "--unshare-pid" in argv
-    assert argv[argv.index("--dev-bind") :][:3] == ["--dev-bind", "/", "/"]
 
 
 def test_no_variable_is_a_word_of_its_own() -> None:
