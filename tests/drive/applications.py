@@ -15,12 +15,6 @@ from tests.realtime import hurry
 ROOT = Path(__file__).parents[2]
 KIWI = ROOT / "examples" / "kiwi"
 
-LEAVES = (
-    "perception.py",
-    "        if not memory.wait():\n            continue\n",
-    "        if not memory.wait(0.9 if 'frame' in locals() else None):\n            sys.exit(0)\n",
-)
-
 TOLD = {
     "in": ["opendlv.sim.Frame"],
     "out": ["opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"],

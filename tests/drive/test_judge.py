@@ -55,6 +55,9 @@ def test_the_example_passes_every_shipped_test(runs: Runs) -> None:
         assert (test["outcome"], test["clock"], test["checks"] != []) == ("passed", "lockstep", True), test
         assert runs.recording(slug).stat().st_size > 10_000
     assert runs.checks(BOARD)["true-positives"] > 300
+    assert runs.checks("sil-perception-cars")["recall-car"] > 0.9
+    assert 0.2 < runs.checks("sil-closed-two-cars")["body-margin"] < 0.35
+    assert runs.checks("sil-closed-two-cars")["time-to-goal"] > 8.5, "the other car is ahead until then"
 
 
 def test_what_was_judged_over_time_is_the_same_in_a_report_of_its_own(runs: Runs, tmp_path: Path) -> None:

@@ -1,9 +1,7 @@
 """Whole tests with clock virtual: applications that act by their own time."""
 
-import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -56,26 +54,6 @@ def test_fifty_drives_under_load_are_one(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
     assert f"{STRAIGHT}: 50 of 50 runs gave " in done.stdout
     assert drive(compose)["checks"] != drive(compose, 0, "--seed", "1")["checks"]
-
-
-@pytest.mark.proof
-def test_a_program_with_libcluons_timers_drives_the_same_each_time(tmp_path: Path) -> None:
-    """With libcluon as a header, ``LIBCLUON_HEADER=.../cluon-complete.hpp``."""
-    header = os.environ.get("LIBCLUON_HEADER")
-    if not header or not shutil.which("cmake") or not shutil.which("g++"):
-        pytest.skip("LIBCLUON_HEADER names no cluon-complete.hpp, or cmake or g++ is not installed")
-    made = tmp_path / "made"
-    made.mkdir()
-    words = [sys.executable, "-m", "dodo_dsl", "new", "--application", "--language", "cpp"]
-    subprocess.run(words, cwd=made, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True)
-    shutil.copy(HERE / "timed.cpp", made / "steering.cpp")
-    shutil.copy(header, made / "cluon-complete.hpp")
-    for words in (["cmake", "-B", "build"], ["cmake", "--build", "build", "--target", "steering"]):
-        subprocess.run(words, cwd=made, check=True, capture_output=True, timeout=600)
-    compose = application(made, "build/steering")
-    first = drive(compose)
-    assert first["outcome"] == "passed"
-    assert all(drive(compose)["checks"] == first["checks"] for _ in range(4))
 
 
 SPINS = """\
