@@ -1,15 +1,9 @@
-"""What DoDo's services say to each other past the bus: typed messages over a Unix socket in a folder of DoDo's own.
+"""What the clock of a test in lockstep and its services say to each other past the bus: typed messages.
 
-The folder is in the sandbox of no application. In lockstep the clock listens there, and each service of the test
-connects and gives its name before it is ready, so before the application starts.
+Each service connects to the clock before it is ready, so before the application starts.
 """
 
-import contextlib
-import os
-import select
-import socket
-import time
-from collections.abc import Iterable, Iterator
+import math
 from pathlib import Path
 from typing import Self
 
@@ -18,14 +12,7 @@ from msgspec import Struct
 
 from dodo_dsl.opendlv.address import Address
 from dodo_dsl.opendlv.envelope import Envelope
-
-CLOCK_SOCKET = ".clock"
-
-
-class Hello(Struct, tag=True, array_like=True):
-    """The first message: which service of the test it is."""
-
-    service: str
+from dodo_dsl.opendlv.packets import Connection
 
 
 class Step(Struct, tag=True, array_like=True):
@@ -67,112 +54,29 @@ class Done(Struct, tag=True, array_like=True):
     about: About | None = None
 
 
-Message = Hello | Step | Show | Done
-PACKET = 1 << 16
-_LAST, _MORE = b"\0", b"\1"
-_AGAIN_S, _HELLO_S = 0.005, 1.0
+Message = Step | Show | Done
 _encode = msgspec.msgpack.Encoder().encode
 _decode = msgspec.msgpack.Decoder(Message).decode
 
 
-@contextlib.contextmanager
-def _short(path: Path) -> Iterator[str]:
-    """The path of a socket in a form that an address can hold, however long the folder's is."""
-    folder = os.open(path.parent, os.O_PATH)
-    try:
-        yield f"/proc/self/fd/{folder}/{path.name}"
-    finally:
-        os.close(folder)
-
-
 class Channel:
-    """One end of a connection. A message longer than a packet takes several, of which the first byte says so."""
+    """One end of a connection between the clock and a service."""
 
-    def __init__(self, connection: socket.socket) -> None:
-        self._socket = connection
-        self._poll = select.poll()
-        self._poll.register(connection, select.POLLIN)
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self.fileno, self.close = connection.fileno, connection.close
 
     @classmethod
-    def connect(cls, path: Path) -> Self:
-        """Connects as soon as somebody listens."""
-        while True:
-            connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-            try:
-                with _short(path) as address:
-                    connection.connect(address)
-            except (FileNotFoundError, ConnectionRefusedError):
-                connection.close()
-                time.sleep(_AGAIN_S)
-            else:
-                return cls(connection)
+    def connect(cls, path: Path, name: str) -> Self:
+        """Connects as a service of this name, as soon as the clock listens."""
+        return cls(Connection.open(path, name, math.inf))
 
     def send(self, message: Message) -> None:
         """Sends a message; it is lost where the other end has gone."""
-        data = _encode(message)
-        with contextlib.suppress(OSError):
-            while len(data) > PACKET:
-                self._socket.send(_MORE + data[:PACKET])
-                data = data[PACKET:]
-            self._socket.send(_LAST + data)
+        self._connection.send(_encode(message))
 
     def receive(self, timeout: float) -> Message | None:
         """The next message within ``timeout`` seconds; raises EOFError when the other end has gone."""
-        if not self._poll.poll(timeout * 1000):
-            return None
-        data, kind = b"", _MORE
-        while kind == _MORE:
-            try:
-                packet = self._socket.recv(PACKET + 1)
-            except ConnectionError:
-                packet = b""
-            if not packet:
-                raise EOFError
-            kind, data = packet[:1], data + packet[1:]
-        message: Message = _decode(data)
+        data = self._connection.receive(timeout)
+        message: Message | None = None if data is None else _decode(data)
         return message
-
-    def fileno(self) -> int:
-        """The file descriptor to poll for reading."""
-        return self._socket.fileno()
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
-
-
-class Listener:
-    """The end to which services connect, each of ``services`` once; others are turned away."""
-
-    def __init__(self, path: Path, services: Iterable[str]) -> None:
-        """Raises OSError."""
-        self._path = path
-        self.missing = set(services)
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        path.unlink(missing_ok=True)
-        with _short(path) as address:
-            self._socket.bind(address)
-        path.chmod(0o666)
-        self._socket.listen(socket.SOMAXCONN)
-
-    def accept(self, timeout: float) -> tuple[str, Channel] | None:
-        """A service that connects within ``timeout`` seconds, with its name; nobody can behind the last one."""
-        if not select.select([self._socket], [], [], timeout)[0]:
-            return None
-        channel = Channel(self._socket.accept()[0])
-        try:
-            hello = channel.receive(_HELLO_S)
-        except (EOFError, msgspec.DecodeError):
-            hello = None
-        if not isinstance(hello, Hello) or hello.service not in self.missing:
-            channel.close()
-            return None
-        self.missing.remove(hello.service)
-        if not self.missing:
-            self.close()
-        return hello.service, channel
-
-    def close(self) -> None:
-        """Nobody else can connect."""
-        self._socket.close()
-        self._path.unlink(missing_ok=True)

@@ -13,7 +13,7 @@ from dodo_dsl.run import service_protocol
 from dodo_dsl.run.outcomes import Facts, Finding, decide, how_it_ended
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
-from dodo_dsl.run.protocol import Malformed, Noted, Recorded, VerdictEvent
+from dodo_dsl.run.protocol import Malformed, Noted, VerdictEvent
 from dodo_dsl.run.test_recording import TestRecording
 
 NOT_OF_A_RECORDING = ("DODO_READERS", "DODO_RIG", "DODO_WORLD", "DODO_TOLD", "DODO_TRUTH")
@@ -91,7 +91,9 @@ def _collect(one: _Running, facts: Facts, notes: list[str], logs: Path) -> tuple
     recorded = []
     one.output.seek(0)
     for line in one.output:
-        match service_protocol.read_line(name, True, line):
+        if line.startswith(service_protocol.JUDGED):
+            recorded.append(line)
+        match service_protocol.read(name, True, line):
             case VerdictEvent() as verdict:
                 facts.verdicts.setdefault(name, []).append(verdict)
             case Malformed(_, problem):
@@ -99,8 +101,6 @@ def _collect(one: _Running, facts: Facts, notes: list[str], logs: Path) -> tuple
                 facts.findings.append(Finding("error", text, name))
             case Noted(text):
                 notes.append(text)
-            case Recorded():
-                recorded.append(line)
     one.log.seek(0)
     said = one.log.read()
     log = logs / f"{one.service.layer}.{name}.log"

@@ -38,6 +38,8 @@ class Finding:
     service: str = ""
     is_verdict: bool = False
     """Whether an evaluator found it: then a machine that is too busy may be the reason, unlike for a program's end."""
+    silent: bool = False
+    """Whether nothing came of the application, which may be on another bus."""
 
 
 @dataclass
@@ -97,7 +99,7 @@ def decide(facts: Facts, others: Sequence[Finding] = ()) -> Finding:
 def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
     if len(verdicts) > 1:
         return [Finding("error", f"evaluator '{evaluator}' gave {len(verdicts)} verdicts, expected one", evaluator)]
-    return [Finding("passed" if v.passed else "failed", v.reason, evaluator, is_verdict=True) for v in verdicts]
+    return [Finding("passed" if v.passed else "failed", v.reason, evaluator, True, v.silent) for v in verdicts]
 
 
 def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:

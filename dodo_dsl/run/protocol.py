@@ -2,11 +2,11 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Protocol
+from typing import Annotated, Literal, Protocol
 
-from msgspec import Meta
+from msgspec import UNSET, Meta, Struct, UnsetType
 
-from dodo_dsl.outcome import Check, Response, Verdict
+from dodo_dsl.outcome import Amount, Check, Evidence, Response, Verdict
 from dodo_dsl.run.machine_load.service_use import Snapshot
 
 MOST_TEXT = 2000
@@ -14,20 +14,137 @@ MOST_TEXT = 2000
 Sentence = Annotated[str, Meta(min_length=1, max_length=MOST_TEXT)]
 
 
-@dataclass(frozen=True)
-class Ready:
+class Said(Struct, tag_field="dodo", frozen=True):
+    """What a service says, its kind under ``dodo``; the runner adds its name."""
+
     service: str
+
+
+class Ready(Said, tag="ready", frozen=True):
+    """It can take what comes: the next layer may start."""
+
+
+class InputEnded(Said, tag="end-of-input", frozen=True):
+    """A source is at its end: an application may end, too."""
+
+
+class Overrun(Said, tag="lost", frozen=True):
+    """A service has lost ``messages`` of the bus up to now, because its receive buffer was full."""
+
+    messages: Annotated[int, Meta(gt=0, le=(1 << 63) - 1)]
+
+
+class Late(Said, tag="late", frozen=True):
+    """Up to now ``late`` of the ``updates`` of a service were late, one of them by ``worst_s``."""
+
+    updates: Annotated[int, Meta(gt=0, le=(1 << 63) - 1)]
+    late: Annotated[int, Meta(gt=0, le=(1 << 63) - 1)]
+    worst_s: Amount = 0.0
+
+
+class Paused(Said, tag="paused", frozen=True):
+    """What a service emulates has stood still for ``seconds`` so far, as the machine was too busy for it."""
+
+    seconds: Annotated[float, Meta(gt=0)]
+
+
+class Flooded(Said, tag="flood", frozen=True):
+    """More is sent than the recorder takes: ``what`` is the limit in a sentence, ``too_fast`` whether it is the rate's.
+
+    ``share`` of it are messages ``message`` of one ``sender_stamp``.
+    """
+
+    what: Sentence
+    message: Sentence
+    sender_stamp: int
+    share: float
+    too_fast: bool
+
+
+class MemoryTaken(Said, tag="taken", frozen=True):
+    """A service cannot write its shared memory any more, as a reader of it keeps the lock or has broken it."""
+
+    text: Sentence
+
+
+class Noted(Struct, tag_field="dodo", tag="note", frozen=True):
+    """A note on the test besides its outcome."""
+
+    text: Sentence
+
+
+class Foreign(Struct, tag_field="dodo", tag="foreign", frozen=True):
+    """The application sent what only others may send; one sentence."""
+
+    reason: Sentence
+
+
+class Time(Struct, tag_field="dodo", tag="time", frozen=True):
+    """How far the clock of a lockstep test is: test time in seconds; ``last`` when it has stopped."""
+
+    seconds: float
+    last: bool = False
+
+
+class Responded(Struct, tag_field="dodo", tag="response", frozen=True):
+    """How long the application took for its answers in lockstep."""
+
+    response: Response
+
+
+class Stopped(Struct, tag_field="dodo", tag="stopped", frozen=True):
+    """The clock of a lockstep test gives up; ``silent`` when nothing came of the application."""
+
+    how: Literal["unanswered", "stuck", "timedout"]
+    reason: Annotated[str, Meta(max_length=MOST_TEXT)]
+    silent: bool = False
+
+
+class GivenLimit(Struct, forbid_unknown_fields=True, frozen=True):
+    """What the value of a check may be."""
+
+    min: int | float | UnsetType = UNSET
+    max: int | float | UnsetType = UNSET
+
+
+class GivenCheck(Struct, forbid_unknown_fields=True, frozen=True):
+    """A check of a verdict."""
+
+    name: Sentence
+    value: int | float | None
+    limit: GivenLimit
+    unit: Annotated[str, Meta(max_length=MOST_TEXT)]
+    ok: bool
+    exclusive: bool | UnsetType = UNSET
+
+
+class GivenVerdict(Said, tag="verdict", frozen=True):
+    """What an evaluator has found; ``silent`` when nothing came of the application."""
+
+    outcome: Literal["passed", "failed"]
+    reason: Sentence
+    checks: list[GivenCheck]
+    evidence: Evidence = {}
+    silent: bool = False
+
+
+Message = (
+    Ready | InputEnded | Overrun | Late | Paused | Flooded | MemoryTaken | Noted | Foreign | Time | Responded | Stopped
+    | GivenVerdict
+)  # fmt: skip
+"""What services say to the runner; besides ``judged``, which is for the report to read."""
 
 
 @dataclass(frozen=True)
 class VerdictEvent:
-    """A well-formed verdict line of an evaluator; its checks have their margins."""
+    """A verdict of an evaluator; its checks have their margins."""
 
     service: str
     passed: bool
     reason: str
     checks: tuple[Check, ...]
     evidence: Mapping[str, float | str | None] = field(default_factory=dict)
+    silent: bool = False
 
     def as_json(self) -> Verdict:
         """The verdict in ``results.json``."""
@@ -39,17 +156,10 @@ class VerdictEvent:
 
 @dataclass(frozen=True)
 class Malformed:
-    """A line that should be a verdict and is not one."""
+    """A message that should be a verdict and is not one."""
 
     service: str
     problem: str
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """A line of what an evaluator judged over time, for the report."""
-
-    service: str
 
 
 @dataclass(frozen=True)
@@ -59,76 +169,6 @@ class Exited:
     service: str
     code: int
     out_of_memory: bool = False
-
-
-@dataclass(frozen=True)
-class Overrun:
-    """A service has lost ``messages`` of the bus up to now, because its receive buffer was full."""
-
-    service: str
-    messages: Annotated[int, Meta(gt=0, le=(1 << 63) - 1)]
-
-
-@dataclass(frozen=True)
-class Late:
-    """Up to now ``late`` of the ``updates`` of a service were late, one of them by ``worst_s``."""
-
-    service: str
-    updates: Annotated[int, Meta(le=(1 << 63) - 1)]
-    late: Annotated[int, Meta(gt=0)]
-    worst_s: Annotated[float, Meta(ge=0)] = 0.0
-
-
-@dataclass(frozen=True)
-class Paused:
-    """What a service emulates has stood still for ``seconds`` so far, as the machine was too busy for it."""
-
-    service: str
-    seconds: Annotated[float, Meta(gt=0)]
-
-
-@dataclass(frozen=True)
-class Flooded:
-    """More is sent than the recorder takes: ``what`` is the limit in a sentence, ``too_fast`` whether it is the rate's.
-
-    ``share`` of it are messages ``message`` of one ``sender_stamp``.
-    """
-
-    service: str
-    what: Sentence
-    message: Sentence
-    sender_stamp: int
-    share: float
-    too_fast: bool
-
-
-@dataclass(frozen=True)
-class MemoryTaken:
-    """A service cannot write its shared memory any more, as a reader of it keeps the lock or has broken it."""
-
-    service: str
-    text: Sentence
-
-
-@dataclass(frozen=True)
-class Noted:
-    """A note on the test besides its outcome."""
-
-    text: Sentence
-
-
-@dataclass(frozen=True)
-class Foreign:
-    """The application sent what only others may send; one sentence."""
-
-    reason: Sentence
-
-
-@dataclass(frozen=True)
-class InputEnded:
-    """A source is at its end: an application may end, too."""
-
-    service: str
 
 
 @dataclass(frozen=True)
@@ -145,29 +185,6 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class Time:
-    """How far the clock of a lockstep test is: test time in seconds; ``last`` when it has stopped."""
-
-    seconds: float
-    last: bool = False
-
-
-@dataclass(frozen=True)
-class Responded:
-    """How long the application took for its answers in lockstep."""
-
-    response: Response
-
-
-@dataclass(frozen=True)
-class Stopped:
-    """The clock of a lockstep test gives up: ``kind`` is unanswered, stuck or timedout."""
-
-    kind: str
-    reason: Annotated[str, Meta(max_length=MOST_TEXT)]
-
-
-@dataclass(frozen=True)
 class Unmatched:
     """What a service printed since one of its lines last matched, in words; ``never`` if none did."""
 
@@ -176,26 +193,7 @@ class Unmatched:
     never: bool
 
 
-Event = (
-    Ready
-    | VerdictEvent
-    | Malformed
-    | Recorded
-    | Overrun
-    | Late
-    | Paused
-    | Flooded
-    | MemoryTaken
-    | Noted
-    | Foreign
-    | InputEnded
-    | Exited
-    | Unstartable
-    | Lost
-    | Time
-    | Responded
-    | Stopped
-)
+Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost
 
 
 class Backend(Protocol):

@@ -63,10 +63,6 @@ class Ended(Exception):
     """The test is over; what decided it is among the facts."""
 
 
-_SILENT = "; the test is on CID"
-"""What the reasons of services end with, before the number, where they heard nothing of the application."""
-
-
 @dataclass
 class RunState:
     """Takes the events of one test. Times in s; ``began`` and ``finished`` by ``clock``, which never goes back."""
@@ -159,8 +155,8 @@ class RunState:
                 self._end_with(memory_taken(event))
             case Foreign(reason):
                 self.end("failed", reason, self._first_application())
-            case Stopped(kind, reason):
-                self._take_stop(kind, reason)
+            case Stopped():
+                self._take_stop(event)
             case Exited(service, code):
                 self.exits[service] = code
                 self._take_exit(event)
@@ -189,12 +185,13 @@ class RunState:
             case Responded(answers):
                 self.response = answers
 
-    def _take_stop(self, kind: str, reason: str) -> None:
-        if kind == "timedout":
+    def _take_stop(self, event: Stopped) -> None:
+        if event.how == "timedout":
             self.time_out()
-        self.is_unanswered = kind == "unanswered"
+        self.is_unanswered = event.how == "unanswered"
+        result: Result = "failed" if self.is_unanswered else "error"
         service = self._first_application() if self.is_unanswered else CLOCK
-        self.end("failed" if self.is_unanswered else "error", reason, service)
+        self._end_with(Finding(result, event.reason, service, silent=event.silent))
 
     def note_end(self, event: Exited, is_asked: bool) -> None:
         """Notes an end of the application's that decides nothing, unless it is a good one or by SIGTERM."""
@@ -244,13 +241,14 @@ class RunState:
         told = windowless(self._tails.get(finding.service, ()))
         return replace(finding, reason=f"{finding.reason}; {told}") if told else finding
 
-    def _elsewhere(self, finding: Finding) -> Finding:
-        """A failure for silence, which names the test's CID, with the bus that the application has joined instead."""
-        others = sorted(self.buses - {self.plan.cid})
-        if not others or finding.result != "failed" or not finding.reason.endswith(f"{_SILENT} {self.plan.cid}"):
+    def _elsewhere(self, finding: Finding, cid: int) -> Finding:
+        """A failure for silence, with the test's CID, and the one that the application has joined instead."""
+        if not finding.silent:
             return finding
-        told = f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}"
-        return replace(finding, reason=f"{finding.reason}; {told}")
+        told = [finding.reason, f"the test is on CID {cid}"]
+        if others := sorted(self.buses - {cid}):
+            told += [f"the application talks on CID {others[0]}", f"write x-dodo: {{cid: {others[0]}}}"]
+        return replace(finding, reason="; ".join(told))
 
     def _explained(self, finding: Finding) -> Finding:
         """An error in place of a failure that may be due to what others used up.
@@ -309,7 +307,7 @@ class RunState:
         judged = [check for verdict in verdicts for check in verdict.checks]
         findings = (*answers.findings, *use.findings)
         considered, load = consider(decide(self.facts, findings), self._load(), bool(plan.timed))
-        found = self._explained(self._elsewhere(self._timed(considered)))
+        found = self._explained(self._elsewhere(self._timed(considered), backend.cid))
         finding = self._without_display(self._with_told(self._with_printed(found)))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(

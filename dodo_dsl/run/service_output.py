@@ -1,7 +1,4 @@
-"""A service's output: raw into its log with times, the last lines in memory, lines of the protocol to a callback.
-
-What an evaluator recorded goes into its own file next to the log.
-"""
+"""A service's output: raw into its log with times, the last lines in memory, and each line to a callback."""
 
 import asyncio
 import contextlib
@@ -13,13 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dodo_dsl import atomic
-from dodo_dsl.log_times import JUDGED_SUFFIX, LogTimes
-from dodo_dsl.run.service_protocol import JUDGED
+from dodo_dsl.log_times import LogTimes
 
 _MAX_LINE = 1 << 16
 _MAX_LOG = 64 << 20
 _MAX_LOG_LINES = 500_000
-_MAX_RECORD = 16 << 20
 _TAIL_LINES = 8
 _TAIL_WIDTH = 300
 
@@ -27,8 +22,8 @@ _TAIL_WIDTH = 300
 class ServiceOutput:
     """The reading end of a pipe. ``writer`` is handed to the service; ``done`` is set at the end of its output.
 
-    ``on_line`` is called with every line, and returns whether it belongs to the protocol. Lines reach the log when they
-    are complete.
+    ``on_line`` is called with every line, and returns whether it is a message to the runner, and no log.
+    Lines reach the log when they are complete.
     """
 
     def __init__(
@@ -38,10 +33,10 @@ class ServiceOutput:
 
         ``is_cooked`` means that another terminal has put a carriage return to the end of each line.
         """
-        self._log, self._record_file = atomic.appended(log), log.with_suffix(JUDGED_SUFFIX)
+        self._log = atomic.appended(log)
         self._times, self._begin = LogTimes(log), os.fstat(self._log.fileno()).st_size
         self._on_line = on_line
-        self._written = self._lines = self._recorded = 0
+        self._written = self._lines = 0
         self._rest = b""
         self._skipping = False
         self._tail: deque[bytes] = deque(maxlen=_TAIL_LINES)
@@ -70,12 +65,18 @@ class ServiceOutput:
         self._write_times()
         return self._reader, self._log.fileno()
 
+    def add(self, line: str) -> None:
+        """Writes a line of the runner's into the log."""
+        self._write(line.encode("utf-8", "replace") + b"\n")
+
     def close(self) -> None:
         """Reads the rest that is there already, and stops."""
         while not self.done.is_set() and self._read():
             pass
         if not self.done.is_set():
             self._finish()
+        self._log.close()
+        self._write_times()
 
     def _read(self) -> bool:
         """Reads once; whether there was something to read."""
@@ -100,7 +101,7 @@ class ServiceOutput:
         return True
 
     def _write(self, data: bytes) -> None:
-        """Writes to the log up to its limit; lines of the protocol count beyond it, too."""
+        """Writes to the log up to its limit; messages to the runner count beyond it, too."""
         if self._written > _MAX_LOG or not data:
             return
         self._lines += data.count(b"\n")
@@ -121,29 +122,18 @@ class ServiceOutput:
         if self._skipping:
             self._skipping = False
             return True
-        if line.strip() and not self._on_line(line):
-            self._tail.append(line)
-        elif line.startswith(JUDGED):
-            self._record(line + b"\n")
+        if not line.strip():
+            return True
+        if self._on_line(line):
             return False
+        self._tail.append(line)
         return True
-
-    def _record(self, line: bytes) -> None:
-        self._recorded += len(line)
-        try:
-            if self._recorded <= _MAX_RECORD:
-                with atomic.appended(self._record_file) as file:
-                    file.write(line)
-        except OSError as error:
-            self._tail.append(f"... dodo: what it judged cannot be written: {error.strerror}".encode())
 
     def _finish(self) -> None:
         asyncio.get_running_loop().remove_reader(self._reader)
         os.close(self._reader)
         if self._rest and self._take(self._rest):
             self._write(self._rest)
-        self._log.close()
-        self._write_times()
         self.done.set()
 
     def _write_times(self) -> None:

@@ -1,131 +1,165 @@
-"""The protocol of services on standard output: JSON lines with the key ``dodo`` are for the runner, others are log."""
+"""What services tell the runner: JSON over the channel of a test, or lines of output where they do not reach it.
 
+Such a line is an object with the key ``dodo``; everything else that services print is log.
+"""
+
+import asyncio
+import contextlib
 import json
-import math
-from typing import Annotated, Any
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import msgspec
-from msgspec import Meta, Struct
 
-from dodo_dsl.outcome import Evidence, Response, with_margin
-from dodo_dsl.plan.added_services import CLOCK, RECORDER
+from dodo_dsl import atomic
+from dodo_dsl.log_times import JUDGED_SUFFIX
+from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection, Listener
+from dodo_dsl.outcome import with_margin
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.protocol import (
-    MOST_TEXT,
     Event,
-    Flooded,
     Foreign,
+    GivenVerdict,
     InputEnded,
     Late,
     Malformed,
     MemoryTaken,
+    Message,
     Noted,
-    Overrun,
-    Paused,
     Ready,
-    Recorded,
-    Responded,
-    Sentence,
     Stopped,
-    Time,
     VerdictEvent,
 )
+from dodo_dsl.run.service_output import ServiceOutput
 
 JUDGED = b'{"dodo": "judged"'
-_STOPS = ("unanswered", "stuck", "timedout")
+_MAX_RECORD = 16 << 20
+_PATIENCE_S = 1.0
+_decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
 
 
-def read_line(service: str, is_evaluator: bool, line: bytes) -> Event | None:
-    """The event that a line represents, or None for a line of log; only evaluators give verdicts, and record."""
-    text = line.strip()
-    if text.startswith(JUDGED):  # its JSON is the report's to read
-        return Recorded(service) if is_evaluator else None
-    if not text.startswith(b"{") or b'"dodo"' not in text:
+def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
+    """The event that a message is, or None; only evaluators give verdicts."""
+    text = message.strip()
+    if not text.startswith(b"{") or b'"dodo"' not in text or text.startswith(JUDGED):
+        return None
+    is_verdict = b'"verdict"' in text
+    if is_verdict and not is_evaluator:
         return None
     try:
-        message = json.loads(text, parse_int=_finite, parse_float=_finite, parse_constant=_finite)
-    except (ValueError, RecursionError):
-        return Malformed(service, "its JSON cannot be read") if is_evaluator and b'"verdict"' in text else None
-    if not isinstance(message, dict):
-        return None
-    kind = str(message.get("dodo"))
-    if kind == "verdict":
-        return _verdict(service, message) if is_evaluator else None
-    try:
-        json.dumps(message, ensure_ascii=False).encode()
-        return _event(service, kind, message)
-    except (UnicodeEncodeError, msgspec.ValidationError):
-        return None
+        said = _decoder.decode(b'{"service":%s,%s' % (json.dumps(service).encode(), text[1:]))
+        if isinstance(said, GivenVerdict):
+            checks = tuple(with_margin(msgspec.to_builtins(check)) for check in said.checks)
+            is_good = said.outcome == "passed"
+            return VerdictEvent(service, is_good, said.reason, checks, said.evidence, said.silent)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
+        return Malformed(service, str(error)) if is_verdict else None
+    match said:
+        case Noted(text=note):
+            return Noted(f"service '{service}': {note}")
+        case Late() if said.late > said.updates:
+            return None
+    return said
 
 
-_EVENTS: dict[str, Any] = {
-    "ready": Ready, "end-of-input": InputEnded, "note": Noted, "foreign": Foreign, "taken": MemoryTaken,
-    "lost": Overrun, "late": Late, "paused": Paused,
-}  # fmt: skip
-_OF_CLOCK: dict[str, Any] = {"time": Time, "response": Response, **dict.fromkeys(_STOPS, Stopped)}
-"""What lines say, by their kind; of the clock alone the second ones."""
-_FIELDS = {"dodo": "kind", "s": "seconds", "sender": "sender_stamp"}
-"""Names of an event's fields, where a line has others."""
-_UNSEEN = {**dict.fromkeys(("processor_median_s", "processor_p95_s", "processor_worst_s", "over")), "processor": ""}
-"""What the clock leaves out where it cannot see the application's processes, or the test has no limit."""
+def _words(event: Event) -> str:
+    """What the log of a service has of what it said; empty for what comes again and again."""
+    match event:
+        case Ready():
+            return "ready"
+        case InputEnded():
+            return "end-of-input"
+        case VerdictEvent():
+            return f"verdict: {'passed' if event.passed else 'failed'}: {event.reason}"
+        case Stopped() | Foreign():
+            return event.reason
+        case Noted() | MemoryTaken():
+            return event.text
+    return ""
 
 
-def _event(service: str, kind: str, message: dict[str, Any]) -> Event | None:
-    """Raises ValidationError."""
-    known = _EVENTS | (_OF_CLOCK if service == CLOCK else {}) | ({"flood": Flooded} if service == RECORDER else {})
-    if kind not in known:
-        return None
-    own = {"service": service, "too_fast": message.get("limit") == "rate"}
-    given = {**_UNSEEN, **{_FIELDS.get(key, key): value for key, value in message.items()}, **own}
-    event = msgspec.convert(given, known[kind])
-    if isinstance(event, Noted):
-        return Noted(f"service '{service}': {event.text}")
-    if isinstance(event, Late):
-        return event if event.late <= event.updates else None
-    if isinstance(event, Response):
-        counts = (event.slow, event.over or 0, event.uncopied, event.worst_frame - 1)
-        return Responded(event) if max(counts) <= event.answers else None
-    return event  # type: ignore[no-any-return]
+class Reports:
+    """Takes what a test's services say, also into their logs; what evaluators judged goes into files next to these."""
 
+    def __init__(
+        self, plan: Plan, logs: Path, put: Callable[[Event], None], outputs: Mapping[str, ServiceOutput]
+    ) -> None:
+        """``put`` gets each event."""
+        self._services = {service.name: service for service in plan.services}
+        self._logs, self._put, self._outputs = logs, put, outputs
+        self._recorded = Counter[str]()
+        self._listener: Listener | None = None
+        self._open: dict[str, tuple[Connection, asyncio.Event]] = {}
 
-class _Limit(Struct, forbid_unknown_fields=True):
-    min: int | float = 0
-    max: int | float = 0
+    def listen(self, folder: Path) -> None:
+        """Listens in the folder where services meet until the application starts; raises OSError."""
+        self._listener = Listener(folder / RUNNER_SOCKET, self._services)
+        asyncio.get_running_loop().add_reader(self._listener.fileno(), self._accept, self._listener.fileno())
 
+    def _accept(self, number: int) -> None:
+        assert self._listener is not None
+        loop = asyncio.get_running_loop()
+        if accepted := self._listener.accept(0.0):
+            name, connection = accepted
+            self._open[name] = connection, asyncio.Event()
+            loop.add_reader(connection.fileno(), self._read, name)
+        if not self._listener.missing:
+            loop.remove_reader(number)
 
-class _Check(Struct, forbid_unknown_fields=True):
-    name: Sentence
-    value: int | float | None
-    limit: _Limit
-    unit: Annotated[str, Meta(max_length=MOST_TEXT)]
-    ok: bool
-    exclusive: bool = False
+    def stop_listening(self) -> None:
+        """Nobody else can connect: the application is about to start."""
+        if self._listener is not None and self._listener.missing:
+            asyncio.get_running_loop().remove_reader(self._listener.fileno())
+            self._listener.close()
 
+    def _read(self, name: str) -> None:
+        connection, ended = self._open[name]
+        try:
+            while (message := connection.receive(0.0)) is not None:
+                self.take(name, message)
+        except EOFError:
+            asyncio.get_running_loop().remove_reader(connection.fileno())
+            connection.close()
+            ended.set()
 
-class _Verdict(Struct):
-    reason: Sentence
-    checks: list[_Check]
-    evidence: Evidence = {}
+    def take(self, name: str, message: bytes) -> bool:
+        """Takes a message, or a line that a service printed; whether it is one."""
+        is_evaluator = self._services[name].judge
+        if is_evaluator and message.startswith(JUDGED):
+            self._record(name, message)
+            return True
+        event = read(name, is_evaluator, message)
+        if event is None:
+            return False
+        self._put(event)
+        if (words := _words(event)) and name in self._outputs:
+            self._outputs[name].add(words)
+        return True
 
+    def _record(self, name: str, line: bytes) -> None:
+        self._recorded[name] += len(line)
+        if self._recorded[name] > _MAX_RECORD:
+            return
+        file = (self._logs / f"{self._services[name].layer}.{name}.log").with_suffix(JUDGED_SUFFIX)
+        try:
+            with atomic.appended(file) as written:
+                written.write(line.rstrip() + b"\n")
+        except OSError as error:
+            self._put(Noted(f"what '{name}' judged cannot be written: {error.strerror}"))
 
-def _verdict(service: str, message: dict[str, Any]) -> Event:
-    """The verdict, or what is wrong with it; its checks stay as they are written."""
-    outcome = message.get("outcome")
-    if outcome not in ("passed", "failed"):
-        return Malformed(service, f"its outcome is {json.dumps(outcome)[:40]}, expected passed or failed")
-    try:
-        msgspec.convert(message, _Verdict)
-        json.dumps(message, ensure_ascii=False).encode()
-    except UnicodeEncodeError:
-        return Malformed(service, "it has characters that UTF-8 cannot encode")
-    except msgspec.ValidationError as error:
-        return Malformed(service, str(error))
-    evidence = message.get("evidence", {})
-    return VerdictEvent(
-        service, outcome == "passed", message["reason"], tuple(map(with_margin, message["checks"])), evidence
-    )
+    async def ended(self, name: str) -> None:
+        """Returns when a service that has ended has said all; another program may still hold its connection."""
+        if name in self._open:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._open[name][1].wait(), _PATIENCE_S)
 
-
-def _finite(text: str) -> Any:
-    """A number; what is none, or what no float holds, is a list, which may stand nowhere."""
-    number = float(text)
-    return [] if not math.isfinite(number) else int(text) if text.lstrip("-").isdecimal() else number
+    def close(self) -> None:
+        """Reads what is there already, and stops."""
+        self.stop_listening()
+        for name, (connection, ended) in self._open.items():
+            if not ended.is_set():
+                self._read(name)
+            if not ended.is_set():
+                asyncio.get_running_loop().remove_reader(connection.fileno())
+                connection.close()

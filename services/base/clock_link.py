@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
-from dodo_dsl.opendlv.channel import CLOCK_SOCKET, Channel, Done, Hello, Show, Step
+from dodo_dsl.opendlv.channel import Channel, Done, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.packets import CLOCK_SOCKET
 from dodo_dsl.opendlv.session import Session
 from services.base.members import channel
 
@@ -30,8 +31,7 @@ class ClockClient:
 
     def __init__(self, session: Session, name: str, path: Path | None = None) -> None:
         self._session = session
-        self._channel = Channel.connect(path or socket_path())
-        self._channel.send(Hello(name))
+        self._channel = Channel.connect(path or socket_path(), name)
         self._begin = session.messages.id("dodo.TestBegin")
 
     def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | Show | None:
@@ -60,7 +60,7 @@ class ClockClient:
         except EOFError:  # the clock has ended, and the runner will end this service
             time.sleep(SLICE_S)
             return None
-        assert not isinstance(command, Hello | Done), "the clock gives commands"
+        assert not isinstance(command, Done), "the clock gives commands"
         return command
 
     def _drain(self, observe: Callable[[Envelope], None]) -> int:

@@ -1,7 +1,7 @@
 """What an evaluator judged over time, for the report to draw: values with limits and targets, boxes, and the path.
 
-It decides nothing. In a test that DoDo runs it goes to standard output as lines of JSON, each below 64 KiB, before the
-verdict; DoDo keeps them next to the service's log. A service that is started by hand prints none.
+It decides nothing. In a test that DoDo runs the runner gets it as lines of JSON, each below 64 KiB, before the verdict,
+and keeps them next to the service's log. A service that is started by hand prints none.
 """
 
 import base64

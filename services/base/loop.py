@@ -5,7 +5,6 @@ another stamp than its own is easily taken for silence.
 """
 
 import functools
-import json
 import logging
 import time
 from collections import Counter
@@ -22,6 +21,7 @@ from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import MICROSECONDS, Clock
 from services.base.evaluator import UnjudgeableError
 from services.base.members import END_OF_INPUT, NOT_SHOWN, Members, World
+from services.base.runner import tell
 from services.base.service import IDLE_PERIOD, Handler, Output, Service
 
 SHORTEST = 10_000
@@ -110,12 +110,10 @@ _warn_once = functools.cache(_log.warning)
 class Loop:
     """Runs a service on a session by a clock; ``sender_stamp`` is that of outputs without one.
 
-    ``name`` is the source in its EndOfInput. Lines on stdout report, once a second at most, how many messages were
-    lost so far (``{"dodo": "lost", "messages": N}``) and in real time how many updates ended late since the test began
-    (``{"dodo": "late", "updates": N, "late": M, "worst_s": S}``) and for how long what is emulated stood still
-    (``{"dodo": "paused", "s": S}``), that a source is at its end (``{"dodo": "end-of-input"}``), and the
-    service's notes, with messages that came under other sender stamps only, unless a verdict does
-    (``{"dodo": "note", "text": "..."}``). Raises what the model raises, and SessionError.
+    ``name`` is the source in its EndOfInput. The runner hears, once a second at most, how many messages were lost so
+    far, and in real time how many updates ended late since the test began and for how long what is emulated stood
+    still; that a source is at its end; and the service's notes, with messages that came under other sender stamps
+    only, unless a verdict has them. Raises what the model raises, and SessionError.
     """
 
     name: str
@@ -158,7 +156,7 @@ class Loop:
         except UnjudgeableError as error:
             raise UnjudgeableError(with_strangers(str(error), self._stamps.strangers())) from None
         if self.service.finished and self.service.verdict is None:
-            print(json.dumps({"dodo": "end-of-input"}), flush=True)
+            tell("end-of-input")
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close(stopped if self._began is not None else lambda: True)
         self._tell_strangers()
@@ -245,18 +243,18 @@ class Loop:
             self.service.verdict = replace(verdict, reason=with_strangers(verdict.reason, strangers), silent=False)
             strangers = []
         for text in (*strangers, *self.service.notes):
-            print(json.dumps({"dodo": "note", "text": text}), flush=True)
+            tell("note", text=text)
 
     def _report(self, now: int) -> None:
         if self.session.lost > self._reported:
             self._reported, self._report_after = self.session.lost, now + REPORT_PERIOD
-            print(json.dumps({"dodo": "lost", "messages": self._reported}), flush=True)
+            tell("lost", messages=self._reported)
         if (late := self._lateness.news()) is not None:
             self._report_after = now + REPORT_PERIOD
-            print(json.dumps({"dodo": "late", **late}), flush=True)
+            tell("late", **late)
         if self.service.paused > self._paused:
             self._paused, self._report_after = self.service.paused, now + REPORT_PERIOD
-            print(json.dumps({"dodo": "paused", "s": round(self._paused, 3)}), flush=True)
+            tell("paused", seconds=round(self._paused, 3))
 
     def _send(self, output: Message | Output | Envelope, now: int) -> None:
         envelope = output if isinstance(output, Envelope) else self._envelope(output, now)

@@ -4,7 +4,6 @@ Each enters its address in a folder that the application does not have. From the
 time, what the application must not hear. The table of who may send which message is the compiler's, of the wiring.
 """
 
-import json
 import math
 import os
 import time
@@ -21,6 +20,7 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
+from services.base.runner import tell
 
 VARIABLE = "DODO_SENDERS"
 """Environment variable with words such as ``opendlv.sim.Frame/0=pose``; no service behind ``=``: nobody may send it.
@@ -107,7 +107,7 @@ class SenderTable:
         """Report to the runner why the test fails."""
         if reason not in self._reported:
             self._reported.add(reason)
-            print(json.dumps({"dodo": "foreign", "reason": reason}), flush=True)
+            tell("foreign", reason=reason)
 
 
 def _infinite_number(message: Message, inside: str = "") -> str:
@@ -261,7 +261,7 @@ class Members:
             self._overheard.add(envelope.data_type)
             why = f"'{silent[0]}' does not use DoDo's base for services"
             text = f"the application can hear {self._world.names[envelope.data_type]}, as service {why}"
-            print(json.dumps({"dodo": "note", "text": text}), flush=True)
+            tell("note", text=text)
         self._session.send_envelope(envelope)
 
     def begin(self) -> None:

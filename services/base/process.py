@@ -5,7 +5,6 @@ code, and the call chain. Signals also end a service that is being built, which 
 """
 
 import contextlib
-import json
 import logging
 import os
 import signal
@@ -30,6 +29,7 @@ from services.base.clock import Clock, RealTimeClock
 from services.base.flags import Flags, FlagsError, help_text, load_manifest, parse
 from services.base.loop import Loop
 from services.base.members import Members, SenderTable, World, channel
+from services.base.runner import connected, say, tell
 from services.base.service import Build, Context, Service, undeclared_checks
 
 _OURS = ("dodo_dsl.", "services.")
@@ -147,8 +147,9 @@ def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Cl
         return USAGE
     level = logging.DEBUG if flags["verbose"] else logging.INFO
     logging.basicConfig(stream=sys.stderr, level=level, format=f"{name}: %(levelname)s: %(message)s")
-    with _signals() as stop:
-        return _serve(manifest, folder, build, flags, clock, stop)
+    role = os.environ.get("DODO_SERVICE") or name
+    with _signals() as stop, connected(channel(), role):
+        return _serve(role, manifest, folder, build, flags, clock, stop)
 
 
 class _Stop:
@@ -173,10 +174,8 @@ def _signals() -> Iterator[_Stop]:
 
 
 def _serve(
-    manifest: Mapping[str, Any], folder: Path, build: Build, flags: Flags, clock: Clock | None, stop: _Stop
+    role: str, manifest: Mapping[str, Any], folder: Path, build: Build, flags: Flags, clock: Clock | None, stop: _Stop
 ) -> int:
-    name = manifest["name"]
-    role = os.environ.get("DODO_SERVICE") or name
     code = USAGE
     try:
         place = channel()
@@ -190,7 +189,7 @@ def _serve(
                 with interruptible():  # it waits for the clock service
                     clock = _clock(session, role)
             on_rig = bool(os.environ.get("DODO_RIG"))
-            service = build(Context(name, flags, session.messages, resources, clock, session, on_rig))
+            service = build(Context(manifest["name"], flags, session.messages, resources, clock, session, on_rig))
             code = BROKEN
             if place and (service.drive or not os.environ.get("DODO_CLOCK")):
                 session.hear_directly()
@@ -205,11 +204,11 @@ def _serve(
                     _print_record(service)
             if service.verdict is not None:
                 if undeclared := undeclared_checks(service.verdict, manifest.get("checks")):
-                    print(json.dumps({"dodo": "note", "text": undeclared}), flush=True)
-                print(service.verdict.line(flags["cid"]), flush=True)
+                    tell("note", text=undeclared)
+                say(service.verdict.line())
     except Exception as error:  # noqa: BLE001  (it is logged)
         if isinstance(error, MemoryTakenError):
-            print(json.dumps({"dodo": "taken", "text": str(error)}), flush=True)
+            tell("taken", text=str(error))
         expected = code == USAGE and isinstance(error, ValueError | OSError)
         tell_crash(error, folder, expected=expected, verbose=bool(flags["verbose"]))
         return code if expected else BROKEN
@@ -222,7 +221,7 @@ def _print_record(service: Service) -> None:
         service.record()
         checks = service.verdict.checks if service.verdict else ()
         for line in service.judged.lines({check.name: check.parameters for check in checks if check.parameters}):
-            print(line, flush=True)
+            say(line)
 
 
 def _messages(manifest: Mapping[str, Any], folder: Path) -> MessageSet:
@@ -275,7 +274,7 @@ def _readiness(folder: Path | None, role: str, session: Session) -> Iterator[Non
     if folder:
         address_book.enter(folder, role, session.address)
     try:
-        print(json.dumps({"dodo": "ready"}), flush=True)
+        tell("ready")
         yield
     finally:
         if folder:

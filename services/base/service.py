@@ -77,15 +77,13 @@ class Verdict:
     silent: bool = False
     evidence: Mapping[str, float | str | None] = field(default_factory=dict)
 
-    def line(self, cid: int) -> str:
-        """The verdict line, without its line break; ASCII, whatever the locale.
-
-        A silent application may have been on another bus, so the reason names the test's.
-        """
+    def line(self) -> str:
+        """The verdict line, without its line break; ASCII, whatever the locale."""
         checks = [check.as_json() for check in self.checks]
-        reason = f"{self.reason}; the test is on CID {cid}" if self.silent else self.reason
-        reason = reason if len(reason) <= _MOST_REASON else reason[: _MOST_REASON - 1] + "…"
+        reason = self.reason if len(self.reason) <= _MOST_REASON else self.reason[: _MOST_REASON - 1] + "…"
         message: dict[str, Any] = {"dodo": "verdict", "outcome": self.outcome, "reason": reason, "checks": checks}
+        if self.silent:
+            message["silent"] = True
         if self.evidence:
             numbers = {key: v if isinstance(v, str) else _number(v) for key, v in self.evidence.items()}
             message["evidence"] = numbers

@@ -113,9 +113,7 @@ class SteppedApplication:
         link: ServiceLink,
         stopped: IsStopped,
         response: ResponseTimes,
-        cid: int | None = None,
     ) -> None:
-        """``cid`` is the test's: an application of which nothing comes may be on another bus."""
         self.answers = answers
         self.frames = 0
         self.waited_first, self.waited = 0.0, 0.0
@@ -128,7 +126,6 @@ class SteppedApplication:
         self._contention_before = 0.0
         self._shown, self._own_wait = 0.0, 0.0
         """When all pictures were there, and how long the clock itself had waited for a processor until then."""
-        self._cid = cid
         self.pauses, self.unasked = 0, 0
         """Pauses in which nothing was shown, and those in which the application sent on all the same."""
         self._pause_after, self._answered = _FIRST_PAUSE, 0.0
@@ -186,8 +183,7 @@ class SteppedApplication:
         """
         while not (self._stopped() or self._is_answered):
             if self._left <= 0:
-                where = f"; the test is on CID {self._cid}" if self._cid and self.answers.is_silent else ""
-                raise ApplicationSilent(f"{self._sentence(self._missing)}{where}")
+                raise ApplicationSilent(self._sentence(self._missing), silent=self.answers.is_silent)
             self._link.pump(self._left, self._reading)
             self._check_flood()
         before, self._answered = self._answered, time.monotonic()

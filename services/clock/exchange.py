@@ -13,8 +13,9 @@ from typing import Protocol
 
 from dodo_dsl.opendlv.address import LINES, Address
 from dodo_dsl.opendlv.address_book import RUNNER
-from dodo_dsl.opendlv.channel import Channel, Done, Listener, Show, Step
+from dodo_dsl.opendlv.channel import Channel, Done, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.packets import Listener
 from dodo_dsl.opendlv.session import Session
 from services.base.members import SenderTable, World
 
@@ -73,7 +74,7 @@ class Exchange:
 
     def _accept(self, timeout: float) -> None:
         if accepted := self._listener.accept(timeout):
-            name, channel = accepted
+            name, channel = accepted[0], Channel(accepted[1])
             self._channels[name] = channel
             if name in self._unsent:
                 channel.send(self._unsent.pop(name))
@@ -131,9 +132,16 @@ SLICE_S = 0.05
 
 
 class TestEnded(Exception):
-    """The test cannot go on; one sentence. ``kind`` names the reason in the protocol."""
+    """The test cannot go on; one sentence. ``kind`` names the reason to the runner.
+
+    ``silent`` means that nothing came of the application.
+    """
 
     kind = ""
+
+    def __init__(self, reason: str = "", *, silent: bool = False) -> None:
+        super().__init__(reason)
+        self.silent = silent
 
 
 class ApplicationSilent(TestEnded):

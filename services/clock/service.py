@@ -1,6 +1,5 @@
 """The clock on the bus: it waits for the test's begin, steps it to its end, and reports its progress to the runner."""
 
-import json
 import logging
 import os
 import time
@@ -17,6 +16,7 @@ from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
 from services.base.lockstep_clock import EPOCH
 from services.base.members import SenderTable
+from services.base.runner import tell
 from services.base.service import Service
 from services.clock.answers import Answers
 from services.clock.application import ResponseTimes, SteppedApplication
@@ -78,9 +78,7 @@ class ClockService(Service):
             )
         else:
             response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
-            self._application = SteppedApplication(
-                answers, timing.patience, exchange, self._over, response, session.cid
-            )
+            self._application = SteppedApplication(answers, timing.patience, exchange, self._over, response)
         self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
         self._reported = self._begun = 0.0
         self._reached = 0
@@ -100,7 +98,7 @@ class ClockService(Service):
         self._begun = time.monotonic()
         self._report_time()
         self._application.processes = ApplicationProcesses(self._pids(begin))
-        kind, reason = "", ""
+        ended: TestEnded | None = None
         try:
             self._stepper.connect()
             for envelope, source in self._early:
@@ -108,14 +106,14 @@ class ClockService(Service):
             self._exchange.ignore_services(self._heard)
             self._stepper.run(begin._replace(sample_time=EPOCH, received=0))
         except TestEnded as problem:
-            kind, reason = problem.kind, str(problem)
+            ended = problem
         spent = sorted(((n, s) for n, s in self._stepper.spent.items() if n), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
         if facts := self._application.facts():
-            self._report("response", **facts)
+            tell("response", response=facts)
         self._report_time(last=True)
-        if kind:
-            self._report(kind, reason=reason)
+        if ended is not None:
+            tell("stopped", how=ended.kind, reason=str(ended), silent=ended.silent)
 
     def _pids(self, begin: Envelope) -> list[int]:
         """The process ids of the application's services; none where the runner gives none."""
@@ -161,13 +159,7 @@ class ClockService(Service):
     def _report_time(self, last: bool = False) -> None:
         self._reported, self._reached = time.monotonic(), self._stepper.reached
         seconds = (self._reached - EPOCH) / 1e6
-        self._report(
-            "time", s=seconds, frames=self._application.frames, surplus=self._application.answers.surplus, last=last
-        )
+        tell("time", seconds=seconds, last=last)
 
     def _note(self, text: str) -> None:
-        self._report("note", text=text)
-
-    @staticmethod
-    def _report(kind: str, **facts: object) -> None:
-        print(json.dumps({"dodo": kind, **facts}), flush=True)
+        tell("note", text=text)

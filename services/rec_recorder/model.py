@@ -3,7 +3,6 @@
 What a test may send has limits: a flood ends the recording, and the error says which messages it is made of.
 """
 
-import json
 import logging
 import os
 from collections import deque
@@ -14,6 +13,7 @@ from typing import Self
 
 from dodo_dsl.opendlv.envelope import Envelope, FrameError, encode_frame
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
+from services.base.runner import tell
 
 MOST_PER_SECOND, MOST_OF_A_KIND = 20_000, 10_000
 """Messages within a second; of one message and sender stamp."""
@@ -53,7 +53,8 @@ class Traffic:
         self._bytes[kind] = self._bytes.get(kind, 0) + size
         self._size += size
         if self._size > self._most_bytes:
-            self._end("size", f"the recording would be larger than {self._most_bytes / 1e6:g} MB", self._bytes)
+            what = f"the recording would be larger than {self._most_bytes / 1e6:g} MB"
+            self._end(what, self._bytes, too_fast=False)
         if self._now is not None:
             self._count(kind, self._now())
 
@@ -65,15 +66,16 @@ class Traffic:
         self._number += 1
         count = self._second[kind] = self._second.get(kind, 0) + 1
         if count > MOST_OF_A_KIND:
-            self._end("rate", f"more than {MOST_OF_A_KIND} messages of a kind came within a second", self._second)
+            what = f"more than {MOST_OF_A_KIND} messages of a kind came within a second"
+            self._end(what, self._second, too_fast=True)
         if self._number + self._lost() - self._lost_before > MOST_PER_SECOND:
-            self._end("rate", f"more than {MOST_PER_SECOND} messages came within a second", self._second)
+            self._end(f"more than {MOST_PER_SECOND} messages came within a second", self._second, too_fast=True)
 
-    def _end(self, limit: str, what: str, counts: dict[Kind, int]) -> None:
+    def _end(self, what: str, counts: dict[Kind, int], *, too_fast: bool) -> None:
         (id_, stamp), most = max(counts.items(), key=lambda item: item[1])
         message = self._name(id_) if id_ else "many kinds of messages"
-        facts = {"limit": limit, "what": what, "message": message, "sender": stamp}
-        print(json.dumps({"dodo": "flood", **facts, "share": round(most / sum(counts.values()), 3)}), flush=True)
+        share = round(most / sum(counts.values()), 3)
+        tell("flood", what=what, message=message, sender_stamp=stamp, share=share, too_fast=too_fast)
         raise FloodError(f"{what}, most of it {message}/{stamp}")
 
 

@@ -39,9 +39,7 @@ def run(folder: Path, manner: str, code: int, *words: str) -> tuple[dict[str, An
 
 
 def surplus(folder: Path) -> int:
-    log = (folder / "report" / CURVE / "logs" / "environment.dodo-clock.log").read_text()
-    lines = [line for line in log.splitlines() if line.startswith('{"dodo": "time"')]
-    return int(json.loads(lines[-1])["surplus"])
+    return int(results(folder / "report")[CURVE]["response"]["surplus"])
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,7 @@ from dodo_dsl.rec.truth import TruthError
 from dodo_dsl.run.outcomes import Finding
 from dodo_dsl.run.protocol import Flooded, MemoryTaken, Noted
 from dodo_dsl.run.run_state import MOST_NOTES, Ended, RunState
-from dodo_dsl.run.service_protocol import read_line
+from dodo_dsl.run.service_protocol import read
 from dodo_dsl.spec import registry
 from dodo_dsl.spec.registry import RegistryError, locate
 from services.camera.sources import FileCamera
@@ -241,7 +241,7 @@ def test_a_recording_ends_at_its_limit_and_names_what_fills_it(
                 recording.write(envelope(9, 3))
         recording.write(envelope(9, 3))
     assert 99_000 < path.stat().st_size <= 100_000
-    event = read_line("dodo-recorder", False, capsys.readouterr().out.encode())
+    event = read("dodo-recorder", False, capsys.readouterr().out.encode())
     assert isinstance(event, Flooded) and (event.message, event.sender_stamp, event.too_fast) == ("a.M9", 3, False)
     assert 0.99 < event.share < 1
 
@@ -376,7 +376,7 @@ def test_a_lock_that_a_reader_keeps_is_not_the_creator_s_fault(posix: bool) -> N
 
 def test_a_kept_lock_fails_the_application(tmp_path: Path) -> None:
     line = b'{"dodo": "taken", "text": "shared memory \'video0.argb\' was locked by another for 5 s"}'
-    event = read_line("camera", False, line)
+    event = read("camera", False, line)
     assert isinstance(event, MemoryTaken)
     finding = decided(state(tmp_path), event)
     assert (finding.result, finding.is_verdict) == ("failed", False)

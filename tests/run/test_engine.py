@@ -633,29 +633,26 @@ def test_a_kill_for_want_of_memory_is_noted_and_no_excuse(
 
 
 @pytest.mark.parametrize(
-    ("joined", "said", "told"),
+    ("joined", "silent", "told"),
     [
-        (
-            {130, 111},
-            "nothing came; the test is on CID 130",
-            "; the application talks on CID 111; write x-dodo: {cid: 111}",
-        ),
-        ({130}, "nothing came; the test is on CID 130", ""),
-        ({130, 111}, "hit wall left", ""),
+        ({131, 111}, True, "; the test is on CID 131; the application talks on CID 111; write x-dodo: {cid: 111}"),
+        ({131}, True, "; the test is on CID 131"),
+        ({131, 111}, False, ""),
     ],
 )
 def test_the_bus_of_an_application_that_is_silent_on_the_test_s(
-    joined: set[int], said: str, told: str, monkeypatch: pytest.MonkeyPatch
+    joined: set[int], silent: bool, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(listeners, "buses", lambda processes: joined if list(processes) == [17] else set())
-    assert begun((3.0, VerdictEvent("track", False, said, ())), (3.1, ENDED)).reason == said + told
+    verdict = VerdictEvent("track", False, "nothing came", (), silent=silent)
+    assert begun((3.0, verdict), (3.1, ENDED)).reason == f"nothing came{told}"
 
 
 def test_nobody_looks_for_buses_on_the_machine_s_own_network(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(listeners, "buses", lambda _: {111})
-    said = "nothing came; the test is on CID 130"
-    events = {**READY, "begin": [(3.0, VerdictEvent("track", False, said, ())), (3.1, ENDED)]}
-    assert outcome(ScriptedBackend(plan(), events, is_on_host=True)).reason == said
+    said = VerdictEvent("track", False, "nothing came", (), silent=True)
+    events = {**READY, "begin": [(3.0, said), (3.1, ENDED)]}
+    assert outcome(ScriptedBackend(plan(), events, is_on_host=True)).reason == "nothing came; the test is on CID 131"
 
 
 @pytest.mark.parametrize(

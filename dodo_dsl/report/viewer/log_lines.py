@@ -1,6 +1,5 @@
 """The log lines of all services of a test by its time, with errors and warnings marked."""
 
-import json
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -77,13 +76,12 @@ def _without_times(log: Path) -> Iterator[tuple[int, LogLine]]:
     level = ""
     for offset, raw in _raw_lines(log):
         line = _ESCAPES.sub("", raw[: 4 * _MOST_TEXT].decode("utf-8", "replace")).rstrip("\r\n ")
-        text = line if layer == _APPLICATION else _said(line)
-        if not text:
+        if not line:
             continue
         level = _level(line, level)
-        length = f" … ({len(raw)} bytes)" if len(text) > _MOST_TEXT else ""
-        kind = READY if text == READY != line else level
-        yield offset, LogLine(None, name or layer, kind, shown(text[:_MOST_TEXT]) + length)
+        length = f" … ({len(raw)} bytes)" if len(line) > _MOST_TEXT else ""
+        kind = READY if line == READY and layer != _APPLICATION else level
+        yield offset, LogLine(None, name or layer, kind, shown(line[:_MOST_TEXT]) + length)
 
 
 def _raw_lines(log: Path) -> Iterator[tuple[int, bytes]]:
@@ -111,21 +109,6 @@ def _test_times(walls: Sequence[int], test: RecordedTest) -> list[float]:
     before = (arrived - test.walls[0]) / MICROSECONDS
     times: list[float] = np.where(before < 0, before, np.minimum(inside, test.duration)).tolist()
     return times
-
-
-def _said(line: str) -> str:
-    """A line of DoDo's services; of their protocol what a reader wants to know."""
-    if not line.startswith('{"dodo"'):
-        return line
-    try:
-        message = json.loads(line)
-        kind = message["dodo"]
-    except (ValueError, KeyError, RecursionError):
-        return line
-    if kind == "verdict":
-        return f"verdict: {message.get('outcome')}: {message.get('reason')}"
-    told = message.get("reason") or message.get("text")
-    return str(told or (kind if kind in ("ready", "end-of-input") else ""))
 
 
 def _level(line: str, before: str) -> str:

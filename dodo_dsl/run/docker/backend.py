@@ -14,7 +14,6 @@ from typing import Any
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import HEALTHY, READY_S, Plan
-from dodo_dsl.run import service_protocol
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.application_time import PAGE_DESTROYED
 from dodo_dsl.run.docker import shared_files
@@ -29,6 +28,7 @@ from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import PrintedLines
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import LONGEST_S, Conditions, in_turn, one_off, optional
 from dodo_dsl.spec.model import VIRTUAL
 
@@ -61,7 +61,7 @@ class DockerBackend:
         say: Say,
         channel: str = "",
     ) -> None:
-        """``channel`` is the folder where services meet, if they and the runner are on this host."""
+        """``channel`` is the folder where services and runner meet, if the engine sees it."""
         self.plan = plan
         self.cid = plan.cid
         self.report = report
@@ -80,6 +80,7 @@ class DockerBackend:
         """What the application's containers print."""
         self._relay: ContainerRelay | None = None
         self._outputs: dict[str, ServiceOutput] = {}
+        self._reports = Reports(plan, report / "logs", self._events.put_nowait, self._outputs)
         self._out_of_memory: set[str] = set()
         self._is_closing = False
         self._kills: set[asyncio.Future[None]] = set()
@@ -104,6 +105,7 @@ class DockerBackend:
         await asyncio.to_thread(self._compose.read)
         await self._pulls.once("docker compose", self._compose.require_plugin)
         await self._require_files()
+        await self._open_channel()
         await self._compose.provide_images(self._pulls)
         await self._compose.create(self._subnets)
         await self._start_watching()
@@ -114,6 +116,20 @@ class DockerBackend:
         paths = self._compose.mounted()
         others = [str(path) for path in paths if not path.is_relative_to(self._folder)]
         await self._pulls.once(f"files {self._folder.parent} {others}", lambda: self._look_for(paths))
+
+    async def _open_channel(self) -> None:
+        """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
+        folder = self._compose.channel
+        if not self._compose.layers:  # DoDo's services are no containers
+            return
+        try:
+            if not self.is_on_host:
+                await self._pulls.once(f"folder {Path(folder).parent}", lambda: self._look_for([Path(folder)]))
+            self._reports.listen(Path(folder))
+        except BackendError:
+            self._compose.channel = ""
+        except OSError as error:
+            raise BackendError(f"services cannot reach the runner: {error}") from error
 
     async def _provide_empty_image(self) -> str:
         await asyncio.to_thread(shared_files.provide_image, self._client)
@@ -220,6 +236,7 @@ class DockerBackend:
     async def _died(self, name: str, code: int) -> None:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._outputs[name].done.wait(), 2.0)
+        await self._reports.ended(name)
         self._events.put_nowait(Exited(name, code, await self._was_out_of_memory(name, code)))
         self._conditions.ended(name, code)
 
@@ -245,11 +262,11 @@ class DockerBackend:
         if layer == "application":
             names = [name for name in self._application if name in self._containers]
             await asyncio.gather(self._wait_for_copies(), self._connect())
-        evaluators = {s.name for s in self.plan.services if s.judge}
+            self._reports.stop_listening()
         for name in names:
             self._outputs[name] = ServiceOutput(
                 self.report / "logs" / f"{layer}.{name}.log",
-                self._line_reader(layer, name, evaluators),
+                self._line_reader(layer, name),
                 is_cooked=self._prints(name),
             )
         waiting = [name for name in names if self._conditions.of(name)]
@@ -299,14 +316,11 @@ class DockerBackend:
         self._events.put_nowait(Unstartable(name, why))
         self._conditions.failed(name)
 
-    def _line_reader(self, layer: str, name: str, evaluators: set[str]) -> Callable[[bytes], bool]:
+    def _line_reader(self, layer: str, name: str) -> Callable[[bytes], bool]:
         def on_line(line: bytes) -> bool:
-            if layer == "application" and self._prints(name):
+            if self._prints(name):
                 self.lines.take(name, line)
-            event = None if layer == "application" else service_protocol.read_line(name, name in evaluators, line)
-            if event is not None:
-                self._events.put_nowait(event)
-            return event is not None
+            return layer != "application" and self._reports.take(name, line)
 
         return on_line
 
@@ -390,6 +404,7 @@ class DockerBackend:
         self._watch.close()
         if self._relay is not None:
             self._relay.close()
+        self._reports.close()
         for output in self._outputs.values():
             output.close()
         return kept

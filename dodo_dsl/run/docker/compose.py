@@ -65,7 +65,7 @@ class Compose:
     """Those whose compiled files have a part in it."""
 
     def __init__(self, plan: Plan, folder: Path, report: Path, project: str, say: Say, channel: str = "") -> None:
-        """``channel`` is the folder where services meet, if they and the runner are on this host."""
+        """``channel`` is the folder where services and runner meet, empty if that is a volume."""
         self.plan = plan
         self.folder = folder
         self.report = report

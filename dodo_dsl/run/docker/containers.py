@@ -73,12 +73,11 @@ class Containers:
     async def open(self, job: Job, say: Say, keep: bool) -> AsyncIterator[Backend]:
         plan = job.plan
         refuse_rpicam(plan)
-        if plan.isolation == "network" and not plan.is_real:
-            with self.project(DockerBackend, job, say) as backend:
-                yield backend
-            return
         with meeting_place(job.work, keep) as channel, self.project(DockerBackend, job, say, channel) as backend:
             Path(channel).chmod(0o777)  # for users of images; the folder around it is closed
+            if plan.isolation == "network" and not plan.is_real:
+                yield backend
+                return
             async with (
                 host_isolation.host_slot(plan, (plan.cid,), say, alone=True) as slot,
                 attended(plan, replace(slot, channel=channel), say, self._roots),
@@ -89,7 +88,7 @@ class Containers:
     def project(self, kind: type[_Kind], job: Job, say: Say, channel: str = "") -> Iterator[_Kind]:
         """A backend of a kind with its own project, and the project's lease; raises BackendError.
 
-        ``channel`` is the folder where services meet, if they and the runner are on this host.
+        ``channel`` is the folder where services and runner meet, if the engine sees it.
         """
         if self._client is None or self._pulls is None:
             raise BackendError(self._problem)

@@ -16,7 +16,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
-from dodo_dsl.run import application_time, service_protocol
+from dodo_dsl.run import application_time
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
@@ -31,10 +31,13 @@ from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError, Event, Exited, Lost, Noted, Ready, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off
 from dodo_dsl.spec.model import VIRTUAL
 
 LOG = "sandbox.log"
+TIME_READY = b'{"dodo": "ready"}'
+"""What gives the application the test's time prints when it does."""
 USE_PATIENCE_S = 2.0
 PIDS_PATIENCE_S = 5.0
 TIME_PATIENCE_S = 10.0
@@ -73,6 +76,7 @@ class ProcessBackend:
         self._events: asyncio.Queue[Event] = asyncio.Queue() if events is None else events
         self._lines = PrintedLines(plan, folder, self._note)
         self._outputs: dict[str, ServiceOutput] = {}
+        self._reports = Reports(plan, report / "logs", self._events.put_nowait, self._outputs)
         self._pids: dict[str, asyncio.Future[int]] = {}
         """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._conditions = Conditions(plan.application.services, has_health=False)
@@ -94,6 +98,7 @@ class ProcessBackend:
 
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
+        self._reports.listen(Path(self.slot.channel))
         needed = [*needed_paths(self.plan, self._folder, self.report), Path(self.slot.channel)]
         if self.plan.clock == VIRTUAL:
             time = await asyncio.to_thread(application_time.built)
@@ -125,6 +130,7 @@ class ProcessBackend:
         if output is not None:
             with contextlib.suppress(TimeoutError):  # a child of the service may still hold its output open
                 await asyncio.wait_for(output.done.wait(), 1.0)
+        await self._reports.ended(exited)
         if exited == TIME:
             if self._time_ready:
                 self._time_ready.set()
@@ -196,6 +202,7 @@ class ProcessBackend:
         if not await self._ask("relay", cid=self.slot.cid, folder=self.slot.channel):
             raise BackendError("nothing can be sent to the test's services: the sandbox does not reach its bus")
         lines.connect(self._send)
+        self._reports.stop_listening()
 
     def _send(self, data: bytes, to: Sequence[str] = (BUS,)) -> None:
         self._sandbox.send({"do": "send", "to": to, "data": data.hex()})
@@ -219,19 +226,16 @@ class ProcessBackend:
 
     def _start(self, command: Command) -> None:
         def on_line(line: bytes) -> bool:
-            event = None
             if command.layer == "application":
                 if command.name in self._lines.services:
                     self._lines.take(command.name, line)
-            else:
-                event = service_protocol.read_line(command.name, command.is_evaluator, line)
-            if isinstance(event, Ready) and command.name == TIME and self._time_ready:
+                return False
+            if command.name != TIME:
+                return self._reports.take(command.name, line)
+            if is_ready := line == TIME_READY and self._time_ready is not None:
                 self._has_time = True
                 self._time_ready.set()
-                return True
-            if event is not None:
-                self._events.put_nowait(event)
-            return event is not None
+            return is_ready
 
         self._starts.setdefault(command.name, []).append(command)
         output = self._output(command, on_line)
@@ -324,6 +328,7 @@ class ProcessBackend:
         if keep and (pid := self._sandbox.pid):
             return self._kept(pid)
         await self._sandbox.close()
+        self._reports.close()
         for output in self._outputs.values():
             output.close()
         await asyncio.gather(*self._exits, return_exceptions=True)
@@ -334,6 +339,9 @@ class ProcessBackend:
 
     def _kept(self, pid: int) -> list[str]:
         outputs = [output.hand_over() for output in self._outputs.values() if not output.done.is_set()]
+        for output in self._outputs.values():
+            if output.done.is_set():
+                output.close()
         self._sandbox.keep((*(reader for reader, _ in outputs), *(log for _, log in outputs)))
         look = f"ps -f --ppid {pid}"
         if self.isolation == "network":

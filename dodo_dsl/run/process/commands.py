@@ -38,7 +38,6 @@ class Command:
     argv: tuple[str, ...]
     environment: Mapping[str, str]
     folder: Path
-    is_evaluator: bool = False
     is_module: bool = False
     """Whether it is one of DoDo's own Python modules, which may be forked from a process with their libraries."""
     masked: tuple[str, ...] = ()
@@ -73,7 +72,7 @@ class Commands:
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         hidden = tuple(masked(self.plan, service))
-        return Command(service.name, service.layer, words, environment, self.folder, service.judge, is_module, hidden)
+        return Command(service.name, service.layer, words, environment, self.folder, is_module, hidden)
 
     def _flag(self, flag: Flag) -> str:
         values: dict[str, Callable[[], str]] = {

@@ -57,7 +57,7 @@ def test_verbose_shows_checks_use_and_what_services_complained_of(tmp_path: Path
     logs = tmp_path / "logs"
     logs.mkdir()
     (logs / "application.steering.log").write_text("frame 0\nwarning: late\x07\nTraceback\n  File x\n")
-    (logs / "evaluation.track.log").write_text('{"dodo": "ready"}\n' + "error: no map\n" * 22)
+    (logs / "evaluation.track.log").write_text("ready\n" + "error: no map\n" * 22)
     passed = replace(PASSED, checks=({"name": "gap", "value": 0.5, "limit": {"min": 0.1}, "unit": "m", "ok": True},))
     passed = replace(passed, resources=(ServiceUse("steering", 1.5, 0.25, 150_000_000, 5e6, None),))
     stream, reported = StringIO(), Reported(plan(), tmp_path, Path("dodo-report/ok"))

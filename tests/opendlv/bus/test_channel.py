@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv.channel import PACKET, Channel, Done, Hello, Listener, Step
+from dodo_dsl.opendlv.channel import Channel, Done, Step
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.packets import PACKET, Listener
 
 
 @pytest.fixture
@@ -23,27 +24,24 @@ def listener(path: Path) -> Iterator[Listener]:
         yield listener
 
 
-def joined(path: Path, name: str) -> Channel:
-    channel = Channel.connect(path)
-    channel.send(Hello(name))
-    return channel
-
-
 def accepted(listener: Listener, *names: str) -> dict[str, Channel]:
     found: dict[str, Channel] = {}
     while set(found) != {*names}:
         if accepted := listener.accept(5.0):
-            found[accepted[0]] = accepted[1]
+            found[accepted[0]] = Channel(accepted[1])
     return found
 
 
 def test_who_is_none_of_the_services_or_comes_twice_is_turned_away(path: Path, listener: Listener) -> None:
-    with closing(joined(path, "pose")) as pose, closing(joined(path, "nobody")) as nobody:
+    with closing(Channel.connect(path, "pose")) as pose, closing(Channel.connect(path, "nobody")) as nobody:
         ours = accepted(listener, "pose")
-        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as other, closing(joined(path, "pose")) as again:
+        with (
+            socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as other,
+            closing(Channel.connect(path, "pose")) as again,
+        ):
             other.connect(str(path))
             other.send(b"\0not a message")
-            with closing(joined(path, "track")) as track:
+            with closing(Channel.connect(path, "track")) as track:
                 ours |= accepted(listener, "track")
                 for stranger in (nobody, again):
                     with pytest.raises(EOFError):
@@ -62,7 +60,7 @@ def test_who_is_none_of_the_services_or_comes_twice_is_turned_away(path: Path, l
 @pytest.mark.parametrize("size", [0, PACKET - 20, PACKET, 10 * PACKET + 7])
 def test_messages_of_any_size(size: int, path: Path) -> None:
     step = Step(7, [Envelope(1090, b"x" * size, -1, 0, 2**50, 2**32 - 1), Envelope(1, b"", 0, 0, 0, 0)])
-    with closing(Listener(path, {"pose"})) as listener, closing(joined(path, "pose")) as pose:
+    with closing(Listener(path, {"pose"})) as listener, closing(Channel.connect(path, "pose")) as pose:
         clock = accepted(listener, "pose")["pose"]
         thread = threading.Thread(target=lambda: [clock.send(step) for _ in range(2)])
         thread.start()
@@ -76,7 +74,7 @@ def test_a_socket_that_was_left_is_replaced_and_the_clock_awaited(path: Path) ->
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as left:
         left.bind(str(path))
     found: list[Channel] = []
-    thread = threading.Thread(target=lambda: found.append(joined(path, "pose")))
+    thread = threading.Thread(target=lambda: found.append(Channel.connect(path, "pose")))
     thread.start()
     with closing(Listener(path, {"pose"})) as listener:
         accepted(listener, "pose")["pose"].close()

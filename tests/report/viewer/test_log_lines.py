@@ -26,7 +26,7 @@ def test_lines_of_services_are_merged_in_the_tests_time(tmp_path: Path) -> None:
     write(
         tmp_path, "application.a", (4_999_000_000, b"before\n"), (5_000_500_000, b"in\nit\n"), (5_009_000_000, b"end")
     )
-    write(tmp_path, "evaluation.b", (5_000_250_000, b'{"dodo": "ready"}\n'))
+    write(tmp_path, "evaluation.b", (5_000_250_000, b"ready\n"))
     (tmp_path / "action.c.log").write_text("untimed\n")
     log = log_lines.merged(tmp_path, LOCKSTEP)
     assert [(time, log["services"][service], text) for time, service, _, text in log["lines"]] == [
@@ -50,8 +50,8 @@ def test_in_real_time_both_clocks_are_one(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("test", [RecordedTest(), RecordedTest(begin=1_700_000_000_000_000)], ids=["no", "lockstep"])
 def test_without_a_clock_in_common_times_count_from_when_all_were_ready(tmp_path: Path, test: RecordedTest) -> None:
-    write(tmp_path, "action.a", (WALL, b'{"dodo": "ready"}\n'))
-    write(tmp_path, "action.b", (WALL + 250_000, b'{"dodo": "ready"}\n'), (WALL + 2_250_000, b"end\n"))
+    write(tmp_path, "action.a", (WALL, b"ready\n"))
+    write(tmp_path, "action.b", (WALL + 250_000, b"ready\n"), (WALL + 2_250_000, b"end\n"))
     write(tmp_path, "application.c", (WALL + 750_000, b"Traceback\n"))
     (tmp_path / "application.d.log").write_text("untimed\n")
     assert [time for time, *_ in log_lines.merged(tmp_path, test)["lines"]] == [-0.25, 0.0, 0.5, 2.0, None]
@@ -70,14 +70,6 @@ def test_without_a_clock_in_common_times_count_from_when_all_were_ready(tmp_path
 def test_errors_and_warnings_are_marked(tmp_path: Path, text: str, levels: list[str]) -> None:
     (tmp_path / "application.a.log").write_text(text)
     assert [line[2] for line in log_lines.merged(tmp_path, RecordedTest())["lines"]] == levels
-
-
-def test_the_protocol_is_shown_in_words_and_the_applications_lines_as_they_are(tmp_path: Path) -> None:
-    lines = '{"dodo": "time", "s": 1}\n{"dodo": "verdict", "outcome": "failed", "reason": "hit"}\n{"dodo"\n'
-    for name in ("environment.clock", "application.a"):
-        (tmp_path / f"{name}.log").write_text(lines)
-    log = log_lines.merged(tmp_path, RecordedTest())["lines"]
-    assert [text for *_, text in log] == [*lines.split("\n")[:3], "verdict: failed: hit", '{"dodo"']
 
 
 def test_long_logs_keep_both_ends(tmp_path: Path) -> None:

@@ -263,7 +263,7 @@ def test_the_command_is_quoted_and_lines_of_services_that_are_ready_are_hidden(
     chromium: Chromium, tmp_path: Path
 ) -> None:
     crash = failures.crash()
-    said = [(-0.5, '{"dodo": "ready"}'), (0.1, "looking")]
+    said = [(-0.5, "ready"), (0.1, "looking")]
     outcome = {**crash.outcome, "name": "a[of='x $HOME'][run=2]", "seed": 7}
     drives.write(tmp_path / "report", [replace(crash, outcome=outcome, logs={**crash.logs, "evaluation.track": said})])
     with chromium.page((tmp_path / "report" / "test-0" / "drive.html").as_uri()) as page:

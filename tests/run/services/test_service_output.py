@@ -51,10 +51,6 @@ class Read:
         return line.startswith(b"{")
 
 
-def expected_lines(data: bytes) -> list[bytes]:
-    return [line for line in data.split(b"\n") if line.strip()]
-
-
 CHUNKS = st.lists(st.binary(max_size=40) | st.sampled_from([b"\n", b"a\n", b'{"dodo": "ready"}\n']), max_size=20)
 
 
@@ -64,32 +60,16 @@ def test_lines_do_not_depend_on_how_they_were_written(chunks: list[bytes], termi
     """Nor on a terminal, which changes and repeats nothing: no ends of lines, no control characters."""
     with tempfile.TemporaryDirectory() as folder:
         read = Read(Path(folder), chunks, terminal=terminal)
-    data = b"".join(chunks)
-    assert (read.log, read.lines) == (data, expected_lines(data))
+    *lines, rest = b"".join(chunks).split(b"\n")
+    log = b"".join(line + b"\n" for line in lines if not line.startswith(b"{")) + rest * (not rest.startswith(b"{"))
+    assert (read.log, read.lines) == (log, [line for line in [*lines, rest] if line.strip()])
     log_lines = [line for line in read.lines if not line.startswith(b"{")]
     assert read.tail == [line.decode("utf-8", "replace") for line in log_lines[-8:]]
-
-
-def test_what_an_evaluator_recorded_is_in_a_file_beside_the_log(tmp_path: Path) -> None:
-    """However it was written; of an application, whose lines are no protocol, it stays in the log."""
-    line = b'{"dodo": "judged", "series": "x"}\n'
-    read = Read(tmp_path, [b"a\n{", line[1:20], line[20:] + b"b\n", line, b"c"])
-    assert (read.log, read.tail) == (b"a\nb\nc", ["a", "b", "c"])
-    assert (tmp_path / "logs" / "app.judged").read_bytes() == 2 * line
-    assert Read(tmp_path / "other", [b" " + line]).log == b" " + line
-    assert not (tmp_path / "other" / "logs" / "app.judged").exists()
 
 
 def test_the_returns_of_a_terminal_in_a_container_are_taken_off(tmp_path: Path) -> None:
     read = Read(tmp_path, [b"a\r\nb\r\r", b"\nc\r\n"], cooked=True)
     assert (read.lines, read.log) == ([b"a", b"b\r", b"c"], b"a\nb\r\nc\n")
-
-
-def test_a_record_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    line = b'{"dodo": "judged", "series": "x"}\n'
-    monkeypatch.setattr(service_output, "_MAX_RECORD", 2 * len(line))
-    read = Read(tmp_path, [3 * line, b"end\n"])
-    assert (read.log, (tmp_path / "logs" / "app.judged").read_bytes()) == (b"end\n", 2 * line)
 
 
 def test_a_long_line_is_in_the_log_and_its_begin_in_the_tail(tmp_path: Path) -> None:

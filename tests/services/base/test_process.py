@@ -66,9 +66,9 @@ def test_what_it_emulates_stood_still(start: Start, cid: int) -> None:
         assert service.line() == READY
         for distance in (-0.0625, 1.0, -0.0625):
             session.send(DISTANCE(distance=distance), sender_stamp=2)
-        assert service.line() == {"dodo": "paused", "s": 0.062}
+        assert service.line() == {"dodo": "paused", "seconds": 0.062}
         session.send(DISTANCE(distance=-0.5), sender_stamp=2)
-        assert service.line() == {"dodo": "paused", "s": 0.5}
+        assert service.line() == {"dodo": "paused", "seconds": 0.5}
         service.stop()
         assert service.end() == (0, "", "")
 

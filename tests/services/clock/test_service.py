@@ -39,13 +39,14 @@ def test_a_service_that_does_not_answer_is_reported_with_the_progress(
     cid: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(model, "SERVICE_PATIENCE", 0.1)
+    reason = "service 'gone' did not answer the clock within 0.1 s"
     with Session(cid) as session, Session(cid) as runner:
         runner.send(runner.messages.type("dodo.TestBegin")())
         driven(session, Roles((), (), ("gone",)), runner=runner)
     assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [
-        {"dodo": "time", "s": 0.0, "frames": 0, "surplus": 0, "last": False},
-        {"dodo": "time", "s": 0.0, "frames": 0, "surplus": 0, "last": True},
-        {"dodo": "stuck", "reason": "service 'gone' did not answer the clock within 0.1 s"},
+        {"dodo": "time", "seconds": 0.0, "last": False},
+        {"dodo": "time", "seconds": 0.0, "last": True},
+        {"dodo": "stopped", "how": "stuck", "reason": reason, "silent": False},
     ]
 
 

@@ -1,7 +1,7 @@
 import pytest
 
 from dodo_dsl.run.protocol import VerdictEvent
-from dodo_dsl.run.service_protocol import read_line
+from dodo_dsl.run.service_protocol import read
 from services.object_detection.model import verdict
 from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score
 
@@ -86,8 +86,8 @@ def test_labels_of_an_application_cannot_make_a_verdict_that_is_not_read(count: 
     """A class of any length, and more classes than a reason or a line may name."""
     made_up = {f"{n} {letter * 3000}": Counts(0, 1, 0) for n in range(count)}
     failed = verdict(by_class(**made_up, yellow=Counts(1, 0, 0)), ALL, "")
-    line = failed.line(111).encode()
-    event = read_line("judge", True, line)
+    line = failed.line().encode()
+    event = read("judge", True, line)
     assert len(line) < 1 << 16
     assert isinstance(event, VerdictEvent) and not event.passed
     assert max(len(check.name) for check in failed.checks) == len("precision-") + 100

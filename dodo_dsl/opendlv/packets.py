@@ -1,0 +1,129 @@
+"""Whole messages, in order, over Unix sockets in the folder of DoDo's own where the services of a test meet.
+
+The application does not have that folder.
+"""
+
+import contextlib
+import os
+import select
+import socket
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Self
+
+CLOCK_SOCKET, RUNNER_SOCKET = ".clock", ".runner"
+PACKET = 1 << 16
+_LAST, _MORE = b"\0", b"\1"
+_AGAIN_S, _NAME_S = 0.005, 1.0
+
+
+@contextlib.contextmanager
+def _short(path: Path) -> Iterator[str]:
+    """The path of a socket in a form that an address can hold, however long the folder's is."""
+    folder = os.open(path.parent, os.O_PATH)
+    try:
+        yield f"/proc/self/fd/{folder}/{path.name}"
+    finally:
+        os.close(folder)
+
+
+class Connection:
+    """One end of a connection. A message longer than a packet takes several, of which the first byte says so."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._socket = connection
+        self._poll = select.poll()
+        self._poll.register(connection, select.POLLIN)
+
+    @classmethod
+    def open(cls, path: Path, name: str, patience: float = 0.0) -> Self:
+        """Connects as a service of this name; raises OSError where nobody listens within ``patience`` seconds."""
+        end = time.monotonic() + patience
+        while True:
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            try:
+                with _short(path) as address:
+                    connection.connect(address)
+            except OSError as error:
+                connection.close()
+                if not isinstance(error, FileNotFoundError | ConnectionRefusedError) or time.monotonic() >= end:
+                    raise
+                time.sleep(_AGAIN_S)
+            else:
+                made = cls(connection)
+                made.send(name.encode())
+                return made
+
+    def send(self, data: bytes) -> None:
+        """Sends a message; it is lost where the other end has gone."""
+        with contextlib.suppress(OSError):
+            while len(data) > PACKET:
+                self._socket.send(_MORE + data[:PACKET])
+                data = data[PACKET:]
+            self._socket.send(_LAST + data)
+
+    def receive(self, timeout: float) -> bytes | None:
+        """The next message within ``timeout`` seconds; raises EOFError when the other end has gone."""
+        if not self._poll.poll(timeout * 1000):
+            return None
+        data, kind = b"", _MORE
+        while kind == _MORE:
+            try:
+                packet = self._socket.recv(PACKET + 1)
+            except ConnectionError:
+                packet = b""
+            if not packet:
+                raise EOFError
+            kind, data = packet[:1], data + packet[1:]
+        return data
+
+    def fileno(self) -> int:
+        """The file descriptor to poll for reading."""
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+
+class Listener:
+    """The end to which services connect, each of ``services`` once; others are turned away."""
+
+    def __init__(self, path: Path, services: Iterable[str]) -> None:
+        """Raises OSError."""
+        self._path = path
+        self.missing = set(services)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        path.unlink(missing_ok=True)
+        with _short(path) as address:
+            self._socket.bind(address)
+        path.chmod(0o666)
+        self._socket.listen(socket.SOMAXCONN)
+
+    def accept(self, timeout: float) -> tuple[str, Connection] | None:
+        """A service that connects within ``timeout`` seconds, with its name; nobody can behind the last one."""
+        if not self.missing or not select.select([self._socket], [], [], timeout)[0]:
+            return None
+        connection = Connection(self._socket.accept()[0])
+        try:
+            name = (connection.receive(_NAME_S) or b"").decode("utf-8", "replace")
+        except EOFError:
+            name = ""
+        if name not in self.missing:
+            connection.close()
+            return None
+        self.missing.remove(name)
+        if not self.missing:
+            self.close()
+        return name, connection
+
+    def fileno(self) -> int:
+        """The file descriptor to poll for a service that connects."""
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        """Nobody else can connect."""
+        self.missing.clear()
+        self._socket.close()
+        self._path.unlink(missing_ok=True)

@@ -1,0 +1,39 @@
+"""What a service tells the runner: over the test's channel, or by lines of its output where no runner listens."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection
+
+_runner: Connection | None = None
+
+
+@contextmanager
+def connected(folder: Path | None, service: str) -> Iterator[None]:
+    """Within the block, a runner that listens in the folder hears what is told."""
+    global _runner  # noqa: PLW0603  (a process is one service)
+    try:
+        _runner = Connection.open(folder / RUNNER_SOCKET, service) if folder else None
+    except OSError:  # run by hand, or by an engine on another machine
+        _runner = None
+    try:
+        yield
+    finally:
+        if _runner is not None:
+            _runner.close()
+            _runner = None
+
+
+def tell(kind: str, **facts: object) -> None:
+    """Tells the runner something of a kind that ``dodo_dsl/run/protocol.py`` knows."""
+    say(json.dumps({"dodo": kind, **facts}))
+
+
+def say(message: str) -> None:
+    """As ``tell``, with a message that is written already."""
+    if _runner is None:
+        print(message, flush=True)
+    else:
+        _runner.send(message.encode())
