@@ -48,15 +48,6 @@ def boxes(path: Path) -> dict[int, list[tuple[str, float, float, float, float]]]
     return images
 
 
-PROJECTED = """
-dodo: 1
-name: hil-projected
-extends: ../hil-perception/hil-perception.dodo.yml
-environment:
-  camera: {uses: camera, with: {scene.truth-sender: 8, scene.truth-min-height: 10 px}}
-"""
-
-
 TRUTH = boxes(ROOT / "tests_registry" / "truths" / "static-rig.json")[1]
 MICROSTEPS = tuple(1.01 * step for step in MICROSTEP.values())
 """m, m, rad; a Frame holds 32 bits a number."""
@@ -246,38 +237,7 @@ def is_labelled(folder: Path, within: float) -> None:
             assert nearest == pytest.approx(true, abs=within), (label, true)
 
 
-def sent_boxes(recording: Path, sender: int) -> dict[tuple[int, int], tuple[float, float, float, float]]:
-    """Left, top, right and bottom as shares of the picture, by sample time and number of the model."""
-    messages, found = MessageSet.standard(), {}
-    for envelope in read_envelopes(recording):
-        kind = messages.id("opendlv.logic.perception.DetectionBoundingBox")
-        if (envelope.data_type, envelope.sender_stamp) == (kind, sender):
-            box: Any = messages.decode(envelope.data_type, envelope.payload)
-            edges = (box.x, box.y, box.x + box.width, box.y + box.height)
-            found[envelope.sample_time, box.detectionId] = edges
-    return found
-
-
-def overlap(one: tuple[float, ...], other: tuple[float, ...]) -> float:
-    """Intersection over union."""
-    (left, top), (right, bottom) = map(max, one[:2], other[:2]), map(min, one[2:], other[2:])
-    common = max(right - left, 0.0) * max(bottom - top, 0.0)
-    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (one, other)]
-    return common / (sum(areas) - common)
-
-
-def test_the_truth_that_moves_is_where_the_renderer_drew_it(tmp_path: Path) -> None:
-    """Projected by the measured position, while the emulated camera draws from the rig's own.
-
-    Whether the application keeps up on a busy machine says nothing of it.
-    """
-    spec = registry_with(tmp_path, "hil-projected", PROJECTED, "maps", "targets", "hil-perception")
-    test = run(tmp_path / "report", str(spec), "--application", str(KIWI / "docker-compose.yml"), code=(0, 3))
+def test_what_moves_with_the_rig_is_found(tmp_path: Path) -> None:
+    """Whether the application keeps up on a busy machine says nothing of it."""
+    test = run(tmp_path, "hil-perception", code=(0, 3))
     assert test["outcome"] == "passed" or test["machine"]["undecided"], test["reason"]
-    recording = tmp_path / "report" / "hil-projected" / "test.rec"
-    drawn, projected = (sent_boxes(recording, sender) for sender in (8, 9))
-    both = sorted(drawn.keys() & projected.keys())
-    overlaps = np.array([overlap(drawn[key], projected[key]) for key in both])
-    assert len(both) > 300 and len(both) > 0.9 * len(projected)
-    assert np.median(overlaps) > 0.85, "it moves; a picture that comes late has another time than its pose"
-    assert overlaps[-20:].min() > 0.97, "it stands at last"
