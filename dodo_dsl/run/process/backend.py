@@ -98,7 +98,6 @@ class ProcessBackend:
 
     async def open(self, container: int = 0) -> None:
         """With a process of a ``container``, in the container's network, IPC namespace and ``/tmp``."""
-        self._reports.listen(Path(self.slot.channel))
         needed = [*needed_paths(self.plan, self._folder, self.report), Path(self.slot.channel)]
         if self.plan.clock == VIRTUAL:
             time = await asyncio.to_thread(application_time.built)
@@ -107,6 +106,7 @@ class ProcessBackend:
         entered = None if self.is_on_host else Entered.with_own(container, *needed)
         with atomic.appended(self.report / LOG) as log:
             await self._sandbox.open(self.slot, log.fileno(), entered)
+        self._reports.listen(Path(self.slot.channel))
 
     def _take(self, message: dict[str, Any]) -> None:
         if "started" in message:
@@ -326,6 +326,7 @@ class ProcessBackend:
         for turn in self._turns.values():
             turn.cancel()
         if keep and (pid := self._sandbox.pid):
+            self._reports.stop_listening()
             return self._kept(pid)
         await self._sandbox.close()
         self._reports.close()

@@ -10,6 +10,7 @@ import pytest
 from dodo_dsl.run.process.backend import ProcessBackend
 from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
+from dodo_dsl.run.service_protocol import Reports
 from tests.run.scripted import plan
 
 
@@ -30,6 +31,7 @@ def test_a_sandbox_shows_what_its_test_needs(monkeypatch: pytest.MonkeyPatch) ->
         shown.append(entered)
 
     monkeypatch.setattr(SandboxClient, "open", opened)
+    monkeypatch.setattr(Reports, "listen", lambda *_: None)
     folder = Path("/tmp/dodo-a/repository/generated/test")
     one = plan(import_paths=("../../../../dodo-b",))
     (app,) = one.application.services

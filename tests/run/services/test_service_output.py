@@ -111,6 +111,7 @@ def test_a_log_that_cannot_be_written_is_said_in_the_tail(small_disk: Path) -> N
         os.write(output.writer, b"a\nb\n")
         output.release_writer()
         await asyncio.wait_for(output.done.wait(), 10)
+        output.close()
         return output.tail()
 
     assert asyncio.run(scene())[-1] == "... dodo: the log cannot be written: No space left on device"
