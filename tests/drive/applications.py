@@ -40,6 +40,14 @@ def results(report: Path) -> dict[str, dict[str, Any]]:
     return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}
 
 
+def program(folder: Path, *process: str, command: str = "", **about: Any) -> Path:
+    """The compose file of an application of one program, with words for its command and keys of its service."""
+    service = {"image": "x", "command": f"--cid=111 --name=video0.argb {command}", "x-dodo-process": [*process]}
+    path = folder / "docker-compose.yml"
+    path.write_text(yaml.safe_dump({"services": {"app": {**service, **about}}}))
+    return path
+
+
 def kiwi(folder: Path, wrong: tuple[str, str, str] | None = None, **commands: str) -> Path:
     """A copy of the example application, wrong in one place, with words appended to its services' commands."""
     shutil.copytree(KIWI, folder)

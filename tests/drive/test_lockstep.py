@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
-from tests.drive.applications import ROOT, TOLD, dodo, kiwi, results
+from tests.drive.applications import ROOT, TOLD, dodo, kiwi, program, results
 from tests.drive.variants import registry, variant
 
 pytestmark = pytest.mark.slow
@@ -23,10 +22,7 @@ CURVE = "sil-closed-left-curve"
 def application(folder: Path, script: str, command: str, **about: Any) -> Path:
     """A compose file for a script of this folder."""
     shutil.copy(HERE / script, folder)
-    service = {"image": "x", "command": f"--cid=111 --name=video0.argb {command}", "x-dodo-process": ["python", script]}
-    path = folder / "docker-compose.yml"
-    path.write_text(yaml.safe_dump({"services": {"app": {**service, **about}}}))
-    return path
+    return program(folder, "python", script, command=command, **about)
 
 
 def run(folder: Path, manner: str, code: int, *words: str) -> tuple[dict[str, Any], list[str]]:

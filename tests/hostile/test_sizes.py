@@ -45,7 +45,7 @@ from services.scene import scene
 from services.scene.meshes import load_obj
 from services.scene.textures import load_picture
 from services.virtual_camera.optics import load_with_alpha
-from tests.drive.applications import results
+from tests.drive.applications import program, results
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
 from tests.run.helpers import Bench
 
@@ -349,8 +349,7 @@ def test_whole_applications(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kin
     (tmp_path / "tests" / "sil-small").mkdir()
     (tmp_path / "tests" / "sil-small" / "sil-small.dodo.yml").write_text(json.dumps(about))
     (tmp_path / "app.py").write_text(BEGIN_OF_ALL + APPLICATIONS[kind][0])
-    app = {"image": "x", "command": "--cid=111 --name=video0.argb", "x-dodo-process": ["python", "app.py"]}
-    (tmp_path / "docker-compose.yml").write_text(json.dumps({"services": {"app": app}}))
+    program(tmp_path, "python", "app.py")
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
     output = StringIO()
     main(["run", "sil-small", "--backend", "process"], output, output)
