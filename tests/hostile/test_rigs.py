@@ -130,12 +130,6 @@ def test_a_serial_number_is_the_device_s_whatever_port_it_is_in(tmp_path: Path) 
     assert identity("/dev/does-not-exist") == "path /dev/does-not-exist"
 
 
-@pytest.mark.parametrize("name", ["", "emulated", "a\0b", str(Path(__file__))])
-def test_what_is_no_hardware_has_no_identity(name: str) -> None:
-    """What is no hardware is not taken for a device."""
-    assert (identity(name), device_key(name)) == ("", "")
-
-
 @pytest.fixture
 def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A repository whose rig is a device that no program moves."""
@@ -181,10 +175,12 @@ def test_no_variable_moves_the_quarantine_of_hardware(repository: Path, monkeypa
     assert rigs_leases.all_quarantined() == {}
 
 
-@pytest.mark.parametrize("name", ["/dev/null", "/dev/ptmx", "/dev/tty", "/none", "a\0b", "", "emulated", "0"])
+@pytest.mark.parametrize("name", ["/dev/null", "/dev/ptmx", "/dev/tty", "/none", "a\0b", "", "emulated", __file__])
 def test_what_is_no_hardware(name: str) -> None:
-    """Files, pseudo-terminals and sockets are not taken for hardware."""
-    assert not rigs_leases.is_hardware_device(name)
+    """Files, pseudo-terminals and sockets are not taken for hardware, and what is no device has no identity."""
+    assert not rigs_leases.is_hardware_device(name) and not rigs_leases.is_hardware_device("0")
+    is_device = name.startswith(("/dev/", "/none"))
+    assert (identity(name) != "", device_key(name) != "") == (is_device, is_device)
 
 
 # The operator
