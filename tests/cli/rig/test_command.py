@@ -1,13 +1,11 @@
 """``dodo rig``: manual use of a rig, with a rig on a pseudo terminal as the hardware."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from dodo_dsl.cli.main import main
 from services.gantry.rig_table import LIMITS
 from tests.run.rigs.place import Place, busy, place
 
