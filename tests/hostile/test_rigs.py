@@ -111,7 +111,7 @@ def test_all_names_of_a_device_are_one(tmp_path: Path) -> None:
     (tmp_path / "again").symlink_to(tmp_path / "rig")
     names = ["/dev/null", "/dev/../dev/null", str(tmp_path / "rig"), str(tmp_path / "again")]
     assert {identity(name) for name in names} == {"path /dev/null"}
-    assert len({device_key(name) for name in names}) == len(device_leases([*names, "emulated", ""])) == 1
+    assert len({device_key(name) for name in names}) == len(device_leases([*names, __file__, "emulated"])) == 1
     assert {identity(f"socket://{host}:4242") for host in ("127.0.0.1", "localhost", "[::1]")} == {"socket 4242"}
     assert device_leases(["socket://127.0.0.1:4242"]) == device_leases(["socket://localhost:4242"]) != []
 
