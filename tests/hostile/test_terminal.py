@@ -7,7 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.terminal import harmless_stream, json_text, printable
@@ -62,10 +62,17 @@ def test_json_says_the_same_and_commands_nothing(attack: str) -> None:
     assert json.loads(stream.getvalue()) == {ATTACKS[attack]: [ATTACKS[attack], "ü"]}
 
 
+def test_commands_in_pieces_are_none_and_the_rest_stays() -> None:
+    stream = StringIO()
+    out = harmless_stream(stream)
+    for part in ("a::b\n", " ", ":", ":error::x\n", "\t:", "ok\n"):
+        out.write(part)
+    assert stream.getvalue() == "a::b\n : :error::x\n\t:ok\n"
+
+
 PIECES = st.sampled_from(["#", "##", "[", "##[", "vso", "vso[", ":", "::", "::error::", " ", "\t", "\n", "a", "\x1b["])
 
 
-@example(["a::b\n", " ", ":", ":error::x\n", "\t:", "ok\n"])
 @given(st.lists(PIECES | st.text(max_size=5), max_size=12))
 @pytest.mark.thorough
 def test_no_pieces_become_a_command(pieces: list[str]) -> None:
