@@ -54,7 +54,8 @@ def read(service: str, is_evaluator: bool, message: bytes) -> Event | None:
             is_good = said.outcome == "passed"
             return VerdictEvent(service, is_good, said.reason, checks, said.evidence, said.silent)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
-        return Malformed(service, str(error)) if is_verdict else None
+        expected = ", expected passed or failed" if "$.outcome" in str(error) else ""
+        return Malformed(service, f"{error}{expected}") if is_verdict else None
     match said:
         case Noted(text=note):
             return Noted(f"service '{service}': {note}")

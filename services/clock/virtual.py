@@ -245,7 +245,8 @@ class SentMessages:
         if not self.answers:
             return {}
         times = dict.fromkeys(("period_s", "median_s", "p95_s", "worst_s"), 0.0)
-        return {"answers": self.answers, **times, "slow": 0, "over": None, "uncopied": self.uncopied, "processor": ""}
+        unseen = dict.fromkeys(("processor_median_s", "processor_p95_s", "processor_worst_s", "over"))
+        return {"answers": self.answers, **times, **unseen, "slow": 0, "uncopied": self.uncopied, "processor": ""}
 
 
 class VirtualApplication:

@@ -125,7 +125,7 @@ def given(test: Compiled, folder: Path) -> dict[str, Any]:
     assert test.plan is not None
     made = Compose(test.plan, test.write(), folder / "report", "dodo-t", print)
     made.read()
-    document, file = made.document(b""), folder / "given.json"
+    document, file = made.document(), folder / "given.json"
     own = test.plan.application.compose["services"]
     document["services"] |= {name: {**service, **document["services"][name]} for name, service in own.items()}
     file.write_text(json.dumps(document))

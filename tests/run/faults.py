@@ -114,7 +114,8 @@ FAULTS = {
     "malformed": Fault(
         "An evaluator gives a malformed verdict",
         "error",
-        "the verdict of evaluator 'judge' is malformed: its outcome is \"maybe\", expected passed or failed",
+        "the verdict of evaluator 'judge' is malformed: Invalid enum value 'maybe' - at `$.outcome`, expected passed or "
+        "failed",
         {"process": SHORT, "docker": LONG},
         judge=READY + BEGUN + MAYBE + WAIT,
     ),

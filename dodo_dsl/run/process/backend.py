@@ -238,8 +238,9 @@ class ProcessBackend:
             return is_ready
 
         self._starts.setdefault(command.name, []).append(command)
-        output = self._output(command, on_line)
-        self._outputs[command.name] = output
+        if command.name in self._outputs:  # it is started once more
+            self._outputs[command.name].close()
+        output = self._outputs[command.name] = self._output(command, on_line)
         self._pids[command.name] = asyncio.get_running_loop().create_future()
         hidden = command.masked if self.isolation == "host" and self.is_apart else ()
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module, "masked": hidden}

@@ -58,7 +58,7 @@ REASONS = {
     "twice": (PASS + PASS, "evaluator 'track' gave 2 verdicts, expected one"),
     "malformed": (
         'print(\'{"dodo": "verdict", "outcome": "maybe"}\')',
-        "the verdict of evaluator 'track' is malformed: its outcome is \"maybe\", expected passed or failed",
+        "the verdict of evaluator 'track' is malformed: Invalid enum value 'maybe' - at `$.outcome`, expected passed or failed",
     ),
 }
 

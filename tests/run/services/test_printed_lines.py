@@ -264,6 +264,7 @@ def fuzz(folder: Path, count: int, terminal: bool) -> tuple[int, int]:
         await write(waiting)
         output.release_writer()
         await asyncio.wait_for(output.done.wait(), 60)
+        output.close()
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - began
 
     grown = asyncio.run(scene())
