@@ -15,12 +15,6 @@ from tests.realtime import hurry
 ROOT = Path(__file__).parents[2]
 KIWI = ROOT / "examples" / "kiwi"
 
-LEAVES = (
-    "perception.py",
-    "        if not memory.wait():\n            continue\n",
-    "        if not memory.wait(0.9 if 'frame' in locals() else None):\n            sys.exit(0)\n",
-)
-
 TOLD = {
     "in": ["opendlv.sim.Frame"],
     "out": ["opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"],
@@ -44,6 +38,14 @@ def dodo(*words: str, code: int | tuple[int, ...], before: Sequence[str] = ()) -
 
 def results(report: Path) -> dict[str, dict[str, Any]]:
     return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}
+
+
+def program(folder: Path, *process: str, command: str = "", **about: Any) -> Path:
+    """The compose file of an application of one program, with words for its command and keys of its service."""
+    service = {"image": "x", "command": f"--cid=111 --name=video0.argb {command}", "x-dodo-process": [*process]}
+    path = folder / "docker-compose.yml"
+    path.write_text(yaml.safe_dump({"services": {"app": {**service, **about}}}))
+    return path
 
 
 def kiwi(folder: Path, wrong: tuple[str, str, str] | None = None, **commands: str) -> Path:

@@ -1,12 +1,11 @@
 """An application on libcluon itself: looks at the camera's memory and the vehicle's frames, and steers steadily.
 
-python cluon_app.py --cid=111 --name=video0.argb --steering=0.1 [--period=0.01]      by a timer instead, in s
+python cluon_app.py --cid=111 --name=video0.argb --steering=0.1
 """
 
 import json
 import sys
 import threading
-import time
 
 import pycluon
 
@@ -37,8 +36,6 @@ def main() -> None:
     session.add_data_trigger(1003, hear)
     memory = pycluon.SharedMemory(FLAGS["name"])
     FIRST.wait(5.0)
-    if "period" in FLAGS:
-        threading.Thread(target=tick, args=(session,), daemon=True).start()
     while True:
         memory.wait()
         memory.lock()
@@ -47,19 +44,8 @@ def main() -> None:
         colours = len({picture[i : i + 3] for i in range(0, len(picture), 4 * 997)})
         facts = {"valid": memory.valid(), "bytes": len(picture), "colours": colours, "stamp": stamp.timestamp()}
         print(json.dumps({**facts, "frames": len(PLACES), "at": PLACES[-1]}), flush=True)
-        if "period" not in FLAGS:
-            steer(session)
-
-
-def steer(session: pycluon.OD4Session) -> None:
-    request(session, "opendlv.proxy.GroundSteeringRequest", groundSteering=float(FLAGS["steering"]))
-    request(session, "opendlv.proxy.PedalPositionRequest", position=0.1)
-
-
-def tick(session: pycluon.OD4Session) -> None:
-    while True:
-        time.sleep(float(FLAGS["period"]))
-        steer(session)
+        request(session, "opendlv.proxy.GroundSteeringRequest", groundSteering=float(FLAGS["steering"]))
+        request(session, "opendlv.proxy.PedalPositionRequest", position=0.1)
 
 
 main()

@@ -1,19 +1,14 @@
-"""What a listener beside the example application hears in each shipped test, and the documentation's table of that."""
+"""What a listener beside the example application hears in each shipped test."""
 
-import json
 import re
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 import yaml
 
 from tests.drive.applications import ROOT, dodo, kiwi, results
 
-RECORD = Path(__file__).with_suffix(".json")
-"""By clock and test: the messages that are none of the application's own. ``scripts/make-heard`` writes it."""
-PAGE = ROOT / "docs" / "reference" / "applications.md"
-BEGIN, END = "<!-- the table of scripts/make-heard begins -->", "<!-- and ends -->"
 CAR = ("opendlv.proxy.", "opendlv.system.", "opendlv.device.")
 """What a car's bus carries."""
 TESTS = sorted(path.name.partition(".")[0] for path in ROOT.glob("tests_registry/*/*.dodo.yml"))
@@ -55,27 +50,6 @@ def heard(folder: Path, clock: str, tests: Iterable[str], *words: str) -> Heard:
     return {name: sorted(others) for name, others in sorted(found.items())}
 
 
-def strangers(found: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
-    """Of what was heard, that which neither a car nor DoDo's own exchange has, by test."""
-    named = {test: [n for n in names if not n.startswith(CAR)] for test, names in found.items()}
-    return {test: names for test, names in named.items() if names}
-
-
-def read() -> dict[str, Heard]:
-    """The record by clock."""
-    return json.loads(RECORD.read_text())
-
-
-def page() -> str:
-    """The documentation's page with the table of the record."""
-    record = read()
-    rows = [f"| `{test}` | {_cell(record['lockstep'], test)} | {_cell(record['realtime'], test)} |" for test in TESTS]
-    table = "\n".join(["| test | in lockstep | in real time |", "|---|---|---|", *rows])
-    text = PAGE.read_text()
-    return f"{text[: text.index(BEGIN)]}{BEGIN}\n{table}\n{text[text.index(END) :]}"
-
-
-def _cell(found: Heard, test: str) -> str:
-    if test not in found:
-        return ""
-    return ", ".join(f"`{name}`" for name in found[test]) or "nothing"
+def strangers(names: Iterable[str]) -> list[str]:
+    """Of what was heard, that which neither a car nor DoDo's own exchange has."""
+    return [name for name in names if not name.startswith(CAR)]

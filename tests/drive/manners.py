@@ -9,7 +9,6 @@ slow          takes its time every tenth picture
 leaks         keeps 20 MB of each picture
 restarts      replaces itself with a new process every twentieth picture
 stops         answers no more after ten pictures, and goes on looking
-silent        waits for nothing and says nothing
 timer         answers 100 times a second, or each --period s, whatever it saw last
 """
 
@@ -74,16 +73,13 @@ def tick(session: Session) -> None:
 
 
 def main() -> None:
-    with Session(int(FLAGS["cid"])) as session:
-        if "silent" in MANNERS:
-            time.sleep(600)
-        with attached() as memory:
-            number = 0
-            if "timer" in MANNERS:
-                threading.Thread(target=tick, args=(session,), daemon=True).start()
-            while memory.wait():
-                answer(session, memory, number)
-                number += 1
+    with Session(int(FLAGS["cid"])) as session, attached() as memory:
+        number = 0
+        if "timer" in MANNERS:
+            threading.Thread(target=tick, args=(session,), daemon=True).start()
+        while memory.wait():
+            answer(session, memory, number)
+            number += 1
 
 
 main()

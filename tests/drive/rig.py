@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import yaml
 
@@ -52,8 +52,7 @@ class Hardware:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.poses: list[Pose] = []
-        self.events: list[dict[str, Any]] = []
-        self._extremes: list[dict[str, Any]] = []
+        self._answers = 0
         words = [BUILT / "rig-emulator", "--start", START, "--link", path, BUILT / "gantry.elf"]
         self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         wait_for_nobody(self.process.pid)
@@ -78,9 +77,7 @@ class Hardware:
                 if "x" in said:
                     self.poses.append(Pose(*(float(said[name]) for name in Pose._fields)))
                 elif "ramp" in said:
-                    self._extremes.append(said)
-                elif "event" in said:
-                    self.events.append(said)
+                    self._answers += 1
 
     def order(self, line: str) -> None:
         assert self.process.stdin is not None
@@ -88,20 +85,11 @@ class Hardware:
         self.process.stdin.flush()
 
     def now(self) -> float:
-        """The rig's time, in s, once it has done all that it was ordered; ``ramps`` begins anew."""
-        self.ramps()
-        return self.poses[-1].t
-
-    def ramps(self) -> list[float]:
-        """The largest acceleration of each axis (m/s2, m/s2, rad/s2) since the last order `extremes`."""
-        known = len(self._extremes)
+        """The rig's time, in s, once it has done all that it was ordered."""
+        known = self._answers
         self.order("extremes")
-        self.until(lambda _: len(self._extremes) > known, 60)
-        return [float(ramp) for ramp in self._extremes[-1]["ramp"]]
-
-    @property
-    def late(self) -> bool:
-        return any(event["event"] == "late" for event in self.events)
+        self.until(lambda _: self._answers > known, 60)
+        return self.poses[-1].t
 
     def until(self, true: Callable[[Pose], bool], patience: float, runner: "Runner | None" = None) -> Pose:
         """The first pose from now on for which something is true; a ``runner`` that ends before has failed."""

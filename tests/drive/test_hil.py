@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
-from services.gantry.rig_table import ACCELERATION, BOUNDS, MICROSTEP
+from services.gantry.rig_table import BOUNDS, MICROSTEP
 from tests.drive.applications import KIWI, ROOT, dodo, kiwi, results
-from tests.drive.rig import Hardware, Pose, on_its_way, running
 from tests.drive.variants import registry, variant
 from tests.realtime import hurry
 
@@ -47,15 +46,6 @@ def boxes(path: Path) -> dict[int, list[tuple[str, float, float, float, float]]]
     for each in found["annotations"]:
         images[each["image_id"]].append((names[each["category_id"]], *each["bbox"]))
     return images
-
-
-PROJECTED = """
-dodo: 1
-name: hil-projected
-extends: ../hil-perception/hil-perception.dodo.yml
-environment:
-  camera: {uses: camera, with: {scene.truth-sender: 8, scene.truth-min-height: 10 px}}
-"""
 
 
 TRUTH = boxes(ROOT / "tests_registry" / "truths" / "static-rig.json")[1]
@@ -83,40 +73,6 @@ def poses(recording: Path, sender: int) -> NDArray[np.float64]:
             frame: Any = messages.decode(envelope.data_type, envelope.payload)
             rows.append((envelope.sample_time / 1e6, frame.x, frame.y, 2 * math.atan2(frame.qz, frame.qw)))
     return np.array(rows)
-
-
-STEP, SWING = 20, 1.02
-"""Of the rig's poses, of which there are 100 a second, from one to the next of which speeds are taken, and how
-much more than the drivers told them rotors do, as they swing."""
-
-
-def stays_within_limits(poses: list[Pose], ramps: list[float]) -> None:
-    """By the rig's own poses, time, and largest acceleration of each axis, which are exact."""
-    every = np.array(poses)[::STEP]
-    speeds = np.diff(every[:, 1:4], axis=0) / np.diff(every[:, 0])[:, None]
-    changes = np.diff(speeds, axis=0) / np.diff(every[:, 0])[1:, None]
-    (speed, rate), (acceleration, yaw_acceleration) = (
-        (np.hypot(each[:, 0], each[:, 1]).max(), np.abs(each[:, 2]).max()) for each in (speeds, changes)
-    )
-    found = f"{speed:.3f} m/s, {acceleration:.3f} m/s2, {rate:.3f} rad/s, {yaw_acceleration:.3f} rad/s2, ramps {ramps}"
-    print(found)
-    assert 0.3 < speed <= 1.0 and 0.2 < acceleration <= 0.5 * SWING, found
-    assert 0.1 < rate <= 1.0 and 0.2 < yaw_acceleration <= 1.0 * SWING, found
-    assert all(0.2 < ramp <= most for ramp, most in zip(ramps, ACCELERATION.values(), strict=True)), found
-    for (low, high), way in zip(BOUNDS.values(), np.array(poses)[:, 1:4].T, strict=True):
-        assert low <= way.min() and way.max() <= high
-
-
-def stands(pose: Pose) -> bool:
-    """Whether not even a rotor swings."""
-    return pose.speed < 1e-4 and abs(pose.vyaw) < 1e-3
-
-
-def measured_by_hand(rig: Hardware) -> NDArray[np.float64]:
-    """Time, x, y and yaw as the rig's own counters have them."""
-    command = [sys.executable, "-m", "services.gantry.manual", f"--serial={rig.path}", "status"]
-    said = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
-    return np.array([0.0, said["x"], said["y"], math.radians(said["yaw"])])
 
 
 def same_at_rest(measured: NDArray[np.float64], true: NDArray[np.float64]) -> None:
@@ -210,20 +166,6 @@ def test_laps_on_the_rig_that_turns_without_end(tmp_path: Path, laps: int) -> No
     assert np.abs(true[:, 1]).max() < 0.95 and np.abs(true[:, 2]).max() < 0.7
 
 
-def test_the_rig_itself_saw_no_limit_passed_and_knows_where_it_stands(tmp_path: Path, rig: Hardware) -> None:
-    with running(tmp_path, rig, "network") as run:
-        before = on_its_way(run)
-        rig.order("extremes")  # anew from here on
-        start = next(pose for pose in reversed(rig.poses) if pose.t < before.t and stands(pose))
-        output = run.runner.communicate(timeout=300)[0]
-        assert run.runner.returncode == 0 or rig.late, output
-    rig.until(stands, 60)
-    stays_within_limits([pose for pose in rig.poses if pose.t > start.t], rig.ramps())
-    (first, *_), (end, *_) = (poses(tmp_path / "dodo-report" / "unplugged" / "test.rec", MEASURED), rig.poses[-1:])
-    same_at_rest(first, np.array(start)[:4])
-    same_at_rest(measured_by_hand(rig), np.array(end)[:4])
-
-
 @pytest.mark.parametrize("steering", ["--reverse", pytest.param("", marks=pytest.mark.proof)], ids=["wrong", "right"])
 def test_the_rig_goes_its_way_whatever_the_application_does(tmp_path: Path, steering: str) -> None:
     """On a busy machine the reversed application is not judged, but the reason says what was found."""
@@ -295,38 +237,7 @@ def is_labelled(folder: Path, within: float) -> None:
             assert nearest == pytest.approx(true, abs=within), (label, true)
 
 
-def sent_boxes(recording: Path, sender: int) -> dict[tuple[int, int], tuple[float, float, float, float]]:
-    """Left, top, right and bottom as shares of the picture, by sample time and number of the model."""
-    messages, found = MessageSet.standard(), {}
-    for envelope in read_envelopes(recording):
-        kind = messages.id("opendlv.logic.perception.DetectionBoundingBox")
-        if (envelope.data_type, envelope.sender_stamp) == (kind, sender):
-            box: Any = messages.decode(envelope.data_type, envelope.payload)
-            edges = (box.x, box.y, box.x + box.width, box.y + box.height)
-            found[envelope.sample_time, box.detectionId] = edges
-    return found
-
-
-def overlap(one: tuple[float, ...], other: tuple[float, ...]) -> float:
-    """Intersection over union."""
-    (left, top), (right, bottom) = map(max, one[:2], other[:2]), map(min, one[2:], other[2:])
-    common = max(right - left, 0.0) * max(bottom - top, 0.0)
-    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (one, other)]
-    return common / (sum(areas) - common)
-
-
-def test_the_truth_that_moves_is_where_the_renderer_drew_it(tmp_path: Path) -> None:
-    """Projected by the measured position, while the emulated camera draws from the rig's own.
-
-    Whether the application keeps up on a busy machine says nothing of it.
-    """
-    spec = registry_with(tmp_path, "hil-projected", PROJECTED, "maps", "targets", "hil-perception")
-    test = run(tmp_path / "report", str(spec), "--application", str(KIWI / "docker-compose.yml"), code=(0, 3))
+def test_what_moves_with_the_rig_is_found(tmp_path: Path) -> None:
+    """Whether the application keeps up on a busy machine says nothing of it."""
+    test = run(tmp_path, "hil-perception", code=(0, 3))
     assert test["outcome"] == "passed" or test["machine"]["undecided"], test["reason"]
-    recording = tmp_path / "report" / "hil-projected" / "test.rec"
-    drawn, projected = (sent_boxes(recording, sender) for sender in (8, 9))
-    both = sorted(drawn.keys() & projected.keys())
-    overlaps = np.array([overlap(drawn[key], projected[key]) for key in both])
-    assert len(both) > 300 and len(both) > 0.9 * len(projected)
-    assert np.median(overlaps) > 0.85, "it moves; a picture that comes late has another time than its pose"
-    assert overlaps[-20:].min() > 0.97, "it stands at last"

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -117,70 +117,40 @@ ONE_BY_ONE = (*FOLDERS, *USERS, *LOCALES, *PATHS, *FOLDERS_OF_USERS)
 ODD = "-a b#c%20d%'\"`$HOME${b}$(c){{d}}{%e:,=\\n\n[b]*?<i>&amp;größe"
 """All that is odd in ``PATHS``."""
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+KNOWN = {case.name: case for case in (*ONE_BY_ONE, Case("odd path", ODD), Case("in ASCII", environment=ASCII))}
+
+
+def together(*names: str) -> Case:
+    """One case with all that several say."""
+    cases = [KNOWN[name] for name in names]
+    said: dict[str, Any] = {}
+    for case in cases:
+        said |= {
+            each.name: getattr(case, each.name) for each in fields(Case) if getattr(case, each.name) != each.default
+        }
+    environment = {name: value for case in cases for name, value in case.environment.items()}
+    return Case(**{**said, "name": "; ".join(names), "environment": environment})
+
+
 TOGETHER = (
-    Case(
-        "odd path in ASCII of a user without HOME, umask 077, TMPDIR",
-        ODD,
-        umask=0o077,
-        is_user=True,
-        environment={**ASCII, "HOME": None, "TMPDIR": "{scratch}/tmp"},
+    together("odd path", "in ASCII", "umask 077 of a user", "no HOME", "TMPDIR"),
+    together("symlink", "a deep subfolder, report above", "umask 077, memories of POSIX", "HOME missing"),
+    together("outside, report in the application's folder", "umask 027 of a user", "HOME read-only of a user"),
+    together(
+        "read-only checkout of a user", "report outside", "HOME read-only", "XDG folders read-only", "TMPDIR in memory"
     ),
-    Case(
-        "deep subfolder of a symlink, umask 077, memories of POSIX",
-        made="symlink",
-        at="{checkout}/tests/sil-tiny",
-        report="../../dodo-report",
-        umask=0o077,
-        environment={"CLUON_SHAREDMEMORY_POSIX": "1", "HOME": "{scratch}/missing"},
+    together("report not UTF-8", "HOME not UTF-8", "TMPDIR not UTF-8"),
+    together(
+        "worktree",
+        "a subfolder",
+        "HOME relative",
+        "TMPDIR among the tests",
+        "locale POSIX, UTF-8 mode 1",
+        "XDG folders",
     ),
-    Case(
-        "outside, report in the application's folder, a user with umask 027",
-        at="{scratch}",
-        words=OUTSIDE,
-        report="checkout/out",
-        umask=0o027,
-        is_user=True,
-        environment={"HOME": "/usr"},
-    ),
-    Case(
-        "read-only checkout, HOME and XDG folders of a user, TMPDIR in memory",
-        made="read-only",
-        report="{scratch}/a/b",
-        is_user=True,
-        environment={
-            "HOME": "/proc",
-            "TMPDIR": "/dev/shm",
-            "XDG_STATE_HOME": "/proc/a",
-            "XDG_CACHE_HOME": "/proc/b",
-        },
-    ),
-    Case(
-        "nothing is UTF-8 but the checkout",
-        report=NOT_UTF8,
-        environment={"HOME": f"{{scratch}}/{NOT_UTF8}", "TMPDIR": f"{{scratch}}/{NOT_UTF8}"},
-    ),
-    Case(
-        "subfolder of a worktree, HOME relative, TMPDIR among the tests, blanks in XDG folders, POSIX in UTF-8",
-        made="worktree",
-        at="{checkout}/tests",
-        environment={
-            "HOME": "relative",
-            "TMPDIR": "{checkout}/tests",
-            "LC_ALL": "POSIX",
-            "PYTHONUTF8": "1",
-            "XDG_STATE_HOME": "{scratch}/st ate",
-            "XDG_CACHE_HOME": "{scratch}/ca che",
-        },
-    ),
-    Case("not UTF-8 in ASCII", NOT_UTF8, environment=ASCII, code=2, says="is not UTF-8"),
-    Case(
-        "compiled elsewhere from a subfolder of an odd path",
-        ODD,
-        at="{checkout}/tests",
-        words=("compile", "-o", "{report}"),
-        report="{scratch}/generated",
-    ),
-    Case("a new test from a subfolder", at="{checkout}/tests", words=("new", "sil-more")),
+    together("not UTF-8 in ASCII"),
+    together("odd path", "compiled elsewhere", "a subfolder"),
+    together("a new test from a subfolder"),
 )
 
 

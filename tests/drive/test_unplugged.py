@@ -8,9 +8,7 @@ import itertools
 import signal
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -55,75 +53,46 @@ class Lateness:
             self.worst = max(self.worst, time.monotonic() - begin - 0.002)
 
 
-def unplug(run: Run) -> None:
-    run.rig.order("unplug")
-
-
-def unplug_with_power(run: Run) -> None:
-    run.rig.order("unplug power")
-
-
-def kill_rig(run: Run) -> None:
-    run.rig.process.kill()
-
-
-def reset(run: Run) -> None:
-    run.rig.order("reset")
-
-
-def kill(run: Run, module: str) -> None:
-    run.kill(module)
-
-
-def stop(run: Run, module: str) -> None:
-    run.kill(module, signal.SIGSTOP)
-
-
-def kill_runner(run: Run) -> None:
-    run.runner.kill()
-
-
 GANTRY, MODEL, SANDBOX = "services.gantry", "services.dynamic_model", "dodo_dsl.run.process.sandbox"
 
 
 @dataclass(frozen=True)
 class Way:
-    """What is done, and what is said then; a killed runner says nothing."""
+    """What is done: an order to the rig, or a signal to a program; and what is said then, a killed runner nothing."""
 
-    name: str
-    pull: Callable[[Run], None]
+    pull: str
     reason: str
     isolation: str = "host"
     """As on a real rig."""
     begin: float = BEGIN
     """s until braking begins, or the rig stands."""
-    module: str = ""
-    """The program that it is done to."""
     short: bool = False
     """Whether ``make test`` does it; the others end in the same way, and are for ``make proof``."""
 
 
-def killed(name: str, module: str, reason: str) -> Way:
-    return Way(name, partial(kill, module=module), reason, module=module)
-
-
-def stopped(name: str, module: str, reason: str, short: bool = False) -> Way:
-    return Way(name, partial(stop, module=module), reason, module=module, short=short)
-
-
+KILLED = "was killed by SIGKILL"
 WAYS = (
-    Way("unplug", unplug, "is lost: ", short=True),
-    Way("unplug_with_power", unplug_with_power, "is lost: ", begin=AT_ONCE),
-    Way("kill_rig", kill_rig, "is lost: "),
-    Way("reset", reset, "RESTARTED"),
-    killed("kill_gantry", GANTRY, "service 'pose' of layer action was killed by SIGKILL"),
-    stopped("stop_gantry", GANTRY, "no Frame of the vehicle has come for 2 s", short=True),
-    killed("kill_model", MODEL, "service 'vehicle' of layer action was killed by SIGKILL"),
-    stopped("stop_model", MODEL, "no KinematicState of the vehicle has come for 1 s"),
-    killed("kill_sandbox", SANDBOX, "the test's sandbox ended unexpectedly"),
-    Way("kill_runner", kill_runner, ""),  # in short in tests/run/rigs/test_rig.py
-    Way("kill_runner", kill_runner, "", isolation="network"),
+    Way("order unplug", "is lost: ", short=True),
+    Way("order unplug power", "is lost: ", begin=AT_ONCE),
+    Way("kill rig", "is lost: "),
+    Way("order reset", "RESTARTED"),
+    Way(f"kill {GANTRY}", f"service 'pose' of layer action {KILLED}"),
+    Way(f"stop {GANTRY}", "no Frame of the vehicle has come for 2 s", short=True),
+    Way(f"kill {MODEL}", f"service 'vehicle' of layer action {KILLED}"),
+    Way(f"stop {MODEL}", "no KinematicState of the vehicle has come for 1 s"),
+    Way(f"kill {SANDBOX}", "the test's sandbox ended unexpectedly"),
+    Way("kill runner", ""),  # in short in tests/run/rigs/test_rig.py
+    Way("kill runner", "", isolation="network"),
 )
+
+
+def pull(run: Run, verb: str, what: str) -> None:
+    if verb == "order":
+        run.rig.order(what)
+    elif what in ("rig", "runner"):
+        (run.rig.process if what == "rig" else run.runner).kill()
+    else:
+        run.kill(what, signal.SIGKILL if verb == "kill" else signal.SIGSTOP)
 
 
 def brakes(at: float, poses: list[Pose], begin: float, slack: float) -> None:
@@ -140,13 +109,14 @@ def brakes(at: float, poses: list[Pose], begin: float, slack: float) -> None:
 
 def pull_the_plug(run: Run, way: Way) -> None:
     """Pull it as the rig drives, and see it come to rest in its own time."""
+    verb, _, what = way.pull.partition(" ")
     at_its_start(run)
-    if way.module:
-        run.find(way.module)
+    if "." in what:
+        run.find(what)  # which takes a while
     on_its_way(run)
     with Lateness() as lateness:
-        way.pull(run)
-        if way.pull is kill_rig:
+        pull(run, verb, what)
+        if way.pull == "kill rig":
             return
         at, seen = run.rig.now(), len(run.rig.poses)
         run.rig.until(lambda pose: pose.t > at + BEGIN, 60)
@@ -172,10 +142,7 @@ def nothing_is_left(run: Run) -> bool:
 @pytest.mark.usefixtures("firmware")
 @pytest.mark.parametrize(
     "way",
-    [
-        pytest.param(way, id=f"{way.name}-{way.isolation}", marks=[] if way.short else [pytest.mark.proof])
-        for way in WAYS
-    ],
+    [pytest.param(w, id=f"{w.pull}, {w.isolation}", marks=[] if w.short else [pytest.mark.proof]) for w in WAYS],
 )
 def test_the_outcome_is_error_and_the_rig_comes_to_rest(tmp_path: Path, way: Way) -> None:
     with Hardware(tmp_path / "port") as rig, running(tmp_path, rig, way.isolation) as run:

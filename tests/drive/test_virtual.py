@@ -1,31 +1,19 @@
 """Whole tests with clock virtual: applications that act by their own time."""
 
-import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
-from tests.drive.applications import ROOT, dodo, results
+from tests.drive.applications import ROOT, dodo, program, results
 
 pytestmark = pytest.mark.slow
 
 HERE = Path(__file__).parent
 STRAIGHT = "sil-closed-straight"
 OUT = ["opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"]
-
-
-def application(folder: Path, *process: str) -> Path:
-    """A compose file for a program in ``folder``."""
-    command, about = "--cid=111 --name=video0.argb", {"in": [], "out": OUT}
-    service = {"image": "x", "command": command, "x-dodo": about, "x-dodo-process": [*process]}
-    path = folder / "docker-compose.yml"
-    path.write_text(yaml.safe_dump({"services": {"driver": service}}))
-    return path
 
 
 def drive(compose: Path, code: int = 0, *words: str) -> dict[str, Any]:
@@ -38,7 +26,7 @@ def drive(compose: Path, code: int = 0, *words: str) -> dict[str, Any]:
 def test_one_who_acts_by_timers_drives_the_same_each_time(tmp_path: Path) -> None:
     """Also by the sandbox of the host, where its files lie elsewhere."""
     shutil.copy(HERE / "timed.py", tmp_path)
-    compose = application(tmp_path, "python", "timed.py")
+    compose = program(tmp_path, "python", "timed.py", **{"x-dodo": {"in": [], "out": OUT}})
     first, second = drive(compose), drive(compose, 0, "--isolation", "host")
     assert (first["outcome"], first["clock"], first["response"]) == ("passed", "virtual", None)
     assert first["checks"] == second["checks"]
@@ -50,32 +38,12 @@ def test_one_who_acts_by_timers_drives_the_same_each_time(tmp_path: Path) -> Non
 def test_fifty_drives_under_load_are_one(tmp_path: Path) -> None:
     """Verdict, way and pictures; with another seed it is another drive."""
     shutil.copy(HERE / "timed.py", tmp_path)
-    compose = application(tmp_path, "python", "timed.py")
+    compose = program(tmp_path, "python", "timed.py", **{"x-dodo": {"in": [], "out": OUT}})
     words = [str(ROOT / "scripts/repeat-lockstep"), STRAIGHT, "50", "--clock", "virtual", "--application", str(compose)]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=1500)
     assert done.returncode == 0, done.stdout
     assert f"{STRAIGHT}: 50 of 50 runs gave " in done.stdout
     assert drive(compose)["checks"] != drive(compose, 0, "--seed", "1")["checks"]
-
-
-@pytest.mark.proof
-def test_a_program_with_libcluons_timers_drives_the_same_each_time(tmp_path: Path) -> None:
-    """With libcluon as a header, ``LIBCLUON_HEADER=.../cluon-complete.hpp``."""
-    header = os.environ.get("LIBCLUON_HEADER")
-    if not header or not shutil.which("cmake") or not shutil.which("g++"):
-        pytest.skip("LIBCLUON_HEADER names no cluon-complete.hpp, or cmake or g++ is not installed")
-    made = tmp_path / "made"
-    made.mkdir()
-    words = [sys.executable, "-m", "dodo_dsl", "new", "--application", "--language", "cpp"]
-    subprocess.run(words, cwd=made, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True)
-    shutil.copy(HERE / "timed.cpp", made / "steering.cpp")
-    shutil.copy(header, made / "cluon-complete.hpp")
-    for words in (["cmake", "-B", "build"], ["cmake", "--build", "build", "--target", "steering"]):
-        subprocess.run(words, cwd=made, check=True, capture_output=True, timeout=600)
-    compose = application(made, "build/steering")
-    first = drive(compose)
-    assert first["outcome"] == "passed"
-    assert all(drive(compose)["checks"] == first["checks"] for _ in range(4))
 
 
 SPINS = """\
@@ -93,7 +61,7 @@ with SharedMemory.attach(name) as memory:
 @pytest.mark.proof
 def test_one_who_computes_without_end_is_named(tmp_path: Path) -> None:
     (tmp_path / "spins.py").write_text(SPINS)
-    test = drive(application(tmp_path, "python", "spins.py"), 1)
+    test = drive(program(tmp_path, "python", "spins.py", **{"x-dodo": {"in": [], "out": OUT}}), 1)
     assert test["outcome"] == "failed"
-    assert "of service 'driver' computed for 2 s without waiting; " in test["reason"]
+    assert "of service 'app' computed for 2 s without waiting; " in test["reason"]
     assert "with clock: virtual the test goes on only when all threads wait" in test["reason"]

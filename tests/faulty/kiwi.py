@@ -1,10 +1,10 @@
 """The programs of the example application, and decorators that make them faulty.
 
-A fault alters one loaded program: it replaces a function of it by a wrapped one. Every ``begin`` is called once for a
-program and gives the function that is called from then on, so that what it remembers begins anew.
+A fault alters the one program of its process: it replaces a function of it by a wrapped one.
 """
 
 import importlib.util
+import itertools
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,12 @@ Sent = tuple[Any, int | None, int]
 HANDSHAKE = "SystemStatusMessage"
 
 
+def numbered() -> Callable[[], int]:
+    """Gives 0, 1, 2 and so on: which frame or message it is."""
+    numbers = itertools.count()
+    return lambda: next(numbers)
+
+
 def program(name: str) -> Program:
     """A new copy of one of the examples' programs."""
     spec = importlib.util.spec_from_file_location(name, EXAMPLES / FOLDERS[name] / f"{name}.py")
@@ -40,41 +46,41 @@ def program(name: str) -> Program:
     return module
 
 
-def driving(begin: Callable[[], Driving]) -> Make:
+def driving(change: Driving) -> Make:
     """Changes what ``Driver.drive`` decides."""
 
     def make(steering: Program) -> None:
-        change, drive = begin(), steering.Driver.drive
+        drive = steering.Driver.drive
         steering.Driver.drive = lambda self, *found: change(*drive(self, *found))
 
     return make
 
 
-def finding(begin: Callable[[], Callable[[Cones], Cones]]) -> Make:
+def finding(change: Callable[[Cones], Cones]) -> Make:
     """Changes which cones ``find`` finds."""
 
     def make(perception: Program) -> None:
-        change, find = begin(), perception.find
+        find = perception.find
         perception.find = lambda image: change(find(image))
 
     return make
 
 
-def seeing(begin: Callable[[], Callable[[Any], Any]]) -> Make:
+def seeing(change: Callable[[Any], Any]) -> Make:
     """Changes the image in which ``find`` looks, an array of height x width x 4 bytes."""
 
     def make(perception: Program) -> None:
-        change, find = begin(), perception.find
+        find = perception.find
         perception.find = lambda image: find(change(image))
 
     return make
 
 
-def announcing(begin: Callable[[], Callable[[Cones, int, int], tuple[Cones, int, int]]]) -> Make:
+def announcing(change: Callable[[Cones, int, int], tuple[Cones, int, int]]) -> Make:
     """Changes cones, number and sample time (us) of the frames that ``announce`` sends."""
 
     def make(perception: Program) -> None:
-        change, announce = begin(), perception.announce
+        announce = perception.announce
         perception.announce = lambda session, cones, frame, sample_time, source: announce(
             session, *change(cones, frame, sample_time), source
         )
@@ -82,11 +88,11 @@ def announcing(begin: Callable[[], Callable[[Cones, int, int], tuple[Cones, int,
     return make
 
 
-def sending(begin: Callable[[], Callable[[Sent], Iterable[Sent]]]) -> Make:
+def sending(change: Callable[[Sent], Iterable[Sent]]) -> Make:
     """Changes what a program sends, message by message, but for the question whether the other one listens."""
 
     def make(module: Program) -> None:
-        change, plain = begin(), module.Session
+        plain = module.Session
 
         class FaultySession(plain):  # type: ignore[misc, valid-type]
             def send(self, message: Any, sample_time: int | None = None, sender_stamp: int = 0) -> bytes:
@@ -101,11 +107,10 @@ def sending(begin: Callable[[], Callable[[Sent], Iterable[Sent]]]) -> Make:
     return make
 
 
-def framing(begin: Callable[[], Callable[[], None]]) -> Make:
+def framing(act: Callable[[], None]) -> Make:
     """Does something before each frame is processed, in either program."""
 
     def make(module: Program) -> None:
-        act = begin()
         owner, name = (module.Driver, "drive") if module.__name__ == STEERING else (module, "find")
         process = getattr(owner, name)
 

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from tests.faulty.kiwi import Cones, Make, Program, Sent, announcing, finding, framing, sending
+from tests.faulty.kiwi import Cones, Make, Program, Sent, announcing, finding, framing, numbered, sending
 
 OWN_CID = 111
 LATER = 30
@@ -14,30 +14,26 @@ LEAK_BYTES, LEAK_FRAMES = 50_000_000, 50
 
 def stamped(stamp: int) -> Make:
     """Another sender stamp than the wiring's."""
-    return sending(lambda: lambda sent: [(sent[0], sent[1], stamp)])
+    return sending(lambda sent: [(sent[0], sent[1], stamp)])
 
 
 def at_times(change: Callable[[int | None], int | None]) -> Make:
     """Other sample times (us; None is now)."""
-    return sending(lambda: lambda sent: [(sent[0], change(sent[1]), sent[2])])
+    return sending(lambda sent: [(sent[0], change(sent[1]), sent[2])])
 
 
 def repeated(times: int) -> Make:
     """Every message many times."""
-    return sending(lambda: lambda sent: [sent] * times)
+    return sending(lambda sent: [sent] * times)
 
 
 def silent_after(messages: int) -> Make:
     """No more messages after the first ones."""
-
-    def begin() -> Callable[[Sent], Iterable[Sent]]:
-        numbers = iter(range(1_000_000_000))
-        return lambda sent: [sent] if next(numbers) < messages else []
-
-    return sending(begin)
+    number = numbered()
+    return sending(lambda sent: [sent] if number() < messages else [])
 
 
-def every_second() -> Callable[[Sent], Iterable[Sent]]:
+def every_second() -> Make:
     """The messages of every second frame, by their sample time."""
     times: list[int | None] = []
 
@@ -46,10 +42,10 @@ def every_second() -> Callable[[Sent], Iterable[Sent]]:
             times.append(sent[1])
         return [sent] if len(times) % 2 else []
 
-    return change
+    return sending(change)
 
 
-def before() -> Callable[[Sent], Iterable[Sent]]:
+def before() -> Make:
     """Each message of the frame before in place of that of this one, with its sample time."""
     last: dict[str, Sent] = {}
 
@@ -58,7 +54,7 @@ def before() -> Callable[[Sent], Iterable[Sent]]:
         held, last[name] = last.get(name, sent), sent
         return [held]
 
-    return change
+    return sending(change)
 
 
 def at_nothing(cones: Cones) -> Cones:
@@ -79,7 +75,7 @@ def fixed_cid(program: Program) -> None:
     program.Session = lambda _cid: session(OWN_CID)
 
 
-def frame_before() -> Callable[[Cones, int, int], tuple[Cones, int, int]]:
+def frame_before() -> Make:
     """Each frame announced as the one before it."""
     times: list[int] = []
 
@@ -87,22 +83,13 @@ def frame_before() -> Callable[[Cones, int, int], tuple[Cones, int, int]]:
         times.append(sample_time)
         return cones, frame, times.pop(0) if len(times) > 1 else sample_time
 
-    return change
+    return announcing(change)
 
 
-def each_frame(act: Callable[[], None]) -> Make:
-    """Something done in every frame."""
-    return framing(lambda: act)
-
-
-def at_frame(number: int, act: Callable[[], None]) -> Make:
+def at_frame(frame: int, act: Callable[[], None]) -> Make:
     """Something done once, in a frame counted from 0."""
-
-    def begin() -> Callable[[], None]:
-        numbers = iter(range(1_000_000_000))
-        return lambda: act() if next(numbers) == number else None
-
-    return framing(begin)
+    number = numbered()
+    return framing(lambda: act() if number() == frame else None)
 
 
 def computing(seconds: float) -> Callable[[], None]:
@@ -150,17 +137,17 @@ def ends(code: int) -> Callable[[], None]:
 PERCEPTION_CONDUCT: dict[str, Make] = {
     "sample-time-now": at_times(lambda _: None),
     "sample-time-zero": at_times(lambda _: 0),
-    "sample-time-before": announcing(frame_before),
+    "sample-time-before": frame_before(),
     "stamp-perception": stamped(7),
     "fixed-cid": fixed_cid,
-    "slow-computing": each_frame(computing(0.5)),
-    "slow-sleeping": each_frame(sleeping(0.5)),
-    "leaks": framing(leaking),
+    "slow-computing": framing(computing(0.5)),
+    "slow-sleeping": framing(sleeping(0.5)),
+    "leaks": framing(leaking()),
     "ends-0": at_frame(LATER, ends(0)),
     "ends-1": at_frame(LATER, ends(1)),
     "crashes-at-start": crash_at_start,
     "crashes-at-first": at_frame(0, crash),
-    "crashes-at-nothing": finding(lambda: at_nothing),
+    "crashes-at-nothing": finding(at_nothing),
 }
 STEERING_CONDUCT: dict[str, Make] = {
     "stamp-steering": stamped(7),
@@ -169,7 +156,7 @@ STEERING_CONDUCT: dict[str, Make] = {
     "silent": silent_after(0),
     "silent-later": silent_after(2 * LATER),
     "floods": repeated(200),
-    "every-second": sending(every_second),
-    "answer-before": sending(before),
+    "every-second": every_second(),
+    "answer-before": before(),
     "crashes-later": at_frame(LATER, crash),
 }

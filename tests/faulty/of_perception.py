@@ -7,7 +7,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from tests.faulty.kiwi import Cones, Make, Program, finding, seeing
+from tests.faulty.kiwi import Cones, Make, Program, finding, numbered, seeing
 
 SEED = 7
 LATER = 30
@@ -17,7 +17,7 @@ OTHER = {"yellow": "blue", "blue": "yellow"}
 
 def each_cone(change: Callable[[Any], Any]) -> Make:
     """Every cone changed by itself; ones that become None are not found."""
-    return finding(lambda: lambda cones: [new for new in map(change, cones) if new is not None])
+    return finding(lambda cones: [new for new in map(change, cones) if new is not None])
 
 
 def swapped(cone: Any) -> Any:
@@ -57,12 +57,12 @@ def in_pixels(cone: Any) -> Any:
     return cone._replace(x=cone.x * WIDTH, y=cone.y * HEIGHT, width=cone.width * WIDTH, height=cone.height * HEIGHT)
 
 
-def doubled() -> Callable[[Cones], Cones]:
+def doubled(cones: Cones) -> Cones:
     """Every cone found twice."""
-    return lambda cones: [*cones, *cones]
+    return [*cones, *cones]
 
 
-def late() -> Callable[[Cones], Cones]:
+def late() -> Make:
     """The cones of the frame before, none at first."""
     last: list[Cones] = [[]]
 
@@ -70,17 +70,13 @@ def late() -> Callable[[Cones], Cones]:
         last.append(cones)
         return last.pop(0)
 
-    return change
+    return finding(change)
 
 
 def from_frame(frames: int, change: Callable[[Cones], Cones]) -> Make:
     """Cones changed in all frames after the first ones."""
-
-    def begin() -> Callable[[Cones], Cones]:
-        numbers = iter(range(1_000_000_000))
-        return lambda cones: change(cones) if next(numbers) >= frames else cones
-
-    return finding(begin)
+    number = numbered()
+    return finding(lambda cones: change(cones) if number() >= frames else cones)
 
 
 def ghosts(count: int) -> Make:
@@ -93,12 +89,12 @@ def ghosts(count: int) -> Make:
             colour = draw.choice(("yellow", "blue"))
             return perception.Patch(colour, draw.uniform(0.1, 0.8), draw.uniform(0.55, 0.8), 0.03, 0.07)
 
-        finding(lambda: lambda cones: [*cones, *(ghost() for _ in range(count))])(perception)
+        finding(lambda cones: [*cones, *(ghost() for _ in range(count))])(perception)
 
     return make
 
 
-def previous() -> Callable[[Any], Any]:
+def previous() -> Make:
     """The picture before, the first one twice."""
     kept: list[Any] = []
 
@@ -106,12 +102,7 @@ def previous() -> Callable[[Any], Any]:
         kept.append(image)
         return kept.pop(0) if len(kept) > 1 else image
 
-    return change
-
-
-def each_picture(change: Callable[[Any], Any]) -> Make:
-    """Every picture changed by itself."""
-    return seeing(lambda: change)
+    return seeing(change)
 
 
 def mirrored(image: Any) -> Any:
@@ -141,12 +132,12 @@ PERCEPTION_FAULTS: dict[str, Make] = {
     "boxes-shifted": shifted(20 / WIDTH),
     "boxes-doubled": finding(doubled),
     "ghosts": ghosts(3),
-    "blind": finding(lambda: lambda _: []),
+    "blind": finding(lambda _: []),
     "blind-later": from_frame(LATER, lambda _: []),
     "pixels": each_cone(in_pixels),
-    "frame-late": finding(late),
-    "picture-previous": seeing(previous),
-    "picture-mirrored": each_picture(mirrored),
-    "picture-red-blue": each_picture(red_for_blue),
-    "picture-i420": each_picture(i420_as_argb),
+    "frame-late": late(),
+    "picture-previous": previous(),
+    "picture-mirrored": seeing(mirrored),
+    "picture-red-blue": seeing(red_for_blue),
+    "picture-i420": seeing(i420_as_argb),
 }

@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from tests.faulty.kiwi import Driving, Make, driving
+from tests.faulty.kiwi import Driving, Make, driving, numbered
 
 SEED = 7
 LIMIT = 0.290888  # rad, the largest request of the example
@@ -17,91 +17,67 @@ LATER, JUDGED = 30, 60
 
 def steer(change: Callable[[float], float]) -> Make:
     """Each request changed by itself."""
-    return driving(lambda: lambda angle, pedal: (change(angle), pedal))
+    return driving(lambda angle, pedal: (change(angle), pedal))
 
 
 def press(change: Callable[[float], float]) -> Make:
     """Each pedal position changed by itself."""
-    return driving(lambda: lambda angle, pedal: (angle, change(pedal)))
+    return driving(lambda angle, pedal: (angle, change(pedal)))
 
 
 def tenth(change: Callable[[float], float]) -> Make:
     """Every tenth request changed, the first of them at once."""
-
-    def begin() -> Driving:
-        numbers = iter(range(1_000_000_000))
-        return lambda angle, pedal: (angle if next(numbers) % TENTH else change(angle), pedal)
-
-    return driving(begin)
+    number = numbered()
+    return steer(lambda angle: angle if number() % TENTH else change(angle))
 
 
 def after(frames: int, change: Driving) -> Make:
     """All frames after the first ones changed."""
-
-    def begin() -> Driving:
-        numbers = iter(range(1_000_000_000))
-        return lambda angle, pedal: change(angle, pedal) if next(numbers) >= frames else (angle, pedal)
-
-    return driving(begin)
+    number = numbered()
+    return driving(lambda angle, pedal: change(angle, pedal) if number() >= frames else (angle, pedal))
 
 
 def delayed(frames: int) -> Make:
     """Each request sent some frames later; straight ahead until then."""
+    late = deque([0.0] * frames)
 
-    def begin() -> Driving:
-        late = deque([0.0] * frames)
+    def change(angle: float) -> float:
+        late.append(angle)
+        return late.popleft()
 
-        def change(angle: float, pedal: float) -> tuple[float, float]:
-            late.append(angle)
-            return late.popleft(), pedal
-
-        return change
-
-    return driving(begin)
+    return steer(change)
 
 
 def frozen(frames: int) -> Make:
     """The request of one frame sent for ever."""
+    held: list[float] = []
 
-    def begin() -> Driving:
-        held: list[float] = []
+    def change(angle: float) -> float:
+        if len(held) <= frames:
+            held.append(angle)
+        return held[-1]
 
-        def change(angle: float, pedal: float) -> tuple[float, float]:
-            if len(held) <= frames:
-                held.append(angle)
-            return held[-1], pedal
-
-        return change
-
-    return driving(begin)
+    return steer(change)
 
 
 def noisy(deviation: float) -> Make:
     """Gaussian noise of a deviation in rad, the same in every run."""
-
-    def begin() -> Driving:
-        noise = random.Random(SEED)
-        return lambda angle, pedal: (angle + noise.gauss(0.0, deviation), pedal)
-
-    return driving(begin)
+    noise = random.Random(SEED)
+    return steer(lambda angle: angle + noise.gauss(0.0, deviation))
 
 
 def smoothed(seconds: float) -> Make:
     """A low-pass with a time constant in s, which takes the time between two frames from the wall clock."""
+    state, last = 0.0, time.monotonic()
 
-    def begin() -> Driving:
-        state, last = 0.0, time.monotonic()
+    def change(angle: float) -> float:
+        nonlocal state, last
+        now = time.monotonic()
+        state += (1.0 - math.exp((last - now) / seconds)) * (angle - state)
+        last = now
+        return state
 
-        def change(angle: float, pedal: float) -> tuple[float, float]:
-            nonlocal state, last
-            now = time.monotonic()
-            state += (1.0 - math.exp((last - now) / seconds)) * (angle - state)
-            last = now
-            return state, pedal
-
-        return change
-
-    return driving(begin)
+    return steer(change)
 
 
 STEERING_FAULTS: dict[str, Make] = {
@@ -122,7 +98,7 @@ STEERING_FAULTS: dict[str, Make] = {
     "steering-nan-tenth": tenth(lambda _: math.nan),
     "steering-infinite": steer(lambda _: math.inf),
     "steering-infinite-tenth": tenth(lambda _: math.inf),
-    "steering-swapped": driving(lambda: lambda angle, pedal: (pedal, angle)),
+    "steering-swapped": driving(lambda angle, pedal: (pedal, angle)),
     "steering-wall-clock": smoothed(1.0),
     "steering-good-then-bad": after(JUDGED, lambda angle, pedal: (-angle, pedal)),
     "pedal-zero": press(lambda _: 0.0),

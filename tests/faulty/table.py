@@ -12,7 +12,7 @@ TABLE, RANGES_TABLE = (Path(__file__).with_name(name) for name in ("faults.yml",
 class Fault:
     """A faulty application, and the shipped ``test`` that has to fail with ``words``, a regular expression.
 
-    ``kind`` is what the fault spoils, ``does`` a sentence. ``due`` is what is missing in DoDo where nothing catches it.
+    ``kind`` is what the fault spoils, ``does`` a sentence.
     """
 
     name: str
@@ -20,7 +20,6 @@ class Fault:
     does: str
     test: str
     words: str
-    due: str = ""
 
 
 def _faults(table: Path) -> dict[str, Fault]:

@@ -10,6 +10,7 @@ import fcntl
 import json
 import os
 import platform
+import re
 import resource
 import signal
 import socket
@@ -162,16 +163,76 @@ def _is_readable(path: str) -> bool:
     return any(mark in begin for mark in (b"dodo", b'"model"', b"\x0d\xa4"))
 
 
-@attack
-def lease_on_a_file_of_the_machine() -> object:
-    """Who opens it then has to wait."""
-    with open(Path(sys.prefix, "pyvenv.cfg")) as file:
-        return fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_RDLCK) == 0
+def _status(name: str) -> str:
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(line.split()[1] for line in lines if line.startswith(f"{name}:"))
 
 
-@attack
-def memory_at_known_addresses() -> object:
-    return [hex(kind) for kind in (0x40000, 0x400008, 0x7FFFFFFF, 0xFFFDFFFF) if _libc.personality(kind) != -1]
+def _worked(call: Callable[..., object], *arguments: object) -> str:
+    """What a call did that raises nothing."""
+    call(*arguments)
+    return f"{call.__name__}{arguments}"
+
+
+def _opened(path: str, flags: int = os.O_RDONLY) -> int:
+    return os.open(path, flags)
+
+
+def _connected(kind: int, address: object) -> str:
+    with socket.socket(kind, socket.SOCK_STREAM) as client:
+        client.settimeout(1)
+        return _worked(client.connect, address)
+
+
+_CAPABILITIES = ("CapInh", "CapPrm", "CapEff", "CapBnd", "CapAmb")
+_ADDRESSES = (0x40000, 0x400008, 0x7FFFFFFF, 0xFFFDFFFF)
+_NETWORKS = ("lo", "sit0", "tunl0", "ip6tnl0")
+_ENDLESS = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+ATTACKS |= {
+    # who then opens it has to wait
+    "lease-on-a-file-of-the-machine": lambda: (
+        fcntl.fcntl(_opened(f"{sys.prefix}/pyvenv.cfg"), fcntl.F_SETLEASE, 0) == 0
+    ),
+    "memory-at-known-addresses": lambda: [hex(kind) for kind in _ADDRESSES if _libc.personality(kind) != -1],
+    "has-capabilities": lambda: {name: _status(name) for name in _CAPABILITIES if int(_status(name), 16)},
+    "may-gain-privileges": lambda: _status("NoNewPrivs") != "1",
+    "has-no-filter": lambda: _status("Seccomp") != "2",
+    "is-root": lambda: os.getuid() == 0 or os.geteuid() == 0,
+    "becomes-root": lambda: _worked(os.setuid, 0),
+    "becomes-root-in-a-saved-id": lambda: _worked(os.setresuid, 0, 0, 0),
+    "changes-groups": lambda: _worked(os.setgroups, [0]),
+    "has-groups-of-root": lambda: os.getgid() == 0 or 0 in os.getgroups(),
+    "inherited-descriptors": lambda: INHERITED,
+    "raw-socket": lambda: socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_ICMP),
+    "raw-socket-of-version-6": lambda: socket.socket(socket.AF_INET6, socket.SOCK_RAW, socket.IPPROTO_ICMPV6),
+    "packet-socket": lambda: socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 3),
+    "packet-socket-without-headers": lambda: socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM, 3),
+    "socket-of-the-kernels-ciphers": lambda: socket.socket(socket.AF_ALG, socket.SOCK_SEQPACKET, 0),
+    "socket-to-the-hypervisor": lambda: socket.socket(socket.AF_VSOCK, socket.SOCK_STREAM),
+    "reaches-the-internet": lambda: _connected(socket.AF_INET, ("1.1.1.1", 53)),
+    "sends-to-the-networks-of-the-machine": lambda: socket.socket(type=socket.SOCK_DGRAM).sendto(b"x", ("10.0.0.1", 9)),
+    "other-devices-of-the-network": lambda: [name for _, name in socket.if_nameindex() if name not in _NETWORKS],
+    "abstract-socket-of-the-machine": lambda: _connected(socket.AF_UNIX, "\0" + Path(PLACES["secret"]).name),
+    "makes-a-device": lambda: _worked(os.mknod, "/tmp/mine", stat.S_IFBLK | 0o600, os.makedev(254, 0)),
+    "types-into-the-terminal": lambda: fcntl.ioctl(_opened("/dev/ptmx", os.O_RDWR), 0x5412, b"x") == 0,
+    "writes-a-core": lambda: resource.getrlimit(resource.RLIMIT_CORE)[1],
+    "raises-its-limits": lambda: _worked(resource.setrlimit, resource.RLIMIT_NPROC, _ENDLESS),
+    "opens-files-without-end": lambda: [_opened("/dev/null") for _ in range(20_000)] != [],
+    # System V shared memory that is not this test's
+    "segments-of-the-machine": lambda: Path("/proc/sysvipc/shm").read_text().count("\n") > 50,
+    "shared-memory-of-the-machine": lambda: Path(PLACES["secret"]).name in os.listdir("/dev/shm"),
+    "secrets-in-the-environment": lambda: re.findall(r"\bCI_\w*|\w*TOKEN\w*|\w*SECRET\w*", " ".join(os.environ)),
+    "root-of-the-first-process": lambda: os.listdir("/proc/1/root" + PLACES["repository"]),
+    "slower-clock-for-others": lambda: _worked(os.setpriority, os.PRIO_PROCESS, 0, -20),
+    "real-time-priority": lambda: _worked(os.sched_setscheduler, 0, os.SCHED_FIFO, os.sched_param(50)),
+    "locks-memory": lambda: resource.getrlimit(resource.RLIMIT_MEMLOCK)[1] > 1 << 30 and _libc.mlockall(3) == 0,
+    # where the test's services meet, in any environment that it sees
+    "secrets-in-its-arguments-neighbours": lambda: [
+        path for path in Path("/proc").glob("[0-9]*/environ") if b"DODO_CHANNEL" in path.read_bytes()
+    ],
+    # its own variables and words, and one of the runner, name the folder
+    "sees-names-of-the-machines-folders": lambda: os.path.lexists(PLACES["folder"]),
+}
 
 
 @attack
@@ -191,144 +252,6 @@ def kills_all_that_it_can() -> object:
             os.kill(pid, signal.SIGKILL)
             hit.append(pid)
     return hit
-
-
-def _status(name: str) -> str:
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return next(line.split()[1] for line in lines if line.startswith(f"{name}:"))
-
-
-@attack
-def has_capabilities() -> object:
-    return {
-        name: _status(name) for name in ("CapInh", "CapPrm", "CapEff", "CapBnd", "CapAmb") if int(_status(name), 16)
-    }
-
-
-@attack
-def may_gain_privileges() -> object:
-    return _status("NoNewPrivs") != "1"
-
-
-@attack
-def has_no_filter() -> object:
-    return _status("Seccomp") != "2"
-
-
-@attack
-def is_root() -> object:
-    return os.getuid() == 0 or os.geteuid() == 0
-
-
-@attack
-def becomes_root() -> object:
-    os.setuid(0)
-    return "setuid(0)"
-
-
-@attack
-def becomes_root_in_a_saved_id() -> object:
-    os.setresuid(0, 0, 0)
-    return "setresuid(0, 0, 0)"
-
-
-@attack
-def changes_groups() -> object:
-    os.setgroups([0])
-    return "setgroups([0])"
-
-
-@attack
-def has_groups_of_root() -> object:
-    return os.getgid() == 0 or 0 in os.getgroups()
-
-
-@attack
-def inherited_descriptors() -> object:
-    return INHERITED
-
-
-@attack
-def raw_socket() -> object:
-    return socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_ICMP)
-
-
-@attack
-def raw_socket_of_version_6() -> object:
-    return socket.socket(socket.AF_INET6, socket.SOCK_RAW, socket.IPPROTO_ICMPV6)
-
-
-@attack
-def packet_socket() -> object:
-    return socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 3)
-
-
-@attack
-def packet_socket_without_headers() -> object:
-    return socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM, 3)
-
-
-@attack
-def socket_of_the_kernels_ciphers() -> object:
-    return socket.socket(socket.AF_ALG, socket.SOCK_SEQPACKET, 0)
-
-
-@attack
-def socket_to_the_hypervisor() -> object:
-    return socket.socket(socket.AF_VSOCK, socket.SOCK_STREAM)
-
-
-@attack
-def reaches_the_internet() -> object:
-    with socket.create_connection(("1.1.1.1", 53), timeout=1):
-        return "connected"
-
-
-@attack
-def sends_to_the_networks_of_the_machine() -> object:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        return sender.sendto(b"x", ("10.0.0.1", 9))
-
-
-@attack
-def other_devices_of_the_network() -> object:
-    return [name for _, name in socket.if_nameindex() if name not in ("lo", "sit0", "tunl0", "ip6tnl0")]
-
-
-@attack
-def abstract_socket_of_the_machine() -> object:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-        client.connect("\0" + Path(PLACES["secret"]).name)
-        return "connected"
-
-
-@attack
-def makes_a_device() -> object:
-    os.mknod("/tmp/mine", stat.S_IFBLK | 0o600, os.makedev(254, 0))
-    return "a block device"
-
-
-@attack
-def types_into_the_terminal() -> object:
-    with open("/dev/ptmx", "rb+", buffering=0) as terminal:
-        return fcntl.ioctl(terminal, 0x5412, b"x") == 0
-
-
-@attack
-def writes_a_core() -> object:
-    return resource.getrlimit(resource.RLIMIT_CORE)[1]
-
-
-@attack
-def raises_its_limits() -> object:
-    resource.setrlimit(resource.RLIMIT_NPROC, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-    return "processes without limit"
-
-
-@attack
-def opens_files_without_end() -> object:
-    held = [os.open("/dev/null", os.O_RDONLY) for _ in range(20_000)]
-    return len(held)
 
 
 @attack
@@ -359,56 +282,12 @@ def writes_a_file_without_end() -> object:
 
 
 @attack
-def segments_of_the_machine() -> object:
-    """System V shared memory that is not this test's."""
-    return Path("/proc/sysvipc/shm").read_text().count("\n") > 50
-
-
-@attack
-def shared_memory_of_the_machine() -> object:
-    return [name for name in os.listdir("/dev/shm") if name == Path(PLACES["secret"]).name]
-
-
-@attack
-def secrets_in_the_environment() -> object:
-    return {name for name in os.environ if name.startswith("CI_") or "TOKEN" in name or "SECRET" in name}
-
-
-@attack
 def link_out_of_the_sandbox() -> object:
     os.symlink(PLACES["results"], "/tmp/link-out")
     try:
         return os.listdir("/tmp/link-out")
     finally:
         os.unlink("/tmp/link-out")
-
-
-@attack
-def root_of_the_first_process() -> object:
-    return os.listdir("/proc/1/root" + PLACES["repository"])
-
-
-@attack
-def slower_clock_for_others() -> object:
-    os.setpriority(os.PRIO_PROCESS, 0, -20)
-    return "nice -20"
-
-
-@attack
-def real_time_priority() -> object:
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
-    return "SCHED_FIFO"
-
-
-@attack
-def locks_memory() -> object:
-    return resource.getrlimit(resource.RLIMIT_MEMLOCK)[1] > 1 << 30 and _libc.mlockall(3) == 0
-
-
-@attack
-def secrets_in_its_arguments_neighbours() -> object:
-    """Where the test's services meet, in any environment that it sees."""
-    return [path for path in Path("/proc").glob("[0-9]*/environ") if b"DODO_CHANNEL" in path.read_bytes()]
 
 
 @attack
@@ -430,12 +309,6 @@ def takes_the_place_of_folders_of_services() -> object:
             except OSError:
                 pass
     return through
-
-
-@attack
-def sees_names_of_the_machines_folders() -> object:
-    """Its own variables and words, and one of the runner, name the folder."""
-    return os.path.lexists(PLACES["folder"])
 
 
 @attack

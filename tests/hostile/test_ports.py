@@ -1,11 +1,7 @@
 """Programs of a test on the host open the port of its rig, as root and as an ordinary user."""
 
-import json
 import os
 import pty
-import shutil
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,30 +9,20 @@ from typing import Any
 
 import pytest
 
-from tests.hostile.test_processes import words_as_user
-from tests.run.desk import ROOT
+from tests.hostile.command import USERS, told_by
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("ports")]
 
 
-@pytest.fixture(scope="module", params=["root", "user"])
+@pytest.fixture(scope="module", params=USERS)
 def told(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
     """What the programs of one test reached. The port is a pseudo terminal that everybody may open."""
-    if request.param == "root" and os.getuid() != 0:
-        pytest.skip("only root can try it as root")
     master, slave = pty.openpty()
     os.chmod(os.ttyname(slave), 0o666)  # noqa: PTH101
     with tempfile.TemporaryDirectory(prefix="dodo-hostile-") as name:
-        folder, port = Path(name), Path(name) / "port"
+        port = Path(name, "port")
         port.symlink_to(os.ttyname(slave))
-        as_user = words_as_user(folder) if request.param == "user" and os.getuid() == 0 else []
-        words = [*as_user, sys.executable, "-m", "tests.hostile.reach_port", name, str(port)]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "HOME": name}
-        done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=ROOT, env=environment)
-        assert done.returncode == 0, done.stdout + done.stderr
-        yield json.loads(done.stdout.splitlines()[-1])
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir()
+        yield told_by(request.param, "tests.hostile.reach_port", Path(name), str(port))
     os.close(master)
     os.close(slave)
 

@@ -46,7 +46,7 @@ from services.scene import scene
 from services.scene.meshes import load_obj
 from services.scene.textures import load_picture
 from services.virtual_camera.optics import load_with_alpha
-from tests.drive.applications import results
+from tests.drive.applications import program, results
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
 from tests.run.helpers import Bench
 
@@ -70,31 +70,86 @@ def jpeg(width: int, height: int) -> bytes:
     return b"\xff\xd8" + comment + b"\xff\xc2\x00\x0b\x08" + struct.pack(">HH", height, width) + b"\x01\x01\x11\x00"
 
 
-BOMBS = {"png": png(SIDE, SIDE), "jpg": jpeg(SIDE, SIDE)}
+BOMBS = {"bomb.png": png(SIDE, SIDE), "bomb.jpg": jpeg(SIDE, SIDE)}
 TOO_LARGE = f"an image of {SIDE} x {SIDE} pixels, expected at most {MAX_PIXELS} in all"
+UNREADABLE = (b"", b"\x89PNG\r\n\x1a\n", b"\xff\xd8", b"\xff\xd8" + b"\xff" * 50, b"BM" + bytes(60))
+FACES = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * (MAX_TRIANGLES + 1)
+OVERLAY = {"name": "a", "dimension": [1, 1], "textureFile": "map.json", "instances": [[0, 0]] * (MAX_OVERLAYS + 1)}
+DOUBLED = "\n".join(
+    f"message a.M{n} [id = {5000 + n}] {{ a.M{n + 1} x [id = 1]; a.M{n + 1} y [id = 2]; }}" for n in range(30)
+)
 
 
-@pytest.mark.parametrize("kind", BOMBS)
-@pytest.mark.parametrize("read", [load_picture, load_with_alpha, lambda path: FileCamera(path, 640, 480)])
-def test_pictures_that_unfold_are_refused_by_their_header(tmp_path: Path, kind: str, read: Callable[..., Any]) -> None:
-    path = tmp_path / f"bomb.{kind}"
-    path.write_bytes(BOMBS[kind])
-    with pytest.raises(ValueError, match=f"bomb.{kind}: {TOO_LARGE}"):
-        read(path)
+def map_of(path: Path) -> object:
+    return read_map(path.parent)
 
 
-def test_a_truth_of_such_a_picture_is_refused() -> None:
-    with pytest.raises(TruthError, match=f"desk: {TOO_LARGE}"):
-        truth.decoded(BOMBS["png"], "desk")
+def frame_of(path: Path) -> object:
+    return FileCamera(path, 640, 480)
+
+
+def truth_of(path: Path) -> object:
+    return truth.decoded(path.read_bytes(), path.name)
+
+
+PICTURES = (load_picture, load_with_alpha, frame_of)
+REFUSED: list[tuple[str, bytes, Callable[[Path], object], str]] = [
+    *((name, data, read, TOO_LARGE) for name, data in BOMBS.items() for read in PICTURES),
+    ("bomb.png", BOMBS["bomb.png"], truth_of, TOO_LARGE),
+    *(("a.png", data, load_picture, "not a readable image, expected PNG or JPEG") for data in UNREADABLE),
+    ("a.obj", FACES, load_obj, f"{MAX_TRIANGLES + 1} triangles"),
+    ("a.obj", b" \tv 0 0 0\n" * (MAX_VERTICES + 1), load_obj, f"{MAX_VERTICES + 1} vertices"),
+    ("a.obj", b"# " + b"x" * MAX_BYTES, load_obj, f"{MAX_BYTES + 2} bytes, expected at most {MAX_BYTES}"),
+    ("map.json", json.dumps({"overlay": [OVERLAY]}).encode(), map_of, f"{MAX_OVERLAYS + 1} instances of overlays"),
+    ("a.odvd", f"{DOUBLED}\nmessage a.M30 [id = 4999] {{ uint8 x [id = 1]; }}".encode(), MessageSet.load,
+     r"a\.odvd:15:9: 'a\.M14' unfolds to more than 100000 fields"),
+]  # fmt: skip
+"""A file, what is in it, who reads it, and what is said: by its header, or as it is counted, before it unfolds."""
+
+
+@pytest.mark.parametrize(("name", "content", "read", "said"), REFUSED)
+def test_what_unfolds_is_refused(
+    tmp_path: Path, name: str, content: bytes, read: Callable[[Path], object], said: str
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises((MapError, TruthError, OdvdError, ValueError), match=said):
+        read(tmp_path / name)
+
+
+def registry_of(folder: Path) -> object:
+    for number in range(30):
+        (folder / str(number)).mkdir(exist_ok=True)
+    return locate([], [folder])
+
+
+def obstacles_of(folder: Path) -> object:
+    written = [{"name": name, "lines": [[0, 0, 1, 1]] * 5} for name in "ab"]  # evaluators measure the distance to each
+    (folder / "map.json").write_text(json.dumps({"obstacles": written}))
+    return map_file.read_obstacles(folder)
+
+
+def shipped_scene(_folder: Path) -> object:
+    return scene.load_scene(Path(__file__).parents[2] / "tests_registry" / "maps" / "static-rig")
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"\x89PNG\r\n\x1a\n", b"\xff\xd8", b"\xff\xd8" + b"\xff" * 50, b"BM" + bytes(60)]
+    ("module", "limit", "most", "read", "said"),
+    [
+        (scene, "MAX_TRIANGLES", 10, shipped_scene, "map.json: more than 10 triangles of models"),
+        (scene, "MAX_TEXTURE_BYTES", 10, shipped_scene, "map.json: more than 10 bytes of"),
+        (map_file, "MAX_LINES", 9, obstacles_of, "10 lines of obstacles, expected at most 9"),
+        (registry, "MAX_FOLDERS", 20, registry_of, "has more than 20 folders: name the folder with the tests"),
+    ],
 )
-def test_a_picture_whose_size_cannot_be_read_is_not_decoded(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "a.png").write_bytes(content)
-    with pytest.raises(MapError, match="not a readable image, expected PNG or JPEG"):
-        load_picture(tmp_path / "a.png")
+def test_what_is_read_in_all_is_limited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: Any, limit: str, most: int, read: Any, said: str
+) -> None:
+    read(tmp_path)
+    monkeypatch.setattr(module, limit, most + 1 if limit == "MAX_LINES" else 1000_000_000)
+    read(tmp_path)
+    monkeypatch.setattr(module, limit, most)
+    with pytest.raises((MapError, RegistryError), match=said):
+        read(tmp_path)
 
 
 def test_sizes_in_headers_are_those_of_the_pictures() -> None:
@@ -105,51 +160,6 @@ def test_sizes_in_headers_are_those_of_the_pictures() -> None:
         for options in ([], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]):
             _, data = cv2.imencode(kind, np.zeros((123, 457, 3), np.uint8), options if kind == ".jpg" else [])
             assert picture_size(data.tobytes()) == (457, 123)
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * (MAX_TRIANGLES + 1), f"{MAX_TRIANGLES + 1} triangles"),
-        (b" \tv 0 0 0\n" * (MAX_VERTICES + 1), f"{MAX_VERTICES + 1} vertices"),
-        (b"# " + b"x" * MAX_BYTES, f"the OBJ file has {MAX_BYTES + 2} bytes, expected at most {MAX_BYTES}"),
-    ],
-    ids=["faces", "vertices", "bytes"],
-)
-def test_meshes_are_counted_before_they_are_read(tmp_path: Path, content: bytes, words: str) -> None:
-    (tmp_path / "a.obj").write_bytes(content)
-    with pytest.raises(MapError, match=words):
-        load_obj(tmp_path / "a.obj")
-
-
-@pytest.mark.parametrize(
-    ("limit", "what"), [("MAX_TRIANGLES", "triangles of models"), ("MAX_TEXTURE_BYTES", "bytes of")]
-)
-def test_what_a_map_takes_in_all_is_limited(monkeypatch: pytest.MonkeyPatch, limit: str, what: str) -> None:
-    shipped = Path(__file__).parents[2] / "tests_registry" / "maps" / "static-rig"
-    scene.load_scene(shipped)
-    monkeypatch.setattr(scene, limit, 10)
-    with pytest.raises(MapError, match=f"map.json: more than 10 {what}"):
-        scene.load_scene(shipped)
-
-
-def test_lines_of_obstacles_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Evaluators measure the distance to each line."""
-    written = [{"name": name, "lines": [[0, 0, 1, 1]] * 5} for name in "ab"]
-    (tmp_path / "map.json").write_text(json.dumps({"obstacles": written}))
-    monkeypatch.setattr(map_file, "MAX_LINES", 10)
-    map_file.read_obstacles(tmp_path)
-    monkeypatch.setattr(map_file, "MAX_LINES", 9)
-    with pytest.raises(MapError, match="10 lines of obstacles, expected at most 9"):
-        map_file.read_obstacles(tmp_path)
-
-
-def test_overlays_are_counted(tmp_path: Path) -> None:
-    (tmp_path / "a.png").touch()
-    overlay = {"name": "a", "dimension": [1, 1], "textureFile": "a.png", "instances": [[0, 0]] * (MAX_OVERLAYS + 1)}
-    (tmp_path / "map.json").write_text(json.dumps({"overlay": [overlay]}))
-    with pytest.raises(MapError, match=f"{MAX_OVERLAYS + 1} instances of overlays, expected at most {MAX_OVERLAYS}"):
-        read_map(tmp_path)
 
 
 def test_frames_that_a_message_calls_too_large_are_not_decoded(record: Callable[..., Path]) -> None:
@@ -185,28 +195,12 @@ def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> Non
     assert told == [f"frames of more than {MOST_DECODERS} cameras and formats are not decoded"]
 
 
-def test_messages_that_double_are_not_unfolded(tmp_path: Path) -> None:
-    """Messages that hold the next one twice, a billion fields in thirty, are refused."""
-    texts = [f"message a.M{n} [id = {5000 + n}] {{ a.M{n + 1} x [id = 1]; a.M{n + 1} y [id = 2]; }}" for n in range(30)]
-    (tmp_path / "a.odvd").write_text("\n".join([*texts, "message a.M30 [id = 4999] { uint8 x [id = 1]; }"]))
-    with pytest.raises(OdvdError, match=r"a\.odvd:15:9: 'a\.M14' unfolds to more than 100000 fields"):
-        MessageSet.load(tmp_path / "a.odvd")
-
-
 def test_senders_without_end_become_no_tables(record: Callable[..., Path]) -> None:
     envelopes = [message("opendlv.proxy.DistanceReading", BEGIN, stamp, distance=1.0) for stamp in range(1001)]
     path = record(envelopes)
     code, _, stderr = dodo_rec("export", path, "--csv")
     assert (code, "would become 1001 tables, expected at most 1000; choose messages with" in stderr) == (2, True)
     assert not path.with_suffix("").exists()
-
-
-def test_a_registry_is_not_searched_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for number in range(30):
-        (tmp_path / str(number)).mkdir()
-    monkeypatch.setattr(registry, "MAX_FOLDERS", 20)
-    with pytest.raises(RegistryError, match=r"has more than 20 folders: name the folder with the tests"):
-        locate([], [tmp_path])
 
 
 def test_hidden_folders_and_mounts_are_no_part_of_a_registry(small_disk: Path) -> None:
@@ -253,7 +247,7 @@ def test_a_recording_ends_at_its_limit_and_names_what_fills_it(
     assert 0.99 < event.share < 1
 
 
-def test_more_messages_than_a_second_may_have_end_the_recording() -> None:
+def test_messages_of_a_second_are_limited_in_all_and_of_a_kind() -> None:
     clock, lost = Clock(), [0]
     counter = Traffic(10**9, clock, lambda: lost[0], str)
     for second in range(3):
@@ -261,19 +255,13 @@ def test_more_messages_than_a_second_may_have_end_the_recording() -> None:
         for stamp in (1, 2):
             for _ in range(model.MOST_OF_A_KIND):
                 counter.add(envelope(5, stamp), 10)
+    with pytest.raises(FloodError, match="more than 10000 messages of a kind came within a second, most of it 5/1"):
+        counter.add(envelope(5, 1), 10)
     clock.now += 1_000_000
     counter.add(envelope(5), 10)
     lost[0] = model.MOST_PER_SECOND
     with pytest.raises(FloodError, match="more than 20000 messages came within a second, most of it 5/0"):
         counter.add(envelope(5), 10)
-
-
-def test_one_kind_of_message_may_not_flood_alone() -> None:
-    counter = Traffic(10**9, Clock(), lambda: 0, str)
-    for _ in range(model.MOST_OF_A_KIND):
-        counter.add(envelope(5, 9), 10)
-    with pytest.raises(FloodError, match="more than 10000 messages of a kind came within a second, most of it 5/9"):
-        counter.add(envelope(5, 9), 10)
 
 
 def test_in_lockstep_the_clock_counts_messages() -> None:
@@ -362,8 +350,7 @@ def test_whole_applications(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kin
     (tmp_path / "tests" / "sil-small").mkdir()
     (tmp_path / "tests" / "sil-small" / "sil-small.dodo.yml").write_text(json.dumps(about))
     (tmp_path / "app.py").write_text(BEGIN_OF_ALL + APPLICATIONS[kind][0])
-    app = {"image": "x", "command": "--cid=111 --name=video0.argb", "x-dodo-process": ["python", "app.py"]}
-    (tmp_path / "docker-compose.yml").write_text(json.dumps({"services": {"app": app}}))
+    program(tmp_path, "python", "app.py")
     (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
     output = StringIO()
     main(["run", "sil-small", "--backend", "process"], output, output)

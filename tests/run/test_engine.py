@@ -225,112 +225,48 @@ def test_the_last_figures_are_taken_once(monkeypatch: pytest.MonkeyPatch) -> Non
     assert notes.count("load and use of the machine were not measured to the end: OSError: gone") == 1
 
 
-def test_a_meter_that_breaks_costs_no_verdict() -> None:
-    def broken(_: float) -> None:
-        raise ValueError("odd")
-
-    backend = ScriptedBackend(plan(), drives(5.0), uses=broken)
-    found = outcome(backend)
-    assert (found.outcome, found.notes) == (
-        "passed",
-        ("load and use of the machine were not measured to the end: ValueError: odd",),
-    )
-    assert backend.calls[-1] == "close"
-
-
-def test_a_kept_test_is_explained() -> None:
-    backend = ScriptedBackend(plan(), drives())
-    assert run(Engine(backend.plan, backend, lambda _: None).run(keep=True))[1] == ["look inside"]
-
-
+EARLY = "after 2.0 s, before the test was decided"
+APP, CAMERA, TRACK = (
+    "application service 'app'",
+    "service 'camera' of layer environment",
+    "service 'track' of layer evaluation",
+)
+LATE = "evaluator 'track' gave no verdict within the timeout of 10 s"
+OVER, GONE = (1.0, InputEnded("camera")), (1.1, Exited("app", 0))
+PASSES: list[tuple[float, Event]] = [(3.0, PASSED), (3.0, ENDED)]
 CASES: dict[str, tuple[list[tuple[float, Event]], str, str]] = {
-    "passes": ([(1.0, PASSED), (1.0, ENDED)], "passed", "it drove"),
+    "passes": (PASSES, "passed", "it drove"),
     "fails": ([(1.0, FAILED), (1.0, ENDED)], "failed", "hit wall left"),
-    "application ends with 0": (
-        [(2.0, Exited("app", 0))],
-        "failed",
-        "application service 'app' ended with exit code 0 after 2.0 s, before the test was decided",
-    ),
-    "application crashes": (
-        [(2.0, Exited("app", 3))],
-        "failed",
-        "application service 'app' ended with exit code 3 after 2.0 s, before the test was decided",
-    ),
-    "application is killed": (
-        [(2.0, Exited("app", -9))],
-        "failed",
-        "application service 'app' was killed by SIGKILL after 2.0 s, before the test was decided",
-    ),
-    "application runs out of memory": (
-        [(2.0, Exited("app", 137, out_of_memory=True))],
-        "failed",
-        "application service 'app' ran out of memory after 2.0 s, before the test was decided",
-    ),
-    "application ends after the verdict": (
-        [(1.0, PASSED), (1.5, Exited("app", 3)), (2.0, ENDED)],
-        "passed",
-        "it drove",
-    ),
-    "application ends after the input": (
-        [(1.0, InputEnded("camera")), (1.1, Exited("app", 0)), (2.0, PASSED), (2.0, ENDED)],
-        "passed",
-        "it drove",
-    ),
-    "application ends after the input and was not good": (
-        [(1.0, InputEnded("camera")), (1.1, Exited("app", 0)), (2.0, FAILED), (2.0, ENDED)],
-        "failed",
-        "hit wall left",
-    ),
+    "application ends with 0": ([(2.0, Exited("app", 0))], "failed", f"{APP} ended with exit code 0 {EARLY}"),
+    "application is killed": ([(2.0, Exited("app", -9))], "failed", f"{APP} was killed by SIGKILL {EARLY}"),
+    "application is out of memory": ([(2.0, Exited("app", 137, True))], "failed", f"{APP} ran out of memory {EARLY}"),
+    "application ends after the verdict": ([PASSES[0], (3.1, Exited("app", 3)), (3.2, ENDED)], "passed", "it drove"),
+    "application ends after the input": ([OVER, GONE, *PASSES], "passed", "it drove"),
+    "application ends after the input, unfit": ([OVER, GONE, (2.0, FAILED), (2.0, ENDED)], "failed", "hit wall left"),
     "application crashes after the input": (
-        [(1.0, InputEnded("camera")), (1.1, Exited("app", 3)), (2.0, PASSED), (2.0, ENDED)],
-        "failed",
-        "application service 'app' ended with exit code 3 after 1.1 s, before the test was decided",
+        [OVER, (2.0, Exited("app", 3)), *PASSES], "failed", f"{APP} ended with exit code 3 {EARLY}",
     ),
-    "camera crashes": (
-        [(2.0, Exited("camera", 1))],
-        "error",
-        "service 'camera' of layer environment ended with exit code 1 after 2.0 s",
-    ),
-    "camera is killed": (
-        [(2.0, Exited("camera", 143))],
-        "error",
-        "service 'camera' of layer environment was killed by SIGTERM after 2.0 s",
-    ),
+    "camera crashes": ([(2.0, Exited("camera", 1))], "error", f"{CAMERA} ended with exit code 1 after 2.0 s"),
+    "camera is killed": ([(2.0, Exited("camera", 143))], "error", f"{CAMERA} was killed by SIGTERM after 2.0 s"),
     "camera crashes after the verdict": (
         [(1.0, PASSED), (2.0, Exited("camera", 1)), (3.0, ENDED)],
-        "error",
-        "service 'camera' of layer environment ended with exit code 1 after 2.0 s",
+        "error", f"{CAMERA} ended with exit code 1 after 2.0 s",
     ),
-    "recording runs out": ([(0.5, Exited("camera", 0)), (1.0, PASSED), (1.0, ENDED)], "passed", "it drove"),
+    "recording runs out": ([(0.5, Exited("camera", 0)), *PASSES], "passed", "it drove"),
     "evaluator crashes after its verdict": (
-        [(1.0, PASSED), (1.0, Exited("track", 2))],
-        "error",
-        "service 'track' of layer evaluation ended with exit code 2 after 1.0 s",
-    ),
-    "evaluator crashes after a verdict of failed": (
-        [(1.0, FAILED), (1.0, Exited("track", 2))],
-        "error",
-        "service 'track' of layer evaluation ended with exit code 2 after 1.0 s",
+        [(1.0, FAILED), (1.0, Exited("track", 2))], "error", f"{TRACK} ended with exit code 2 after 1.0 s",
     ),
     "no verdict": ([(1.0, ENDED)], "error", "evaluator 'track' ended without a verdict after 1.0 s"),
     "two verdicts": (
-        [(1.0, PASSED), (1.0, PASSED), (1.0, ENDED)],
-        "error",
-        "evaluator 'track' gave 2 verdicts, expected one",
+        [(1.0, PASSED), (1.0, PASSED), (1.0, ENDED)], "error", "evaluator 'track' gave 2 verdicts, expected one",
     ),
     "malformed verdict": (
-        [(1.0, Malformed("track", "a check has no name"))],
-        "error",
-        "the verdict of evaluator 'track' is malformed: a check has no name",
+        [(1.0, Malformed("track", "it is odd"))], "error", "the verdict of evaluator 'track' is malformed: it is odd",
     ),
-    "timeout": ([], "error", "evaluator 'track' gave no verdict within the timeout of 10 s"),
-    "verdict without an end": (
-        [(1.0, PASSED)],
-        "error",
-        "evaluator 'track' gave no verdict within the timeout of 10 s",
-    ),
+    "timeout": ([], "error", LATE),
+    "verdict without an end": ([(1.0, PASSED)], "error", LATE),
     "backend is gone": ([(1.0, Lost("the Docker engine went away: EOF"))], "error", "the Docker engine went away: EOF"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -340,18 +276,16 @@ def test_what_happens_after_the_begin(case: str) -> None:
     assert (found.outcome, found.reason) == (expected, reason)
 
 
+ILL = "ended with exit code 1 during set-up"
 SET_UP: dict[str, tuple[dict[str, Events], str]] = {
     "camera ends early": (
         {"environment": [(1.0, Exited("camera", 0))]},
-        "service 'camera' of layer environment ended with exit code 0 during set-up, before it was ready",
+        f"{CAMERA} ended with exit code 0 during set-up, before it was ready",
     ),
-    "camera crashes": (
-        {"environment": [(1.0, Exited("camera", 1))]},
-        "service 'camera' of layer environment ended with exit code 1 during set-up",
-    ),
+    "camera crashes": ({"environment": [(1.0, Exited("camera", 1))]}, f"{CAMERA} {ILL}"),
     "camera crashes when it is ready": (
         {**READY, "evaluation": [(0.5, Exited("camera", 1)), (1.0, Ready("track"))]},
-        "service 'camera' of layer environment ended with exit code 1 during set-up",
+        f"{CAMERA} {ILL}",
     ),
     "a program is missing": (
         {"environment": [(0.0, Unstartable("camera", "x: No such file or directory"))]},
@@ -392,8 +326,7 @@ def test_one_that_waits_for_others_has_the_time_that_these_may_take() -> None:
 
 def test_an_application_that_ends_during_set_up_fails() -> None:
     found = outcome(ScriptedBackend(plan(), {**READY, "application": [(0.0, Exited("app", 3))], "begin": []}))
-    ended = "application service 'app' ended with exit code 3 after 0.0 s, before the test was decided"
-    assert (found.outcome, found.reason) == ("failed", ended)
+    assert (found.outcome, found.reason) == ("failed", f"{APP} ended with exit code 3 {EARLY.replace('2.0', '0.0')}")
 
 
 def test_a_service_with_a_longer_set_up_is_waited_for() -> None:
@@ -551,34 +484,36 @@ def clocked(*events: tuple[float, Event], wall_s: float = 60.0) -> ScriptedBacke
     return ScriptedBackend(plan(lockstep=wall_s), {**READY, "begin": events})
 
 
-def test_a_crash_in_lockstep_is_told_at_its_test_time() -> None:
+CRASH, BEGUN = (3.0, Exited("app", 1)), (0.1, Time(0.0, False))
+CRASHED = "application service 'app' ended with exit code 1, before the test was decided"
+HIT = VerdictEvent("track", False, "hit wall left after 2.10 s", ())
+IN_LOCKSTEP: dict[str, tuple[list[tuple[float, Event]], str, str, float | None]] = {
+    "passes": ([BEGUN, (30.0, PASSED), (30.0, ENDED), (31.0, Time(120.0, True))], "passed", "it drove", 120.0),
+    "crashes": ([BEGUN, CRASH, (3.0, Time(40.5, True))], "failed", f"{CRASHED}, after 40.5 s of test time", 40.5),
+    "crashes at a time that the clock did not tell": ([(0.1, Time(40.0, False)), CRASH], "failed", CRASHED, 40.0),
+    "has no verdict": (
+        [BEGUN, (3.0, ENDED), (3.0, Time(0.5, True))],
+        "error",
+        "evaluator 'track' ended without a verdict, after 0.5 s of test time",
+        0.5,
+    ),
+    "fails at its own time": ([(1.0, HIT), (1.0, ENDED), (1.5, Time(2.1, True))], "failed", HIT.reason, 2.1),
+    "never begins": ([], "error", "the test took more than 60 s of wall time", None),
+    "takes too long": (
+        [BEGUN, (3.0, Time(12.0, False))],
+        "error",
+        "the test took more than 60 s of wall time and reached 12.0 s of test time",
+        12.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", IN_LOCKSTEP)
+def test_what_happens_in_lockstep_is_told_at_its_test_time(case: str) -> None:
     """The same in every run, and as the page of the drive counts: wall time is neither."""
-    found = outcome(clocked((0.1, Time(40.0, False)), (3.0, Exited("app", 1)), (3.0, Time(40.5, True))))
-    assert found.reason == (
-        "application service 'app' ended with exit code 1, before the test was decided, after 40.5 s of test time"
-    )
-    assert found.sim_s == 40.5
-
-
-def test_a_crash_in_lockstep_has_no_time_that_the_clock_did_not_tell() -> None:
-    found = outcome(clocked((0.1, Time(40.0, False)), (3.0, Exited("app", 1))))
-    assert found.reason == "application service 'app' ended with exit code 1, before the test was decided"
-
-
-def test_an_evaluator_without_a_verdict_is_told_at_its_test_time() -> None:
-    found = outcome(clocked((0.1, Time(0.0, False)), (3.0, ENDED), (3.0, Time(0.5, True))))
-    assert found.reason == "evaluator 'track' ended without a verdict, after 0.5 s of test time"
-
-
-def test_a_failed_verdict_has_no_other_time_than_its_own() -> None:
-    failed = VerdictEvent("track", False, "hit wall left after 2.10 s", ())
-    found = outcome(clocked((1.0, failed), (1.0, ENDED), (1.5, Time(2.1, True))))
-    assert found.reason == "hit wall left after 2.10 s"
-
-
-def test_lockstep_has_the_time_of_its_clock() -> None:
-    found = outcome(clocked((0.1, Time(0.0, False)), (30.0, PASSED), (30.0, ENDED), (31.0, Time(120.0, True))))
-    assert (found.outcome, found.sim_s, found.execution_s) == ("passed", 120.0, 30.0)
+    events, expected, reason, sim_s = IN_LOCKSTEP[case]
+    found = outcome(clocked(*events))
+    assert (found.outcome, found.reason, found.sim_s) == (expected, reason, sim_s)
 
 
 @pytest.mark.parametrize(
@@ -596,15 +531,6 @@ def test_the_begin_is_announced_until_the_clock_answers() -> None:
     )
     assert outcome(backend).outcome == "passed"
     assert backend.calls.count("begin") == 4
-
-
-@pytest.mark.parametrize(
-    ("times", "reached"),
-    [([], ""), ([(0.1, Time(0.5, False)), (3.0, Time(12.0, False))], " and reached 12.0 s of test time")],
-)
-def test_lockstep_has_a_limit_of_wall_time(times: list[tuple[float, Event]], reached: str) -> None:
-    found = outcome(clocked(*times))
-    assert (found.outcome, found.reason) == ("error", f"the test took more than 60 s of wall time{reached}")
 
 
 STOPS: list[tuple[str, str, str, Callable[[Outcome], bool]]] = [
@@ -661,51 +587,38 @@ def test_what_is_written_after_the_decision_is_not_quoted() -> None:
     assert outcome(Talking(plan(), stages, tails={"track": ["it hit the wall"]})).last_lines == ("it hit the wall",)
 
 
+USED_UP = "9 of 9 open files of this machine were in use"
+
+
 @pytest.mark.parametrize(
-    ("event", "result"),
+    ("event", "is_of_others", "expected", "said"),
     [
-        (FAILED, "error"),
-        (Exited("app", 1), "error"),
-        (Exited("app", 1, out_of_memory=True), "error"),
-        (Stopped("unanswered", "did not answer frame 17"), "error"),
-        (Foreign("the application sent x, which only 'pose' may send"), "failed"),
-        (PASSED, "passed"),
+        (FAILED, True, "error", f"judged here: {USED_UP}; it"),
+        (Exited("app", 1), True, "error", f"judged here: {USED_UP}; it"),
+        (Exited("app", 1, out_of_memory=True), True, "error", f"judged here: {USED_UP}; it"),
+        (Stopped("unanswered", "did not answer frame 17"), True, "error", f"judged here: {USED_UP}; it"),
+        (Foreign("the application sent x, which only 'pose' may send"), True, "failed", "the application sent x"),
+        (PASSED, True, "passed", "it drove"),
+        (FAILED, False, "failed", f"{USED_UP}, perhaps by the application itself"),
+        (Exited("app", 1), False, "failed", f"{USED_UP}, perhaps by the application itself"),
+        (Stopped("unanswered", "no answer"), False, "failed", f"{USED_UP}, perhaps by the application itself"),
+        (Unstartable("app", "python: unavailable"), False, "error", f"python: unavailable; {USED_UP}"),
     ],
 )
-def test_a_machine_that_had_nothing_left_is_not_the_applications_fault(
-    monkeypatch: pytest.MonkeyPatch, event: Event, result: str
+def test_a_machine_that_had_nothing_left_is_not_the_applications_fault_unless_it_took_it(
+    monkeypatch: pytest.MonkeyPatch, event: Event, is_of_others: bool, expected: str, said: str
 ) -> None:
     """What it must not send, it did not send for want of anything."""
-    text = "9 of 9 open files of this machine were in use"
-    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage(text, is_of_others=True))
-    found = begun((1.0, event), (1.0, ENDED))
-    assert found.outcome == result
-    assert ("judged here: 9 of 9 open files of this machine were in use; it" in found.reason) == (result == "error")
-
-
-@pytest.mark.parametrize("event", [FAILED, Exited("app", 1), Stopped("unanswered", "did not answer frame 17")])
-def test_what_the_application_may_have_used_up_itself_is_no_excuse(
-    monkeypatch: pytest.MonkeyPatch, event: Event
-) -> None:
     asked: list[object] = []
 
     def used_up(*words: object) -> Shortage:
         asked.extend(words)
-        return Shortage("the disk was full")
+        return Shortage(USED_UP, is_of_others)
 
     monkeypatch.setattr(shortage, "used_up", used_up)
     found = begun((1.0, event), (1.0, ENDED))
-    assert (found.outcome, found.notes[-1:]) == ("failed", ("the disk was full, perhaps by the application itself",))
-    assert asked == [[17]]
-
-
-def test_what_could_not_be_started_is_told_with_what_was_used_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage("9 of 9 processes were in use"))
-    found = begun((1.0, Unstartable("app", "python: Resource temporarily unavailable")))
-    reason = (
-        "service 'app' could not be started: python: Resource temporarily unavailable; 9 of 9 processes were in use"
-    )
-    assert (found.outcome, found.reason) == ("error", reason)
+    assert (found.outcome, said in "\n".join((found.reason, *found.notes))) == (expected, True), found
+    assert asked == ([[17]] if USED_UP in said else [])
 
 
 @pytest.mark.parametrize(("kills", "notes"), [([3, 3], ()), ([3, 4], (MEMORY_KILL,))])

@@ -74,7 +74,10 @@ def test_times_are_apart_by_clock() -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"spec": ["s"]}, {"setup_s": math.inf}, {"setup_s": math.nan}, {"execution_s": -1}, {"execution_s": "x"}],
+    [
+        *({"spec": ["s"]}, {"setup_s": math.inf}, {"setup_s": math.nan}, {"execution_s": -1}, {"execution_s": "x"}),
+        *({"checks": checks} for checks in (3, {"a": "x"}, {"a": math.inf}, [1.0], None)),
+    ],
 )
 def test_lines_that_no_run_wrote_are_skipped(tmp_path: Path, change: dict[str, object]) -> None:
     path = tmp_path / "history.jsonl"
@@ -132,10 +135,3 @@ def test_the_values_of_checks_in_the_latest_runs(tmp_path: Path) -> None:
     assert runs == found.checks(*key)
     assert runs == [{"when": 7, "outcome": "passed", "checks": {"margin": float(n)}} for n in range(10, 30)]
     assert History(path).checks("s", "t", "process", "realtime") == []
-
-
-@pytest.mark.parametrize("checks", [3, {"a": "x"}, {"a": math.inf}, [1.0], None])
-def test_damaged_values_of_checks_are_no_run(tmp_path: Path, checks: object) -> None:
-    path = tmp_path / "history.jsonl"
-    path.write_text(json.dumps({**LINE, "checks": checks}) + "\n")
-    assert History(path).runs == []

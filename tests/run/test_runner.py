@@ -21,6 +21,7 @@ from tests.run.scripted import (
     FAILED,
     PASSED,
     READY,
+    Events,
     ScriptedBackend,
     ScriptedBackends,
     drives,
@@ -105,11 +106,6 @@ def test_as_many_run_at_once_as_there_is_room_for(scene: Scene, capacity: int, m
     assert scene.backends.most == most
 
 
-def test_a_kept_test_is_explained(scene: Scene) -> None:
-    scene.run(plan(), keep=True)
-    assert scene.runner.kept == ["look inside"]
-
-
 @pytest.mark.parametrize(("fail_fast", "began"), [(True, ["a"]), (False, ["a", "b", "c"])])
 def test_fail_fast_begins_no_further_test(scene: Scene, fail_fast: bool, began: list[str]) -> None:
     scene.lengths, scene.capacity, scene.policy = {"a": 3.0, "b": 2.0}, 1, Policy(fail_fast)
@@ -156,12 +152,6 @@ def test_pictures_stay_unless_the_test_passed(scene: Scene, verdict: VerdictEven
     scene.backends.make = by_slug(a=drives(1.0, verdict))
     scene.run(plan("a"), keep=keep)
     assert pictures.exists() == left
-
-
-def test_without_retries_an_error_stays(logged: Scene) -> None:
-    (outcome,) = logged.run(plan("a"))
-    assert endings([outcome]) == [("a", "error", CRASHED)]
-    assert (outcome.notes, logged.backends.began) == ((), ["a"])
 
 
 TOO_BUSY = (
@@ -246,22 +236,22 @@ def test_a_signal_ends_the_second_attempts(crowded: Scene, seconds: float, reaso
     assert crowded.backends.closed == 1
 
 
-def test_a_kept_test_is_not_tried_again(scene: Scene) -> None:
+def test_a_kept_test_is_explained_and_not_tried_again(scene: Scene) -> None:
     scene.backends.make = always_too_busy
     assert endings(scene.run(plan("a"), keep=True)) == [("a", "error", TOO_BUSY)]
-    assert scene.backends.began == ["a"]
+    assert (scene.backends.began, scene.runner.kept) == (["a"], ["look inside"])
 
 
-def test_errors_that_stay_are_errors(scene: Scene) -> None:
-    scene.policy, scene.backends.make = Policy(retries=2), by_slug(a=CRASH)
+@pytest.mark.parametrize(
+    ("retries", "stages", "expected", "attempts"),
+    [(0, CRASH, "error", 1), (2, CRASH, "error", 3), (2, drives(1.0, FAILED), "failed", 1)],
+)
+def test_errors_alone_are_retried(
+    scene: Scene, retries: int, stages: dict[str, Events], expected: str, attempts: int
+) -> None:
+    scene.policy, scene.backends.make = Policy(retries=retries), by_slug(a=stages)
     (outcome,) = scene.run(plan("a"))
-    assert (outcome.outcome, len(outcome.notes), scene.backends.began) == ("error", 2, ["a"] * 3)
-
-
-def test_what_failed_is_not_retried(scene: Scene) -> None:
-    scene.policy, scene.backends.make = Policy(retries=2), by_slug(a=drives(1.0, FAILED))
-    assert [outcome.outcome for outcome in scene.run(plan("a"))] == ["failed"]
-    assert scene.backends.began == ["a"]
+    assert (outcome.outcome, len(outcome.notes), scene.backends.began) == (expected, attempts - 1, ["a"] * attempts)
 
 
 def test_a_report_that_cannot_be_moved_ends_the_retries_of_its_test_alone(logged: Scene) -> None:

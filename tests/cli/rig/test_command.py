@@ -1,23 +1,15 @@
 """``dodo rig``: manual use of a rig, with a rig on a pseudo terminal as the hardware."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from dodo_dsl.cli.main import main
 from services.gantry.rig_table import LIMITS
 from tests.run.rigs.place import Place, busy, place
 
 __all__ = ["place"]
-
-
-@pytest.mark.parametrize("action", ["status", "home", "goto", "calibrate", "clear", "truth", "measure"])
-def test_every_action_has_help(action: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["rig", action, "--help"], sys.stdout, sys.stderr) == 0
-    assert "RIG" in capsys.readouterr().out
 
 
 @pytest.mark.realtime
@@ -71,14 +63,3 @@ def test_status_shows_a_fault_until_calibrate_acknowledges_it(place: Place) -> N
         assert "the rig touched a limit switch and stopped" in place.dodo("rig", "status", code=0)
     assert "touched a limit switch" in place.dodo("rig", "home", "fake", code=3)
     assert "the rig is idle" in place.dodo("rig", "calibrate", "fake", code=0)
-
-
-@pytest.mark.parametrize("action", ["status", "clear"])
-def test_a_user_without_a_home_folder_is_told_what_to_set(
-    action: str, place: Place, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("HOME", "XDG_STATE_HOME", "DODO_RIGS"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
-    told = "user 3999999999 has no home folder: set DODO_RIGS or XDG_STATE_HOME\n"
-    assert place.dodo("rig", action, "fake", code=3) == f"dodo rig: quarantines cannot be kept: {told}"

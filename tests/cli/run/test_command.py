@@ -120,14 +120,6 @@ def test_the_report_of_a_test_that_failed(dodo: Command) -> None:
     assert [service["name"] for service in dodo.result()["services"]] == ["camera", "track", "app"]
 
 
-def test_an_error_is_an_error_in_junit(dodo: Command) -> None:
-    dodo.stages = ENDINGS["error"]
-    dodo.run()
-    case = ElementTree.parse("report/junit.xml").find(".//testcase")
-    assert case is not None
-    assert case.find("error") is not None
-
-
 def test_losses_of_messages_are_noted_below_the_test(dodo: Command) -> None:
     dodo.stages = stages(Overrun("track", 5), PASSED, Exited("track", 0))
     code, out, _ = dodo.run()
@@ -143,14 +135,6 @@ def test_times_of_all_runs_are_kept_and_drawn(dodo: Command) -> None:
     assert "here, 2 runs" in Path("report/times.svg").read_text().replace(platform.node() or "this machine", "here")
     assert 'src="times.svg"' in Path("report/index.html").read_text()
     assert len(Path("history.jsonl").read_text().splitlines()) == 2
-
-
-def test_a_user_without_a_home_folder_runs_tests(dodo: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("HOME", "XDG_STATE_HOME", "DODO_HISTORY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
-    assert dodo.run()[0] == 0
-    assert "; at most " in dodo.run()[1]
 
 
 def test_a_verdict_without_room_for_a_report_is_printed(dodo: Command, small_disk: Path) -> None:

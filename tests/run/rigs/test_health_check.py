@@ -1,7 +1,6 @@
 """The health check before a test on a real rig: what puts the rig into quarantine, and what does not."""
 
 import asyncio
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 from dodo_dsl.plan.model import Flag, Plan, PlannedService
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs import session
-from dodo_dsl.run.rigs.leases import quarantine, quarantined
+from dodo_dsl.run.rigs.leases import quarantined
 from dodo_dsl.run.rigs.problems import NoAnswer, ProgramTimeout, RigProblem
 from dodo_dsl.run.rigs.session import CHECKS, TRIES, examine
 from tests.run.scripted import plan
@@ -76,38 +75,29 @@ def test_programs_get_the_flags_of_the_test_and_hold_its_leases(monkeypatch: pyt
     assert not state.exists()
 
 
-def test_an_unfit_rig_is_put_into_quarantine_and_checked_no_more(monkeypatch: pytest.MonkeyPatch, state: Path) -> None:
-    programs = Programs(FIT, {"ok": False, "reason": "it has lost steps"})
-    sentence = "rig 'kiwi' is in quarantine: it has lost steps ('dodo rig clear kiwi' ends it)"
-    assert problem(programs, monkeypatch) == sentence
-    assert json.loads((state / "kiwi.json").read_text())["reason"] == "it has lost steps"
-    assert problem(programs, monkeypatch) == sentence
-    assert len(programs.calls) == 2
+ENDS = "('dodo rig clear kiwi' ends it)"
+LOST, SILENT, BUSY = "it has lost steps", NoAnswer("the rig's program gave no answer: Killed"), RigProblem("it is busy")
+CHECKED: dict[str, tuple[list[dict[str, Any] | RigProblem], str, str]] = {
+    "unfit": ([FIT, {"ok": False, "reason": LOST}], f"rig 'kiwi' is in quarantine: {LOST} {ENDS}", LOST),
+    "unfit without a reason": ([{}], "is in quarantine: its health check failed", "its health check failed"),
+    "hung once": ([HUNG, FIT, FIT], "", ""),
+    "hung again": ([HUNG] * TRIES, f"quarantine: its health check hung {TRIES} times: {HUNG}", "its health check hung"),
+    "no answer": ([SILENT], f"rig 'kiwi' cannot be checked: {SILENT}", ""),
+    "busy": ([BUSY], f"rig 'kiwi' cannot be checked: {BUSY}", ""),
+}
+"""What the programs of the checks answer, why a test cannot run then, and why the rig is in quarantine."""
 
 
-def test_a_failure_without_a_reason_has_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "its health check failed" in problem(Programs({}), monkeypatch)
-
-
-def test_a_check_that_hangs_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
-    programs = Programs(HUNG, FIT, FIT)
-    assert problem(programs, monkeypatch) == ""
-    assert programs.calls[0] == programs.calls[1]
-    assert not quarantined("kiwi")
-
-
-def test_a_check_that_hangs_again_puts_the_rig_into_quarantine(monkeypatch: pytest.MonkeyPatch) -> None:
-    programs = Programs(*[HUNG] * TRIES)
-    assert f"in quarantine: its health check hung {TRIES} times: {HUNG}" in problem(programs, monkeypatch)
-    assert quarantined("kiwi").startswith("its health check hung")
-
-
-@pytest.mark.parametrize("error", [NoAnswer("the rig's program gave no answer: Killed"), RigProblem("it is busy")])
-def test_what_says_nothing_about_the_rig_does_not_quarantine_it(
-    error: RigProblem, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert problem(Programs(error), monkeypatch) == f"rig 'kiwi' cannot be checked: {error}"
-    assert not quarantined("kiwi")
+@pytest.mark.parametrize("case", CHECKED)
+def test_what_a_check_leads_to(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers, said, reason = CHECKED[case]
+    programs = Programs(*answers)
+    found = problem(programs, monkeypatch)
+    assert said in found and bool(said) == bool(found)
+    assert quarantined("kiwi").startswith(reason) and bool(reason) == bool(quarantined("kiwi"))
+    assert not programs.answers, "all were asked"
+    if reason:
+        assert (problem(programs, monkeypatch), len(programs.calls)) == (found, len(answers)), "checked no more"
 
 
 def test_a_camera_that_reads_a_file_is_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,11 +105,6 @@ def test_a_camera_that_reads_a_file_is_not_checked(monkeypatch: pytest.MonkeyPat
     programs = Programs()
     assert problem(programs, monkeypatch, replace(on_rig(), services=(camera,))) == ""
     assert programs.calls == []
-
-
-def test_a_rig_in_quarantine_is_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    quarantine("kiwi", "it smokes")
-    assert "is in quarantine: it smokes" in problem(Programs(), monkeypatch)
 
 
 def test_without_a_place_for_quarantines_no_test_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -3,7 +3,8 @@
 import asyncio
 import contextlib
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -41,7 +42,7 @@ def pool(slug: str = "any") -> Job:
     return replace(on("kiwi-1", slug), others=(on("kiwi-2", slug),))
 
 
-def backend(job: Job) -> contextlib.AbstractAsyncContextManager[Backend]:
+def backend(job: Job) -> AbstractAsyncContextManager[Backend]:
     """Holds the leases of a test's rig."""
 
     @contextlib.asynccontextmanager
@@ -52,10 +53,15 @@ def backend(job: Job) -> contextlib.AbstractAsyncContextManager[Backend]:
     return held()
 
 
-async def drive(slug: str, seconds: float, said: list[str] | None = None, one: Job | None = None) -> str:
+Open = Callable[[Job], AbstractAsyncContextManager[Backend]]
+
+
+async def drive(
+    slug: str, seconds: float, said: list[str] | None = None, one: Job | None = None, held: Open = backend
+) -> str:
     """The rig that a test took, after it had it for some time."""
     say = (said if said is not None else []).append
-    async with opened(one or pool(slug), say, backend) as (chosen, _):
+    async with opened(one or pool(slug), say, held) as (chosen, _):
         await asyncio.sleep(seconds)
         return chosen.plan.rig
 
@@ -76,31 +82,15 @@ def test_each_takes_another_rig_and_the_next_the_first_that_comes_free(folder: P
     assert [path.name for path in folder.glob("queue.*")] == []
 
 
-@pytest.mark.thorough
-def test_who_waits_for_one_rig_and_who_waits_for_any_are_one_queue() -> None:
-    """The second came first for both, so it has the rig that comes free first; the third wants the other one."""
+def after(wait: Callable[[], AbstractAsyncContextManager[object]]) -> Open:
+    """Holds the leases of a test's rig once it has waited for something else, as for a health check."""
 
-    async def scene() -> tuple[list[str], list[str]]:
-        order: list[str] = []
+    @contextlib.asynccontextmanager
+    async def held(job: Job) -> AsyncIterator[Backend]:
+        async with wait(), backend(job) as made:
+            yield made
 
-        async def then(slug: str, seconds: float, one: Job | None = None) -> str:
-            rig = await drive(slug, seconds, one=one)
-            order.append(slug)
-            return rig
-
-        held = [
-            asyncio.ensure_future(then("a", 20.0, on("kiwi-1"))),
-            asyncio.ensure_future(then("b", 60.0, on("kiwi-2"))),
-        ]
-        await asyncio.sleep(0.1)
-        tests = []
-        for slug, one in (("c", None), ("d", on("kiwi-1", "d")), ("e", None)):
-            tests.append(asyncio.ensure_future(then(slug, 5.0, one)))
-            await asyncio.sleep(0.1)
-        await asyncio.gather(*held, *tests)
-        return [test.result() for test in tests], order
-
-    assert run(scene()) == (["kiwi-1", "kiwi-1", "kiwi-1"], ["a", "c", "d", "e", "b"])
+    return held
 
 
 def test_who_takes_a_rig_no_longer_waits_and_keeps_it_from_those_who_come_later(folder: Path) -> None:
@@ -108,21 +98,15 @@ def test_who_takes_a_rig_no_longer_waits_and_keeps_it_from_those_who_come_later(
     said: list[str] = []
 
     @contextlib.asynccontextmanager
-    async def slowly(job: Job) -> AsyncIterator[Backend]:
+    async def health_check() -> AsyncIterator[None]:
         await asyncio.sleep(10.0)
-        async with backend(job) as made:
-            yield made
-
-    async def first() -> str:
-        async with opened(pool("a"), lambda _: None, slowly) as (chosen, _):
-            return chosen.plan.rig
+        yield
 
     async def scene() -> tuple[str, ...]:
-        tests = [asyncio.ensure_future(first())]
-        await asyncio.sleep(0.1)
-        tests.append(asyncio.ensure_future(drive("b", 30.0)))
-        await asyncio.sleep(0.1)
-        tests.append(asyncio.ensure_future(drive("c", 1.0, said)))
+        tests = []
+        for driving in (drive("a", 0.0, held=after(health_check)), drive("b", 30.0), drive("c", 1.0, said)):
+            tests.append(asyncio.ensure_future(driving))
+            await asyncio.sleep(0.1)
         return tuple(await asyncio.gather(*tests))
 
     assert run(scene()) == ("kiwi-1", "kiwi-2", "kiwi-1")
@@ -133,26 +117,17 @@ def test_who_has_chosen_a_rig_and_waits_for_the_machine_waits_for_nobody_who_wai
     """The second holds the machine as others do, and needs the rig that the first has chosen but not taken yet."""
 
     @contextlib.asynccontextmanager
-    async def alone(job: Job) -> AsyncIterator[Backend]:
-        await asyncio.sleep(1.0)
-        lease = await leases.lease_any(["machine"], {"test": "a"}, lambda _: None)
-        async with backend(job) as made:
-            yield made
-        lease.release()
-
-    async def first() -> str:
-        async with opened(pool("a"), lambda _: None, alone) as (chosen, _):
-            return chosen.plan.rig
-
-    async def second() -> None:
-        lease = await leases.lease_any(["machine"], {"test": "b"}, lambda _: None, shared=True)
-        assert await drive("b", 5.0, one=on("kiwi-1")) == "kiwi-1"
+    async def machine(shared: bool = False) -> AsyncIterator[None]:
+        await asyncio.sleep(0.0 if shared else 1.0)
+        lease = await leases.lease_any(["machine"], {"test": "a"}, lambda _: None, shared)
+        yield
         lease.release()
 
     async def scene() -> float:
-        test = asyncio.ensure_future(first())
+        test = asyncio.ensure_future(drive("a", 0.0, held=after(machine)))
         await asyncio.sleep(0.1)
-        await second()
+        async with machine(shared=True):
+            assert await drive("b", 5.0, one=on("kiwi-1")) == "kiwi-1"
         assert await test == "kiwi-1"
         return asyncio.get_running_loop().time()
 
@@ -178,22 +153,6 @@ def test_rigs_that_are_not_here_or_in_quarantine_are_left_out(monkeypatch: pytes
         "no rig of the pool can be used here: kiwi-1: there is no '/dev/serial/by-id/elsewhere'; "
         "kiwi-2: in quarantine: it lost its home"
     )
-
-
-def test_who_is_interrupted_leaves_the_queue(folder: Path) -> None:
-    async def scene() -> None:
-        held = [asyncio.ensure_future(drive(slug, 30.0)) for slug in "ab"]
-        await asyncio.sleep(0.1)
-        waiter = asyncio.ensure_future(drive("c", 1.0))
-        await asyncio.sleep(0.1)
-        assert len(list(folder.glob("queue.*"))) == 1
-        waiter.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await waiter
-        assert list(folder.glob("queue.*")) == []
-        assert await asyncio.gather(*held) == ["kiwi-1", "kiwi-2"]
-
-    run(scene())
 
 
 def test_waiting_has_a_limit_after_the_queue_last_moved(monkeypatch: pytest.MonkeyPatch) -> None:

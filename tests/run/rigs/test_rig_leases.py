@@ -1,7 +1,6 @@
 """The leases of a rig: its CID and its devices, whatever they are called."""
 
 import asyncio
-import os
 from pathlib import Path
 
 import pytest
@@ -14,16 +13,6 @@ from tests.run.scripted import run
 def test_flags_name_hardware() -> None:
     words = ["--serial=/dev/ttyACM0", "check", "--source=0", "--width=640", "--serial"]
     assert devices_in(words) == ["/dev/ttyACM0", "0", ""]
-
-
-def test_two_names_of_one_device_are_one_lease(tmp_path: Path) -> None:
-    (tmp_path / "null").symlink_to("/dev/null")
-    (tmp_path / "file").touch()
-    others = [str(tmp_path / "file"), str(tmp_path / "none"), "emulated", "0", "a\0b", ""]
-    (name,) = device_leases(["/dev/null", str(tmp_path / "null"), *others])
-    number = Path("/dev/null").stat().st_rdev
-    assert name == f"device-{os.major(number)}-{os.minor(number)}"
-    assert len(device_leases(["/dev/null", "/dev/zero"])) == 2
 
 
 @pytest.fixture

@@ -52,17 +52,11 @@ def test_the_error_that_ends_it(sessions: tuple[Session, Session]) -> None:
     assert (message.level, message.description) == (2, "the rig is lost")
 
 
-def test_a_service_says_on_the_bus_what_it_logs(start: Start, cid: int) -> None:
+def test_a_service_says_on_the_bus_what_it_logs_where_it_is_asked_to(start: Start, cid: int) -> None:
     with Session(cid) as session:
+        assert start("--role=broken").end()[0] == 1
         service = start("--role=broken", "--log-id=9")
         message = receive(session, LOG, 9)[1]
         assert (message.level, message.description) == (2, "a model went wrong")
         assert service.end()[0] == 1
-
-
-def test_by_default_nothing_is_said(start: Start, cid: int) -> None:
-    with Session(cid) as session:
-        service = start("--role=broken")
-        assert service.end()[0] == 1
-        while (envelope := session.receive(0.0)) is not None:
-            assert envelope.data_type != session.messages.id(LOG)
+        assert session.receive(0.0) is None

@@ -1,5 +1,6 @@
 """How long the clock waits for an answer of an application that gets no processor."""
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -58,54 +59,45 @@ class Late:
         return lambda *_: None
 
 
-@pytest.fixture
-def time(monkeypatch: pytest.MonkeyPatch) -> Time:
-    time = Time()
-    monkeypatch.setattr("services.clock.application.time", time)
-    monkeypatch.setattr("services.clock.application.own_wait_s", lambda: 0.0)
-    monkeypatch.setattr("services.clock.application.contention_s", lambda: 0.0)
-    return time
-
-
-def answer(time: Time, processes: ApplicationProcesses) -> None:
-    late: Any = Late(time)
-    response = cast(ResponseTimes, SimpleNamespace(add=lambda *_: None))
-    application = SteppedApplication(late, Patience(LIMIT_S, LIMIT_S), late, lambda: False, response)
-    application.processes = processes
-    application.show((), 0)
-    application.await_answer()
-
-
-def test_what_it_waits_for_a_processor_does_not_count(time: Time) -> None:
-    answer(time, Waiting(time, (0.05, 0.95)))
-
-
-def test_nor_does_what_the_clock_waits(time: Time, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.clock.application.own_wait_s", lambda: 0.95 * time.now)
-    answer(time, ApplicationProcesses(()))
-
-
-def test_nor_does_what_anything_waits_where_its_processes_cannot_be_seen(
-    time: Time, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As in containers; but not for ever, as a machine may be busy for as long as the application is silent."""
-    with pytest.raises(ApplicationSilent):
-        answer(time, ApplicationProcesses(()))
-    monkeypatch.setattr("services.clock.application.contention_s", lambda: 0.95 * time.now)
-    answer(time, ApplicationProcesses(()))
-    monkeypatch.setattr("services.clock.application.MOST_CONTENTION_S", 0.3)
-    with pytest.raises(ApplicationSilent):
-        answer(time, ApplicationProcesses(()))
+SEEN, SLEEPS, COMPUTES = (0.05, 0.95), ((0.0, 0.0),), ((1.0, 0.0),)
 
 
 @pytest.mark.parametrize(
-    "threads",
-    [((0.0, 0.0),), ((1.0, 0.0),), ((0.6, 0.4), (0.0, 0.99))],
-    ids=["it sleeps", "it computes", "its pool has nothing to do"],
+    ("threads", "own", "contention", "most", "is_excused"),
+    [
+        pytest.param([SEEN], 0.0, 0.0, 60.0, True, id="it waits for a processor"),
+        pytest.param([], 0.95, 0.0, 60.0, True, id="the clock waits for one"),
+        pytest.param(
+            [], 0.0, 0.95, 60.0, True, id="anything does where its processes cannot be seen, as in containers"
+        ),
+        pytest.param(
+            [], 0.0, 0.95, 0.3, False, id="but not for ever, as a machine may be busy for as long as it is silent"
+        ),
+        pytest.param([], 0.0, 0.0, 60.0, False, id="nobody waits"),
+        pytest.param(SLEEPS, 0.0, 0.0, 60.0, False, id="it sleeps"),
+        pytest.param(COMPUTES, 0.0, 0.0, 60.0, False, id="it computes"),
+        pytest.param([(0.6, 0.4), (0.0, 0.99)], 0.0, 0.0, 60.0, False, id="its pool has nothing to do"),
+    ],
 )
-def test_what_it_takes_itself_counts(threads: Any, time: Time) -> None:
-    with pytest.raises(ApplicationSilent, match=r"did not answer frame 1 within 0\.05 s \(Answer missing\)"):
-        answer(time, Waiting(time, *threads))
+def test_what_waits_for_a_processor_does_not_count_and_what_it_takes_itself_does(
+    threads: Any, own: float, contention: float, most: float, is_excused: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    time = Time()
+    for name, value in (
+        ("time", time),
+        ("own_wait_s", lambda: own * time.now),
+        ("contention_s", lambda: contention * time.now),
+        ("MOST_CONTENTION_S", most),
+    ):
+        monkeypatch.setattr(f"services.clock.application.{name}", value)
+    late: Any = Late(time)
+    response = cast(ResponseTimes, SimpleNamespace(add=lambda *_: None))
+    application = SteppedApplication(late, Patience(LIMIT_S, LIMIT_S), late, lambda: False, response)
+    application.processes = Waiting(time, *threads) if threads else ApplicationProcesses(())
+    application.show((), 0)
+    silent = r"did not answer frame 1 within 0\.05 s \(Answer missing\)"
+    with contextlib.nullcontext() if is_excused else pytest.raises(ApplicationSilent, match=silent):
+        application.await_answer()
 
 
 def test_processes_that_wait_beside_one_another_win_no_time() -> None:

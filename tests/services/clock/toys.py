@@ -46,8 +46,16 @@ class Mover(Service):
         return (self._type(x=self._place),)
 
 
+def show(memory: SharedMemory, value: float, now: int) -> None:
+    """As the eight bytes of a picture."""
+    with memory.lock():
+        memory.buffer[:8] = struct.pack("<d", value)
+        memory.stamp(now)
+    memory.notify_all()
+
+
 class Eye(Service):
-    """Shows the newest place as the eight bytes of a picture."""
+    """Shows the newest place."""
 
     period = STEP
 
@@ -59,10 +67,7 @@ class Eye(Service):
         self._place = message.x
 
     def update(self, now: int) -> Iterable[Any]:
-        with self._memory.lock():
-            self._memory.buffer[:8] = struct.pack("<d", self._place)
-            self._memory.stamp(now)
-        self._memory.notify_all()
+        show(self._memory, self._place, now)
         return ()
 
 
@@ -77,10 +82,7 @@ class Film(Service):
     def update(self, now: int) -> Iterable[Any]:
         if self._number < self._length:
             self._number += 1
-            with self._memory.lock():
-                self._memory.buffer[:8] = struct.pack("<d", self._number)
-                self._memory.stamp(now)
-            self._memory.notify_all()
+            show(self._memory, self._number, now)
             self.finished = self._number == self._length
         return ()
 

@@ -2,39 +2,25 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.opendlv import address_book
-from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import RealTimeClock
 from services.base.loop import Loop
 from services.base.members import VARIABLE, Members, SenderTable
 from services.base.service import Service
+from tests.services.base.identity.conftest import Join
 
 FRAME = "opendlv.sim.Frame"
-Join = Callable[..., tuple[Session, Members]]
 
 
-@pytest.fixture
-def enter(cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Join]:
-    """Makes a service with its session, which the others know if it ``says`` where it is."""
+@pytest.fixture(autouse=True)
+def producers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "opendlv.sim.Frame/0=pose opendlv.sim.KinematicState/0=own?")
-    monkeypatch.setenv(CHANNEL_VARIABLE, str(tmp_path))
-    with ExitStack() as stack:
-
-        def one(name: str, says: bool = True) -> tuple[Session, Members]:
-            session = stack.enter_context(Session(cid))
-            if says:
-                address_book.enter(tmp_path, name, session.address)
-            return session, Members(session, name, SenderTable.load(session.messages))
-
-        yield one
 
 
 def admitted(session: Session, members: Members) -> list[bool]:

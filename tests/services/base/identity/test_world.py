@@ -1,24 +1,22 @@
 """What only a simulation has goes to the test's services, and not to the bus."""
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.opendlv import address_book
-from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import RealTimeClock
 from services.base.loop import Loop
-from services.base.members import TOLD, TRUTH, WORLD_VARIABLE, Members, SenderTable, World
+from services.base.members import TOLD, TRUTH, WORLD_VARIABLE, Members, World
 from services.base.service import Output, Service
+from tests.services.base.identity.conftest import Join
 
 FRAME, STATE, READING = "opendlv.sim.Frame", "opendlv.sim.KinematicState", "opendlv.proxy.DistanceReading"
 MESSAGES = MessageSet.standard()
-Join = Callable[..., tuple[Session, Members]]
 
 
 class Teller(Service):
@@ -41,20 +39,9 @@ class Relaying(RealTimeClock):
         self.count += 1
 
 
-@pytest.fixture
-def enter(cid: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Join]:
-    """Makes a service of the test with its session, which joins the others."""
+@pytest.fixture(autouse=True)
+def world(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(WORLD_VARIABLE, "pose track own?=opendlv.sim.KinematicState/0")
-    monkeypatch.setenv(CHANNEL_VARIABLE, str(tmp_path))
-    with ExitStack() as stack:
-
-        def one(name: str) -> tuple[Session, Members]:
-            session = stack.enter_context(Session(cid))
-            session.hear_directly()
-            address_book.enter(tmp_path, name, session.address)
-            return session, Members(session, name, SenderTable.load(session.messages), World.load(session.messages))
-
-        yield one
 
 
 @pytest.fixture
@@ -81,30 +68,25 @@ def frame(name: str = FRAME) -> Envelope:
     return Envelope(MESSAGES.id(name), MESSAGES.encode(MESSAGES.type(name)()), 0, 0, 0, 0)
 
 
-def test_services_hear_it_and_the_application_does_not(enter: Join, application: Session) -> None:
+@pytest.mark.parametrize(
+    ("told", "truth", "heard"),
+    [
+        pytest.param("", "", [READING], id="it hears readings alone"),
+        pytest.param(f"{FRAME}/0", "", [FRAME, READING], id="what it declares it is told"),
+        pytest.param(f"{READING}/0", f"{READING}/0", [], id="truth never, as it is judged by it"),
+    ],
+)
+def test_services_hear_all_and_the_application_what_it_may(
+    enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch, told: str, truth: str, heard: list[str]
+) -> None:
+    for name, value in ((TOLD, told), (TRUTH, truth)):
+        if value:
+            monkeypatch.setenv(name, value)
     pose, track = enter("pose"), enter("track")
     tell(*pose)
-    told = taken(*track)
-    assert sorted(told) == sorted([FRAME, STATE, READING, "dodo.EndOfInput"])  # which come by two sockets, in any order
-    assert taken(application) == [READING]
-
-
-def test_what_it_declares_it_is_told(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(TOLD, f"{FRAME}/0")
-    pose, track = enter("pose"), enter("track")
-    tell(*pose)
-    assert sorted(taken(*track)) == sorted([FRAME, STATE, READING, "dodo.EndOfInput"])
-    assert taken(application) == [FRAME, READING]
-
-
-def test_truth_it_is_never_told(enter: Join, application: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither late nor where it declares that, as it is judged by it."""
-    monkeypatch.setenv(TRUTH, f"{READING}/0")
-    monkeypatch.setenv(TOLD, f"{READING}/0")
-    pose, track = enter("pose"), enter("track")
-    tell(*pose)
-    assert taken(*track) == [FRAME, STATE, READING, "dodo.EndOfInput"]
-    assert taken(application) == []
+    everything = [FRAME, STATE, READING, "dodo.EndOfInput"]
+    assert sorted(map(str, taken(*track))) == sorted(everything), "which come by two sockets, in any order"
+    assert taken(application) == heard
 
 
 @pytest.mark.parametrize("truth", ["", f"{READING}/0"])
@@ -141,7 +123,10 @@ def test_services_that_may_not_say_where_they_listen_are_a_world(monkeypatch: py
     assert World.load(MESSAGES)
 
 
-def test_outside_of_a_test_the_bus_carries_everything(application: Session, cid: int) -> None:
+def test_outside_of_a_test_the_bus_carries_everything(
+    application: Session, cid: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(WORLD_VARIABLE)
     with Session(cid) as session:
         tell(session, None)
     assert taken(application) == [FRAME, STATE, READING, "dodo.EndOfInput"]

@@ -1,5 +1,7 @@
 """One who looks at everything sees each message of a lockstep test once, in the step that it belongs to."""
 
+import pytest
+
 from dodo_dsl.opendlv.envelope import Envelope
 from services.base.lockstep_clock import EPOCH, Observer
 
@@ -29,72 +31,59 @@ def sent(payload: bytes, time: int, received: int = 0) -> Envelope:
     return Envelope(1003, payload, 5, received, time, 0)
 
 
-def test_copies_on_the_bus_count_once_however_late_they_are() -> None:
+def on_bus(text: str, time: int = EPOCH) -> Envelope:
+    """As it comes from the bus."""
+    return sent(text.encode(), time, 9)
+
+
+def step(number: int, *texts: str) -> tuple[int, list[Envelope]]:
+    """A step, and what the clock hands on with it, of its time."""
+    return number, [sent(text.encode(), EPOCH + number * STEP) for text in texts]
+
+
+A, B, ANSWER = on_bus("a"), on_bus("b"), on_bus("answer")
+OWN = on_bus("own", 77)
+CASES: dict[str, tuple[list[Envelope | tuple[int, list[Envelope]]], list[tuple[str, int]]]] = {
+    "copies on the bus count once, however late": ([A, step(0, "a", "b"), B, step(1)], [("a", 0), ("b", 0)]),
+    "what was lost on the bus is seen": ([step(0, "a")], [("a", 0)]),
+    "the application's is seen as it is on the bus": (
+        [OWN, (0, [OWN._replace(sample_time=EPOCH)])],
+        [("own", 77 - EPOCH)],
+    ),
+    "a later step's message waits for that": ([on_bus("early", EPOCH + STEP), step(0), step(1)], []),
+    "and comes after it": ([on_bus("early", EPOCH + STEP), step(0), step(1), step(2)], [("early", STEP)]),
+    "an answer stands before the next step": (
+        [ANSWER, step(0, "0"), step(1, "1")],
+        [("0", 0), ("answer", 0), ("1", STEP)],
+    ),
+    "whenever it came": ([step(0, "0"), ANSWER, step(1, "1")], [("0", 0), ("answer", 0), ("1", STEP)]),
+    "the first messages are said again much later": (
+        [step(0, "a"), *(step(number) for number in range(1, 200)), A, step(200)],
+        [("a", 0)],
+    ),
+}
+"""What comes from the bus and the clock, and what is seen when."""
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_each_message_is_seen_once_in_its_step(case: str) -> None:
     observer, inbox = Observer(), Seen()
-    observer.collect(sent(b"a", EPOCH, 9))
-    observer.deliver(inbox, EPOCH, [sent(b"a", EPOCH), sent(b"b", EPOCH)])
-    observer.collect(sent(b"b", EPOCH, 9))
-    observer.deliver(inbox, EPOCH + STEP, [])
-    assert inbox.seen == [(b"a", EPOCH), (b"b", EPOCH)]
-
-
-def test_what_was_lost_on_the_bus_is_seen_all_the_same() -> None:
-    observer, inbox = Observer(), Seen()
-    observer.deliver(inbox, EPOCH, [sent(b"a", EPOCH)])
-    assert inbox.seen == [(b"a", EPOCH)]
-
-
-def test_the_application_counts_as_it_is_on_the_bus_and_not_as_it_is_handed_on() -> None:
-    observer, inbox = Observer(), Seen()
-    observer.collect(sent(b"own time", 77, 9))
-    observer.deliver(inbox, EPOCH, [sent(b"own time", EPOCH, 9)])
-    assert inbox.seen == [(b"own time", 77)]
-
-
-def test_a_later_step_s_message_waits_for_that() -> None:
-    observer, inbox = Observer(), Seen()
-    observer.collect(sent(b"early", EPOCH + STEP, 9))
-    observer.deliver(inbox, EPOCH, [])
-    assert inbox.seen == []
-    observer.deliver(inbox, EPOCH + STEP, [])
-    assert inbox.seen == []
-    observer.deliver(inbox, EPOCH + 2 * STEP, [])
-    assert inbox.seen == [(b"early", EPOCH + STEP)]
-
-
-def test_an_answer_stands_before_the_next_step_whenever_it_came() -> None:
-    orders = []
-    for is_swift in (True, False):
-        observer, inbox = Observer(), Seen()
-        answer = sent(b"answer", EPOCH, 9)
-        if is_swift:
-            observer.collect(answer)
-        observer.deliver(inbox, EPOCH, [sent(b"0", EPOCH)])
-        if not is_swift:
-            observer.collect(answer)
-        observer.deliver(inbox, EPOCH + STEP, [sent(b"1", EPOCH + STEP)])
-        orders.append([payload for payload, _ in inbox.seen])
-    assert orders == [[b"0", b"answer", b"1"]] * 2
+    for come in CASES[case][0]:
+        if isinstance(come, Envelope):
+            observer.collect(come)
+        else:
+            observer.deliver(inbox, EPOCH + come[0] * STEP, come[1])
+    assert [(payload.decode(), time - EPOCH) for payload, time in inbox.seen] == CASES[case][1]
 
 
 def test_the_last_answer_is_seen_at_the_end_of_the_test() -> None:
     observer, inbox = Observer(), Seen()
-    observer.deliver(inbox, EPOCH, [sent(b"own", EPOCH)])
-    for payload in (b"own", b"answer"):
-        observer.collect(sent(payload, EPOCH, 9))
+    observer.deliver(inbox, *(EPOCH, step(0, "own")[1]))
+    for come in (on_bus("own"), ANSWER):
+        observer.collect(come)
     observer.flush(inbox)
     observer.flush(inbox)
     assert [payload for payload, _ in inbox.seen] == [b"own", b"answer"]
-
-
-def test_the_first_messages_said_again_much_later() -> None:
-    observer, inbox = Observer(), Seen()
-    observer.deliver(inbox, EPOCH, [sent(b"a", EPOCH)])
-    for step in range(1, 200):
-        observer.deliver(inbox, EPOCH + step * STEP, [])
-    observer.collect(sent(b"a", EPOCH, 9))
-    observer.deliver(inbox, EPOCH + 200 * STEP, [])
-    assert inbox.seen == [(b"a", EPOCH)]
 
 
 def test_what_services_sent_long_ago_is_forgotten() -> None:

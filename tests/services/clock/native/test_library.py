@@ -1,11 +1,7 @@
 """The library of `clock: virtual`: waits end by the test's time, in one order, as fast as the programs compute."""
 
-import contextlib
-import os
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -159,27 +155,6 @@ def test_without_the_page_no_program_runs(built: Path, variables: dict[str, str]
     assert ended.stderr.count("\n") == 1
 
 
-@contextlib.contextmanager
-def load() -> Iterator[None]:
-    """Processes that compete for the processors, and come and go."""
-    is_over = threading.Event()
-
-    def compete() -> None:
-        while not is_over.is_set():
-            burn = "import time; end = time.monotonic() + 0.3\nwhile time.monotonic() < end: pass"
-            subprocess.run([sys.executable, "-S", "-c", burn], check=True)
-
-    threads = [threading.Thread(target=compete) for _ in range(2 * (os.cpu_count() or 1))]
-    for thread in threads:
-        thread.start()
-    try:
-        yield
-    finally:
-        is_over.set()
-        for thread in threads:
-            thread.join()
-
-
 def outputs_of_workers(built: Path) -> str:
     with Application(built, [built / "programs", "workers"], [built / "programs", "workers"]) as application:
         application.run(1)
@@ -189,21 +164,3 @@ def outputs_of_workers(built: Path) -> str:
 
 def test_threads_take_turns_in_one_order(built: Path) -> None:
     assert len({outputs_of_workers(built) for _ in range(3)}) == 1
-
-
-@pytest.mark.proof
-def test_threads_take_turns_in_one_order_under_load(built: Path) -> None:
-    with load():
-        assert len({outputs_of_workers(built) for _ in range(50)}) == 1
-
-
-@pytest.mark.proof
-def test_python_is_the_same_under_load(built: Path) -> None:
-    outputs = set()
-    with load():
-        for _ in range(50):
-            with Application(built, [sys.executable, "-S", Path(__file__).with_name("program.py")]) as application:
-                application.run(1)
-                assert application.code() == 0
-                outputs.add(application.output())
-    assert len(outputs) == 1
