@@ -159,8 +159,9 @@ def load(
     start: Path | None = None,
     reader: Reader = read,
     services_only: bool = False,
+    chosen: Callable[[list[Spec], Deployment], list[Spec]] = lambda specs, _: specs,
 ) -> Checked:
-    """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
+    """Reads the specs at or below ``paths``, or those of the deployment's registries without any; checks the chosen.
 
     ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
     tests. ``reader`` may know texts that are not saved yet. With ``services_only`` no test is read.
@@ -183,11 +184,12 @@ def load(
         rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
         deployment = replace(deployment, rigs=rigs)
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
-    specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
+    every = [one for spec in written for one in on_each(spec, deployment.rigs)]
+    specs = chosen(every, deployment)
     shared = {id(corner): corner for spec in specs for corner in spec.corners}  # by instances of a matrix
     corners = [applied(corner, settings) for corner in shared.values()]
     tests, at_ends = (tuple(resolve(some, manifests, deployment, source)) for some in (specs, corners))
-    by_rules = check(tests, manifests, deployment, source, at_ends)
+    by_rules = check(tests, manifests, deployment, source, at_ends, every)
     as_read = {path: of_file for path, (_, of_file) in loaded.items()}
     problems = Problems(tuple(found), (*manifest_problems, *own), as_read, by_rules)
     return _with_tests(Checked(deployment, manifests, (), (), settings, source, tuple(empty), problems), tests)
