@@ -126,8 +126,8 @@ class RealTimeClock:
 
     def close(self, stopped: Callable[[], bool]) -> None:
         """Wait until ``stopped`` where there are pictures: an application must not lose them while it is judged."""
-        while self._has_memory and not stopped():
-            time.sleep(_SLICE)
+        if self._has_memory:
+            await_end(stopped)
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
         """Deliver messages until the instant, and then those that are there already."""
@@ -144,6 +144,22 @@ class RealTimeClock:
         steps = int(late // period)
         _log.warning("%.1f s late, skipped %d steps", late / MICROSECONDS, steps)
         return steps
+
+
+def pauses(longest: float) -> Iterator[float]:
+    """Seconds between looks whether something is over, first short ones: a signal ends no sleep."""
+    pause = 0.001
+    while True:
+        yield pause
+        pause = min(2 * pause, longest)
+
+
+def await_end(stopped: Callable[[], bool]) -> None:
+    """Wait until ``stopped``."""
+    for pause in pauses(_SLICE):
+        if stopped():
+            return
+        time.sleep(pause)
 
 
 def _deliver(inbox: Inbox, timeout: float) -> bool:

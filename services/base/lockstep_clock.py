@@ -26,7 +26,7 @@ from dodo_dsl.opendlv.posix_memory import PosixSegment
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import LOCK_PATIENCE, SharedMemory
 from dodo_dsl.opendlv.sysv_memory import Segment
-from services.base.clock import Inbox
+from services.base.clock import Inbox, await_end
 from services.base.clock_link import ClockClient
 
 _POLL_S = 0.0002
@@ -209,8 +209,6 @@ class StepMarks:
 
 __all__ = ["EPOCH", "LockstepClock"]
 
-_LINGER_S = 0.05
-
 
 class StepSource(Protocol):
     """Where commands come from and answers go, as ClockClient implements it; ``is_over`` when no more will come."""
@@ -330,8 +328,8 @@ class LockstepClock:
         if self._open:
             self._answer(ended=True)
         self._source.close()
-        while self._announcer.memories and not stopped():
-            time.sleep(_LINGER_S)
+        if self._announcer.memories:
+            await_end(stopped)
 
     def _command(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | Show | None:
         """The next command; None when the service is to stop."""
