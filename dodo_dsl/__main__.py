@@ -9,6 +9,8 @@ import sys
 CLOSED = 3
 _COMPLETES = "_ARGCOMPLETE"
 """Set by a shell that asks how a command line may go on."""
+_THREADS = "OPENBLAS_NUM_THREADS"
+"""Of numpy's linear algebra; those that it starts when it is loaded look for work for a tenth of a second each."""
 
 
 def run() -> None:
@@ -24,7 +26,9 @@ def run() -> None:
         from dodo_dsl.cli.loading import begin
 
         begin(sys.argv[2:])
-    if sys.argv[1:2] in (["compile"], ["list"], ["report"]):
+    if _THREADS not in os.environ:
+        os.putenv(_THREADS, "1")  # for this process alone: what it starts gets its variables from ``os.environ``
+    if sys.argv[1:2] in (["compile"], ["list"], ["report"], ["run"]):
         gc.disable()  # what they read stays until the end; collecting garbage took up to a quarter of their time
     try:
         from dodo_dsl.cli.main import main
@@ -34,6 +38,7 @@ def run() -> None:
         code = main(sys.argv[1:], sys.stdout, sys.stderr)
     except KeyboardInterrupt:
         code = 130
+    gc.freeze()  # the interpreter's end would look at everything once more
     sys.exit(_flushed(code))
 
 
