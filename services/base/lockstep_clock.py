@@ -88,13 +88,18 @@ class Announcer:
         """When the newest picture was sampled."""
         return max((memory.sampled for memory in self.memories), default=0)
 
+    @property
+    def is_awaited(self) -> bool:
+        """Whether all readers wait."""
+        return sum(memory.readers_waiting() for memory in self.memories) >= self._readers
+
     def await_readers(self, stopped: Callable[[], bool]) -> bool:
         """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``.
 
         The kernel gives no notice when a process begins to wait, so this polls, less and less often.
         """
         pause = _POLL_S
-        while sum(memory.readers_waiting() for memory in self.memories) < self._readers:
+        while not self.is_awaited:
             if stopped():
                 return False
             time.sleep(pause)
@@ -343,7 +348,8 @@ class LockstepClock:
         sent, about, announcer = self._sent, self._about, self._announcer
         self._sent, self._about, self._open = [], None, False
         pictures = len(announcer.new)
-        self._source.answer(Done(self._name, sent, pictures, announcer.sampled, self._next, ended, about))
+        awaited = pictures > 0 and announcer.is_awaited
+        self._source.answer(Done(self._name, sent, pictures, announcer.sampled, self._next, ended, about, awaited))
 
 
 def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:
