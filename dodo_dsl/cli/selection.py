@@ -85,7 +85,8 @@ def select(
         places = [*paths, *checked.deployment.registry]
     if names or not paths:
         try:
-            checked = load(places, files, settings=settings, chosen=chosen)
+            asked = () if paths else names
+            checked = load(places, files, settings=settings, names=asked, chosen=chosen)
         except NoSuchTest:
             checked_deployment()  # its problems come first: without them there may be such a test
             raise
