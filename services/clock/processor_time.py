@@ -70,7 +70,8 @@ class ProcessorTimes(NamedTuple):
 
     def by_others(self, before: "ProcessorTimes", waited_s: float) -> float:
         """The part of a wait of the clock's own that falls to others than the application."""
-        return min(waited_s * self._share(before, self._ran_s(before)), self._others_s(before))
+        others_s = self._others_s(before)
+        return min(waited_s * _share(others_s, self._ran_s(before)), others_s)
 
     def longest_wait(self, before: "ProcessorTimes") -> float:
         """Seconds that others kept the process waiting which they kept the longest since another snapshot."""
@@ -78,17 +79,12 @@ class ProcessorTimes(NamedTuple):
 
     def _waits(self, before: "ProcessorTimes") -> list[float]:
         """The part of each process's wait that falls to others, by what they and the application's others took."""
-        ran_s = self._ran_s(before)
+        ran_s, others_s = self._ran_s(before), self._others_s(before)
         waits = []
         for pid, threads in self.threads.items():
             own = _busiest(threads, before.threads.get(pid, {}))
-            waits.append(own.waited_s * self._share(before, max(ran_s - own.ran_s, 0.0)))
+            waits.append(own.waited_s * _share(others_s, max(ran_s - own.ran_s, 0.0)))
         return waits
-
-    def _share(self, before: "ProcessorTimes", application_s: float) -> float:
-        """That of others in what they and ``application_s`` took of the processors."""
-        others_s = self._others_s(before)
-        return 1.0 if application_s == 0 or math.isinf(others_s) else others_s / (others_s + application_s)
 
     def _ran_s(self, before: "ProcessorTimes") -> float:
         ran = sum(max(now - before.ran_s.get(pid, now), 0.0) for pid, now in self.ran_s.items())
@@ -105,6 +101,11 @@ class ProcessorTimes(NamedTuple):
         if now.application_s is None and (now.begun != then.begun or before.ran_s.keys() - self.ran_s.keys()):
             return 0.0
         return max(now.machine_s - then.machine_s - self._ran_s(before), 0.0) + _TICK_S
+
+
+def _share(others_s: float, application_s: float) -> float:
+    """That of others in what they and the application took of the processors."""
+    return 1.0 if application_s == 0 or math.isinf(others_s) else others_s / (others_s + application_s)
 
 
 NOTHING = ProcessorTimes({}, {})
@@ -199,10 +200,10 @@ def _group_of(pid: int, proc: Path) -> Path | None:
 
 def _used_s(group: Path) -> float:
     """Seconds, by ``cpuacct.usage`` in ns or ``cpu.stat`` with a row in us."""
-    text = group.read_text()
-    if " " not in text:
+    text = _read(str(group))
+    if b" " not in text:
         return int(text) / 1e9
-    return next(int(row.split()[1]) for row in text.splitlines() if row.startswith("usage_usec ")) / 1e6
+    return next(int(row.split()[1]) for row in text.splitlines() if row.startswith(b"usage_usec ")) / 1e6
 
 
 def own_wait_s(schedstat: str = "/proc/thread-self/schedstat") -> float:
