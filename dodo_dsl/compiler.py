@@ -160,9 +160,8 @@ def load(
     reader: Reader = read,
     services_only: bool = False,
     names: Collection[str] = (),
-    chosen: Callable[[list[Spec], Deployment], list[Spec]] = lambda specs, _: specs,
 ) -> Checked:
-    """Reads the specs at or below ``paths``, or those of the deployment's registries without any; checks the chosen.
+    """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
     ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
     tests. ``reader`` may know texts that are not saved yet. With ``services_only`` no test is read, and where
@@ -188,12 +187,11 @@ def load(
         rigs = {name: replace(rig, cid=None) for name, rig in deployment.rigs.items()}
         deployment = replace(deployment, rigs=rigs)
     written = (applied(spec, settings) for instances, _ in loaded.values() for spec in instances)
-    every = [one for spec in written for one in on_each(spec, deployment.rigs)]
-    specs = chosen(every, deployment)
+    specs = [one for spec in written for one in on_each(spec, deployment.rigs)]
     shared = {id(corner): corner for spec in specs for corner in spec.corners}  # by instances of a matrix
     corners = [applied(corner, settings) for corner in shared.values()]
     tests, at_ends = (tuple(resolve(some, manifests, deployment, source)) for some in (specs, corners))
-    by_rules = check(tests, manifests, deployment, source, at_ends, every)
+    by_rules = check(tests, manifests, deployment, source, at_ends)
     as_read = {path: of_file for path, (_, of_file) in loaded.items()}
     problems = Problems(tuple(found), (*manifest_problems, *own), as_read, by_rules)
     return _with_tests(Checked(deployment, manifests, (), (), settings, source, tuple(empty), problems), tests)

@@ -43,17 +43,16 @@ def check(
     deployment: Deployment,
     application: ApplicationSource | None = None,
     corners: Iterable[ResolvedTest] = (),
-    specs: Iterable[Spec] = (),
 ) -> dict[Path, list[Diagnostic]]:
     """All problems of all instances, by spec, each once and with all instances that have it.
 
     ``corners`` are instances at the ends of their ranges, whose problems are added to those of the others, each with
-    the first that has it. ``specs`` are all that there are: one of another file may have taken a name.
+    the first that has it.
     """
     everything = tuple(tests)
     by_name: dict[str, dict[Path, Spec]] = {}
-    for spec in (*specs, *(test.spec for test in everything)):
-        by_name.setdefault(spec.name or "", {}).setdefault(spec.path, spec)
+    for test in everything:
+        by_name.setdefault(test.spec.name or "", {}).setdefault(test.spec.path, test.spec)
     named = {name: list(specs.values()) for name, specs in by_name.items()}
 
     def problems(test: ResolvedTest) -> dict[Diagnostic, None]:

@@ -70,28 +70,22 @@ def select(
     """
     paths = [Path(word) for word in words if _is_path(word)]
     names = [word for word in words if not _is_path(word)]
-    files, given, places = existing_files(application), set[Path](), list[Path]()
-
-    def chosen(specs: list[Spec], deployment: Deployment) -> list[Spec]:
-        others = [spec for spec in specs if spec.path not in given]
-        slugs = {spec.slug for word in names for spec in _named(word, others, deployment)}
-        return [spec for spec in specs if not names or spec.path in given or spec.slug in slugs]
-
-    if paths:
-        checked = load(paths, files, settings=settings)
-        if checked.empty:
-            raise NoSuchTest(f"there is no test at '{checked.empty[0]}'; specs end in .dodo.yml")
-        given.update(spec.path for spec in checked.specs)
-        places = [*paths, *checked.deployment.registry]
-    if names or not paths:
+    checked = load(paths, existing_files(application), settings=settings, names=() if paths else names)
+    if checked.empty:
+        raise NoSuchTest(f"there is no test at '{checked.empty[0]}'; specs end in .dodo.yml")
+    given = {spec.path for spec in checked.specs} if paths else set()
+    if names:
+        if paths:
+            checked = load([*paths, *checked.deployment.registry], application, settings=settings)
+        others = [spec for spec in checked.specs if spec.path not in given]
         try:
-            asked = () if paths else names
-            checked = load(places, files, settings=settings, names=asked, chosen=chosen)
+            chosen = {spec.slug for word in names for spec in _named(word, others, checked.deployment)}
         except NoSuchTest:
             checked_deployment()  # its problems come first: without them there may be such a test
             raise
-        given |= {spec.path for spec in checked.specs if any(_is_meant(word, spec) for word in names)}
-    if words:
+        checked = narrowed(checked, [s for s in checked.specs if s.path in given or s.slug in chosen])
+        given |= {spec.path for spec in others if any(_is_meant(word, spec) for word in names)}
+    elif paths:
         checked = narrowed(checked, checked.specs)
     if levels:
         if not any(spec.level in levels for spec in checked.specs):
