@@ -9,8 +9,6 @@ import sys
 CLOSED = 3
 _COMPLETES = "_ARGCOMPLETE"
 """Set by a shell that asks how a command line may go on."""
-_THREADS = "OPENBLAS_NUM_THREADS"
-"""Of numpy's linear algebra; those that it starts when it is loaded look for work for a tenth of a second each."""
 
 
 def run() -> None:
@@ -26,8 +24,8 @@ def run() -> None:
         from dodo_dsl.cli.loading import begin
 
         begin(sys.argv[2:])
-    if _THREADS not in os.environ:
-        os.putenv(_THREADS, "1")  # for this process alone: what it starts gets its variables from ``os.environ``
+    if "OPENBLAS_NUM_THREADS" not in os.environ:  # numpy's threads look for work for a tenth of a second each
+        os.putenv("OPENBLAS_NUM_THREADS", "1")  # for this process alone: what it starts gets what os.environ has
     if sys.argv[1:2] in (["compile"], ["list"], ["report"], ["run"]):
         gc.disable()  # what they read stays until the end; collecting garbage took up to a quarter of their time
     try:

@@ -127,7 +127,7 @@ class RealTimeClock:
     def close(self, stopped: Callable[[], bool]) -> None:
         """Wait until ``stopped`` where there are pictures: an application must not lose them while it is judged."""
         if self._has_memory:
-            await_end(stopped)
+            look_until(stopped)
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
         """Deliver messages until the instant, and then those that are there already."""
@@ -146,20 +146,11 @@ class RealTimeClock:
         return steps
 
 
-def pauses(longest: float) -> Iterator[float]:
-    """Seconds between looks whether something is over, first short ones: a signal ends no sleep."""
-    pause = 0.001
-    while True:
-        yield pause
-        pause = min(2 * pause, longest)
-
-
-def await_end(stopped: Callable[[], bool]) -> None:
-    """Wait until ``stopped``."""
-    for pause in pauses(_SLICE):
-        if stopped():
-            return
+def look_until(is_over: Callable[[], bool], pause: float = 0.001, longest: float = _SLICE) -> None:
+    """Look less and less often, where the kernel gives no notice, until it is over; a signal ends no pause."""
+    while not is_over():
         time.sleep(pause)
+        pause = min(1.5 * pause, longest)
 
 
 def _deliver(inbox: Inbox, timeout: float) -> bool:

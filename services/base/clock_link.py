@@ -2,14 +2,13 @@
 
 import select
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.opendlv.channel import CLOCK_SOCKET, Channel, Done, Hello, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
-from services.base.clock import pauses
 from services.base.members import channel
 
 SLICE_S = 0.1
@@ -34,7 +33,7 @@ class ClockClient:
         self._channel = Channel.connect(path or socket_path())
         self._channel.send(Hello(name))
         self._begin = session.messages.id("dodo.TestBegin")
-        self._pauses: Iterator[float] | None = None
+        self._pause = 0.001
 
     def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | Show | None:
         """The next command, or None after a while; ``observe`` takes everything that was on the bus before it."""
@@ -60,8 +59,8 @@ class ClockClient:
         try:
             command = self._channel.receive(timeout)
         except EOFError:  # the clock has ended, and the runner will end this service
-            self._pauses = self._pauses or pauses(SLICE_S)
-            time.sleep(next(self._pauses))
+            time.sleep(self._pause)
+            self._pause = min(2 * self._pause, SLICE_S)
             return None
         assert not isinstance(command, Hello | Done), "the clock gives commands"
         return command

@@ -11,7 +11,6 @@ them on: with the sample time of the frame, and without surplus answers. They ar
 the bus, which does not count here.
 """
 
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -26,7 +25,7 @@ from dodo_dsl.opendlv.posix_memory import PosixSegment
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import LOCK_PATIENCE, SharedMemory
 from dodo_dsl.opendlv.sysv_memory import Segment
-from services.base.clock import Inbox, await_end
+from services.base.clock import Inbox, look_until
 from services.base.clock_link import ClockClient
 
 _POLL_S = 0.0002
@@ -94,17 +93,9 @@ class Announcer:
         return sum(memory.readers_waiting() for memory in self.memories) >= self._readers
 
     def await_readers(self, stopped: Callable[[], bool]) -> bool:
-        """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``.
-
-        The kernel gives no notice when a process begins to wait, so this polls, less and less often.
-        """
-        pause = _POLL_S
-        while not self.is_awaited:
-            if stopped():
-                return False
-            time.sleep(pause)
-            pause = min(pause * 1.2, _LONGEST_POLL_S)
-        return True
+        """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``."""
+        look_until(lambda: self.is_awaited or stopped(), _POLL_S, _LONGEST_POLL_S)
+        return self.is_awaited
 
     def announce(self) -> None:
         """Announce all new pictures."""
@@ -334,7 +325,7 @@ class LockstepClock:
             self._answer(ended=True)
         self._source.close()
         if self._announcer.memories:
-            await_end(stopped)
+            look_until(stopped)
 
     def _command(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | Show | None:
         """The next command; None when the service is to stop."""
