@@ -24,7 +24,9 @@ def run() -> None:
         from dodo_dsl.cli.loading import begin
 
         begin(sys.argv[2:])
-    if sys.argv[1:2] in (["compile"], ["list"], ["report"]):
+    if "OPENBLAS_NUM_THREADS" not in os.environ:  # numpy's threads look for work for a tenth of a second each
+        os.putenv("OPENBLAS_NUM_THREADS", "1")  # for this process alone: what it starts gets what os.environ has
+    if sys.argv[1:2] in (["compile"], ["list"], ["report"], ["run"]):
         gc.disable()  # what they read stays until the end; collecting garbage took up to a quarter of their time
     try:
         from dodo_dsl.cli.main import main
@@ -34,6 +36,7 @@ def run() -> None:
         code = main(sys.argv[1:], sys.stdout, sys.stderr)
     except KeyboardInterrupt:
         code = 130
+    gc.freeze()  # the interpreter's end would look at everything once more
     sys.exit(_flushed(code))
 
 

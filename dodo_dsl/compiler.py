@@ -159,18 +159,22 @@ def load(
     start: Path | None = None,
     reader: Reader = read,
     services_only: bool = False,
+    names: Collection[str] = (),
 ) -> Checked:
     """Reads and checks the specs at or below ``paths``, or those of the deployment's registries without any.
 
     ``application`` are compose files that replace the deployment's, which is looked for at ``start``, then above the
-    tests. ``reader`` may know texts that are not saved yet. With ``services_only`` no test is read.
+    tests. ``reader`` may know texts that are not saved yet. With ``services_only`` no test is read, and where
+    all ``names`` are those of files, no other is.
     """
     deployment, found = load_deployment(find_deployment(start or Path.cwd(), paths), reader)
     manifests, manifest_problems = load_manifests(deployment.services, reader)
     own = unknown_messages(deployment.services, reader, known_ids(deployment.messages))
     locations, empty = locate(paths, deployment.registry, _registries_above(paths, reader))
+    is_each_one = {location.stem for location in locations}.issuperset(names)
+    wanted = [location for location in locations if location.stem in names] if names and is_each_one else locations
     once = functools.lru_cache(maxsize=_MOST_READ)(reader)
-    loaded = {} if services_only else {location.path: load_spec(location, once) for location in locations}
+    loaded = {} if services_only else {location.path: load_spec(location, once) for location in wanted}
     source = None
     if files := application or deployment.application:
         source, of_application = read_application(

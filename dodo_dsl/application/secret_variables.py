@@ -1,5 +1,6 @@
 """Variables that look like secrets: the pipeline's own, tokens, passwords and keys."""
 
+import functools
 import re
 from collections.abc import Collection, Iterator, Mapping
 from fnmatch import fnmatchcase
@@ -67,7 +68,8 @@ def passed_secrets(variables: Mapping[str, str], passed: Collection[str]) -> Ite
             yield f"{what}; what it prints of it is in its log"
 
 
-def _matches(name: str, patterns: Collection[str]) -> bool:
+@functools.lru_cache(maxsize=1024)  # a run asks for each of its own variables with each process
+def _matches(name: str, patterns: tuple[str, ...]) -> bool:
     return any(fnmatchcase(name.upper(), pattern) for pattern in patterns)
 
 

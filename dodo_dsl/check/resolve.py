@@ -16,7 +16,7 @@ from dodo_dsl.check.wiring import ANYTHING, Port, Wiring, driving, message, wire
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.opendlv import odvd
 from dodo_dsl.opendlv.assets import recording_contents
-from dodo_dsl.opendlv.odvd import STANDARD, STANDARD_0_9
+from dodo_dsl.opendlv.odvd import STANDARD_0_9
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import FRAME, Argument, ResolvedService, resolved
 from dodo_dsl.spec.deployment import Deployment
@@ -133,7 +133,7 @@ def known_ids(own: tuple[Path, ...]) -> Mapping[str, int]:
 @functools.cache
 def known_messages(own: tuple[Path, ...]) -> Mapping[str, odvd.Definition]:
     """The standard messages and those in a deployment's files, as far as these can be read, by name."""
-    found = {d.name: d for d in odvd.load(STANDARD)}
+    found = {d.name: d for d in odvd.shipped()}
     for path in own:
         try:
             found.update((d.name, d) for d in odvd.load(path))

@@ -7,6 +7,7 @@ import argparse
 import asyncio
 import contextlib
 import fcntl
+import gc
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -180,6 +181,8 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
             jobs, deployment = prepare(options, folder.path, quietly)
             _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
             runner = runner_of(options, jobs, deployment, quietly, load)
+        gc.freeze()
+        gc.enable()
         with reserved(options.report, stdout):
             source, said = origin(options, deployment), options.verbosity
             outcomes, is_reported, repeats = run(runner, jobs, options.report, stdout, source, said=said)

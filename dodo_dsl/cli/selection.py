@@ -70,7 +70,7 @@ def select(
     """
     paths = [Path(word) for word in words if _is_path(word)]
     names = [word for word in words if not _is_path(word)]
-    checked = load(paths, existing_files(application), settings=settings)
+    checked = load(paths, existing_files(application), settings=settings, names=() if paths else names)
     if checked.empty:
         raise NoSuchTest(f"there is no test at '{checked.empty[0]}'; specs end in .dodo.yml")
     given = {spec.path for spec in checked.specs} if paths else set()

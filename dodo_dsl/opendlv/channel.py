@@ -42,7 +42,7 @@ class Done(Struct, tag=True, array_like=True):
     """A service has done what it was to do, and sent these messages meanwhile; ``about`` is in the first one alone.
 
     ``pictures`` are new ones, ``sampled`` is when the newest was (us), and ``next`` when it has something to say next,
-    0 when it does not know.
+    0 when it does not know. ``awaited`` says that readers of new pictures wait for them already.
     """
 
     service: str
@@ -52,6 +52,7 @@ class Done(Struct, tag=True, array_like=True):
     next: int = 0
     ended: bool = False
     about: About | None = None
+    awaited: bool = False
 
 
 Message = Step | Show | Done

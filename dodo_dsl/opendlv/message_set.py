@@ -11,7 +11,7 @@ from google.protobuf.message import DecodeError, Message
 
 from dodo_dsl.opendlv import odvd, wire
 from dodo_dsl.opendlv.numbers import is_whole, whole
-from dodo_dsl.opendlv.odvd import INTEGER_BITS, STANDARD, Definition, OdvdError, integer_range
+from dodo_dsl.opendlv.odvd import INTEGER_BITS, Definition, OdvdError, integer_range, shipped
 from dodo_dsl.opendlv.protobuf_classes import Layout, build
 
 
@@ -176,12 +176,6 @@ def besides(first: Iterable[Definition], others: Iterable[Definition], kept: Con
     """Those of the others whose name and id no message of the first has, and those whose names are ``kept``."""
     taken = {key for definition in first for key in (definition.name, definition.id)}
     return [each for each in others if each.name in kept or taken.isdisjoint((each.name, each.id))]
-
-
-@cache
-def shipped() -> tuple[Definition, ...]:
-    """The messages that DoDo knows by itself, read once."""
-    return odvd.load(STANDARD)
 
 
 @cache

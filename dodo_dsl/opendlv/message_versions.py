@@ -6,8 +6,8 @@ from pathlib import Path
 from dodo_dsl.opendlv import message_columns, odvd
 from dodo_dsl.opendlv.frame_table import Fact
 from dodo_dsl.opendlv.message_columns import Numbers
-from dodo_dsl.opendlv.message_set import MessageSet, besides, merged, shipped
-from dodo_dsl.opendlv.odvd import STANDARD_0_9, Definition
+from dodo_dsl.opendlv.message_set import MessageSet, besides, merged
+from dodo_dsl.opendlv.odvd import STANDARD_0_9, Definition, shipped
 from dodo_dsl.opendlv.recording import Recording
 
 OLD, NEW = "0.9", "1.0"

@@ -8,6 +8,7 @@
 Fields without an id are counted from 1 in their order. An error names file, line and column.
 """
 
+import functools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -183,6 +184,12 @@ def load(path: Path) -> tuple[Definition, ...]:
     except UnicodeDecodeError:
         raise OdvdError(f"{path}: not UTF-8 text") from None
     return parse(text, str(path))
+
+
+@functools.cache
+def shipped() -> tuple[Definition, ...]:
+    """The messages that DoDo knows by itself, read once."""
+    return load(STANDARD)
 
 
 def parse(text: str, file: str = "<odvd>") -> tuple[Definition, ...]:

@@ -23,8 +23,8 @@ def listening(services: Mapping[int, str], proc: Path = _PROC) -> set[str] | Non
     found, seen, hidden = set(), set(), set()
     for pid, name in owners(services, living(proc)).items():
         try:
-            if name not in found and not _sockets(proc / str(pid)).isdisjoint(_at_the_port(proc / str(pid))):
-                found.add(name)
+            if name not in found and (own := _sockets(proc / str(pid))):
+                found |= set() if own.isdisjoint(_at_the_port(proc / str(pid))) else {name}
             seen.add(name)
         except (FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
             continue

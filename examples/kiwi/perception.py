@@ -157,6 +157,7 @@ def main() -> int:
     parser.add_argument("--verbose", action="store_true", help="print what is found")
     flags = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    cv2.setNumThreads(1)  # a frame takes a millisecond: other threads look for work for longer than they help
 
     numbers, size = itertools.count(), flags.width * flags.height * 4
     with Session(flags.cid) as session:

@@ -126,8 +126,8 @@ class RealTimeClock:
 
     def close(self, stopped: Callable[[], bool]) -> None:
         """Wait until ``stopped`` where there are pictures: an application must not lose them while it is judged."""
-        while self._has_memory and not stopped():
-            time.sleep(_SLICE)
+        if self._has_memory:
+            look_until(stopped)
 
     def _wait(self, due: int, inbox: Inbox, stopped: Callable[[], bool]) -> None:
         """Deliver messages until the instant, and then those that are there already."""
@@ -144,6 +144,13 @@ class RealTimeClock:
         steps = int(late // period)
         _log.warning("%.1f s late, skipped %d steps", late / MICROSECONDS, steps)
         return steps
+
+
+def look_until(is_over: Callable[[], bool], pause: float = 0.001, longest: float = _SLICE) -> None:
+    """Look less and less often, where the kernel gives no notice, until it is over; a signal ends no pause."""
+    while not is_over():
+        time.sleep(pause)
+        pause = min(1.5 * pause, longest)
 
 
 def _deliver(inbox: Inbox, timeout: float) -> bool:

@@ -33,6 +33,7 @@ class ClockClient:
         self._session = session
         self._channel = Channel.connect(path or socket_path(), name)
         self._begin = session.messages.id("dodo.TestBegin")
+        self._pause = 0.001
 
     def next(self, observes: bool, observe: Callable[[Envelope], None]) -> Step | Show | None:
         """The next command, or None after a while; ``observe`` takes everything that was on the bus before it."""
@@ -58,7 +59,8 @@ class ClockClient:
         try:
             command = self._channel.receive(timeout)
         except EOFError:  # the clock has ended, and the runner will end this service
-            time.sleep(SLICE_S)
+            time.sleep(self._pause)
+            self._pause = min(2 * self._pause, SLICE_S)
             return None
         assert not isinstance(command, Done), "the clock gives commands"
         return command

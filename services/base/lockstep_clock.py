@@ -11,7 +11,6 @@ them on: with the sample time of the frame, and without surplus answers. They ar
 the bus, which does not count here.
 """
 
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -26,7 +25,7 @@ from dodo_dsl.opendlv.posix_memory import PosixSegment
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import LOCK_PATIENCE, SharedMemory
 from dodo_dsl.opendlv.sysv_memory import Segment
-from services.base.clock import Inbox
+from services.base.clock import Inbox, look_until
 from services.base.clock_link import ClockClient
 
 _POLL_S = 0.0002
@@ -88,18 +87,15 @@ class Announcer:
         """When the newest picture was sampled."""
         return max((memory.sampled for memory in self.memories), default=0)
 
-    def await_readers(self, stopped: Callable[[], bool]) -> bool:
-        """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``.
+    @property
+    def is_awaited(self) -> bool:
+        """Whether all readers wait."""
+        return sum(memory.readers_waiting() for memory in self.memories) >= self._readers
 
-        The kernel gives no notice when a process begins to wait, so this polls, less and less often.
-        """
-        pause = _POLL_S
-        while sum(memory.readers_waiting() for memory in self.memories) < self._readers:
-            if stopped():
-                return False
-            time.sleep(pause)
-            pause = min(pause * 1.2, _LONGEST_POLL_S)
-        return True
+    def await_readers(self, stopped: Callable[[], bool]) -> bool:
+        """Wait until all readers wait, so that none misses a picture or reads one twice; False when ``stopped``."""
+        look_until(lambda: self.is_awaited or stopped(), _POLL_S, _LONGEST_POLL_S)
+        return self.is_awaited
 
     def announce(self) -> None:
         """Announce all new pictures."""
@@ -208,8 +204,6 @@ class StepMarks:
 
 
 __all__ = ["EPOCH", "LockstepClock"]
-
-_LINGER_S = 0.05
 
 
 class StepSource(Protocol):
@@ -330,8 +324,8 @@ class LockstepClock:
         if self._open:
             self._answer(ended=True)
         self._source.close()
-        while self._announcer.memories and not stopped():
-            time.sleep(_LINGER_S)
+        if self._announcer.memories:
+            look_until(stopped)
 
     def _command(self, inbox: Inbox, stopped: Callable[[], bool]) -> Step | Show | None:
         """The next command; None when the service is to stop."""
@@ -345,7 +339,8 @@ class LockstepClock:
         sent, about, announcer = self._sent, self._about, self._announcer
         self._sent, self._about, self._open = [], None, False
         pictures = len(announcer.new)
-        self._source.answer(Done(self._name, sent, pictures, announcer.sampled, self._next, ended, about))
+        awaited = pictures > 0 and announcer.is_awaited
+        self._source.answer(Done(self._name, sent, pictures, announcer.sampled, self._next, ended, about, awaited))
 
 
 def in_order(messages: Iterable[Envelope]) -> deque[tuple[int, Envelope]]:

@@ -199,6 +199,7 @@ class Context:
 Build = Callable[[Context], Service]
 
 
-def period_of(freq: float) -> Fraction:
+def period_of(freq: float) -> Fraction | int:
     """The period in microseconds of a rate in Hz, exactly: steps at 60 and at 30 Hz stay aligned."""
-    return max(Fraction(1), MICROSECONDS / Fraction(freq).limit_denominator(MICROSECONDS))
+    period = max(Fraction(1), MICROSECONDS / Fraction(freq).limit_denominator(MICROSECONDS))
+    return period.numerator if period.denominator == 1 else period

@@ -158,8 +158,9 @@ class SteppedApplication:
         if shown:
             self.answers.expect(camera.sampled for camera in shown)
         for camera in shown:
-            self._link.send(camera.service, Show(awaits=True, announces=False))
-            while self._link.result(camera.service) is None:
+            if not camera.awaited:
+                self._link.send(camera.service, Show(awaits=True, announces=False))
+            while not camera.awaited and self._link.result(camera.service) is None:
                 if self._stopped():
                     return
                 if self._left <= 0:

@@ -18,6 +18,7 @@ _LOOK_AGAIN = 20
 """Looks after which new processes of the application are looked for again, and sooner where some began."""
 GROUP = "dodo-"
 """How the names of control groups begin that hold one service of the application, and nothing else."""
+_MOST_READ = 1 << 16
 _TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 _BUSY = (0, 1, 2, 5, 6, 7)
 """Columns of ``/proc/stat`` (proc_pid_stat(5)) in which a core is not free: user, nice, system, interrupts, stolen."""
@@ -69,7 +70,8 @@ class ProcessorTimes(NamedTuple):
 
     def by_others(self, before: "ProcessorTimes", waited_s: float) -> float:
         """The part of a wait of the clock's own that falls to others than the application."""
-        return min(waited_s * self._share(before, self._ran_s(before)), self._others_s(before))
+        others_s = self._others_s(before)
+        return min(waited_s * _share(others_s, self._ran_s(before)), others_s)
 
     def longest_wait(self, before: "ProcessorTimes") -> float:
         """Seconds that others kept the process waiting which they kept the longest since another snapshot."""
@@ -77,17 +79,12 @@ class ProcessorTimes(NamedTuple):
 
     def _waits(self, before: "ProcessorTimes") -> list[float]:
         """The part of each process's wait that falls to others, by what they and the application's others took."""
-        ran_s = self._ran_s(before)
+        ran_s, others_s = self._ran_s(before), self._others_s(before)
         waits = []
         for pid, threads in self.threads.items():
             own = _busiest(threads, before.threads.get(pid, {}))
-            waits.append(own.waited_s * self._share(before, max(ran_s - own.ran_s, 0.0)))
+            waits.append(own.waited_s * _share(others_s, max(ran_s - own.ran_s, 0.0)))
         return waits
-
-    def _share(self, before: "ProcessorTimes", application_s: float) -> float:
-        """That of others in what they and ``application_s`` took of the processors."""
-        others_s = self._others_s(before)
-        return 1.0 if application_s == 0 or math.isinf(others_s) else others_s / (others_s + application_s)
 
     def _ran_s(self, before: "ProcessorTimes") -> float:
         ran = sum(max(now - before.ran_s.get(pid, now), 0.0) for pid, now in self.ran_s.items())
@@ -106,6 +103,11 @@ class ProcessorTimes(NamedTuple):
         return max(now.machine_s - then.machine_s - self._ran_s(before), 0.0) + _TICK_S
 
 
+def _share(others_s: float, application_s: float) -> float:
+    """That of others in what they and the application took of the processors."""
+    return 1.0 if application_s == 0 or math.isinf(others_s) else others_s / (others_s + application_s)
+
+
 NOTHING = ProcessorTimes({}, {})
 
 
@@ -114,6 +116,7 @@ class ApplicationProcesses:
 
     def __init__(self, roots: Iterable[int], proc: Path = Path("/proc")) -> None:
         self._roots, self._proc = frozenset(roots), proc
+        self._stat, self._load = f"{proc}/stat", f"{proc}/loadavg"
         self._pids: tuple[int, ...] = ()
         self._looks = 0
         self._begun: int | None = None
@@ -140,8 +143,8 @@ class ApplicationProcesses:
 
     def _account(self) -> Account | None:
         with contextlib.suppress(OSError, ValueError):
-            machine_s = busy_s((self._proc / "stat").read_text(), os.sched_getaffinity(0))
-            begun = int((self._proc / "loadavg").read_text().split()[-1]) if os.getppid() == 1 else None
+            machine_s = busy_s(_read(self._stat), os.sched_getaffinity(0))
+            begun = int(_read(self._load).split()[-1]) if os.getppid() == 1 else None
             return Account(self._used_by_groups(), machine_s, begun)
         return None
 
@@ -155,14 +158,25 @@ class ApplicationProcesses:
         return sum(self._used.values())
 
 
-def busy_s(text: str, cores: Collection[int]) -> float:
+def busy_s(text: bytes, cores: Collection[int]) -> float:
     """Seconds for which any process ran on these cores, by the text of ``/proc/stat``."""
     ticks = 0
     for line in text.splitlines():
         name, *numbers = line.split()
-        if name[:3] == "cpu" and name[3:].isdecimal() and int(name[3:]) in cores:
+        if name[:3] != b"cpu":
+            break
+        if name[3:] and int(name[3:]) in cores:
             ticks += sum(int(numbers[column]) for column in _BUSY if column < len(numbers))
     return ticks * _TICK_S
+
+
+def _read(path: str) -> bytes:
+    """What a file holds, which several are read for twice a frame: pathlib would take five times as long."""
+    file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        return os.read(file, _MOST_READ)
+    finally:
+        os.close(file)
 
 
 def _group_of(pid: int, proc: Path) -> Path | None:
@@ -186,16 +200,16 @@ def _group_of(pid: int, proc: Path) -> Path | None:
 
 def _used_s(group: Path) -> float:
     """Seconds, by ``cpuacct.usage`` in ns or ``cpu.stat`` with a row in us."""
-    text = group.read_text()
-    if " " not in text:
+    text = _read(str(group))
+    if b" " not in text:
         return int(text) / 1e9
-    return next(int(row.split()[1]) for row in text.splitlines() if row.startswith("usage_usec ")) / 1e6
+    return next(int(row.split()[1]) for row in text.splitlines() if row.startswith(b"usage_usec ")) / 1e6
 
 
-def own_wait_s(schedstat: Path = Path("/proc/thread-self/schedstat")) -> float:
+def own_wait_s(schedstat: str = "/proc/thread-self/schedstat") -> float:
     """How long this thread has been ready to run without a processor, in s; 0 if the kernel does not say."""
     with contextlib.suppress(OSError, ValueError):
-        _, waited, *_ = schedstat.read_bytes().split()
+        _, waited, *_ = _read(schedstat).split()
         return int(waited) / 1e9
     return 0.0
 
@@ -230,18 +244,11 @@ def _process_clock(pid: int) -> float:
 
 
 def _threads(tasks: str) -> Iterator[tuple[str, ThreadSpent]]:
-    """The threads of a process by their ids: the first two numbers of schedstat are times in ns.
-
-    This is done twice a frame while the application waits, and pathlib would take five times as long.
-    """
+    """The threads of a process by their ids: the first two numbers of schedstat are times in ns."""
     with contextlib.suppress(OSError):
         for thread in os.listdir(tasks):  # noqa: PTH208
             with contextlib.suppress(OSError, ValueError):
-                file = os.open(f"{tasks}/{thread}/schedstat", os.O_RDONLY | os.O_CLOEXEC)
-                try:
-                    ran, waited, *_ = os.read(file, 100).split()
-                finally:
-                    os.close(file)
+                ran, waited, *_ = _read(f"{tasks}/{thread}/schedstat").split()
                 yield thread, ThreadSpent(int(ran) / 1e9, int(waited) / 1e9)
 
 

@@ -1,12 +1,13 @@
 """The virtual camera: follows a vehicle's frames and draws a picture whenever one is due."""
 
 import logging
+from collections import deque
 from collections.abc import Callable
 
 import cv2
 import numpy as np
 
-from services.scene.camera import LONGEST_GAP, CameraFrame, CameraPose, body_pose, motion_between, still
+from services.scene.camera import LONGEST_GAP, CameraFrame, CameraMotion, CameraPose, body_pose, motion_between, still
 from services.scene.raster import Image
 from services.scene.render import Renderer
 from services.virtual_camera.optics import Optics
@@ -45,22 +46,17 @@ class VirtualCamera:
         self._renderer, self._mounted, self._publish = renderer, mounted, publish
         self._argb = np.empty((height, width, 4), np.uint8)
         self._i420 = np.empty((height * 3 // 2, width), np.uint8)
-        self._motion = still(start) if start else None
-        self._framed: int | None = None
+        self._start = still(start) if start else None
+        self._frames: deque[tuple[CameraPose, int]] = deque(maxlen=2)
+        """The poses of the last frames, and their sample times."""
         self._log = logging.getLogger(__name__)
         self.refused = 0
         """How many frames had no valid pose; the camera stays where it was."""
 
     def take_frame(self, frame: CameraFrame, sample_time: int) -> None:
         """The vehicle is where the frame says; ``sample_time`` in us of test time."""
-        pose = self._pose(frame, sample_time)
-        if pose is None:
-            return
-        if self._motion is None or self._framed is None:
-            self._motion = still(pose)
-        else:
-            self._motion = motion_between(self._motion.pose, pose, sample_time - self._framed)
-        self._framed = sample_time
+        if pose := self._pose(frame, sample_time):
+            self._frames.append((pose, sample_time))
 
     @property
     def bodies(self) -> tuple[int, ...]:
@@ -85,11 +81,18 @@ class VirtualCamera:
 
     def update(self, now: int) -> CameraPose | None:
         """Draws and publishes one picture, sampled at ``now`` (us of test time); the camera's pose in the world."""
-        if self._motion is None:
+        motion = self._motion(now)
+        if motion is None:
             return None
-        if self._framed is not None and now - self._framed > LONGEST_GAP * 1e6:
-            self._motion = still(self._motion.pose)
-        self._optics.expose(self._renderer, self._motion, self._mounted, now, self._argb)
+        self._optics.expose(self._renderer, motion, self._mounted, now, self._argb)
         to_i420(self._argb, self._i420)
         self._publish(self._argb, self._i420, now)
-        return self._motion.pose.carrying(self._mounted)
+        return motion.pose.carrying(self._mounted)
+
+    def _motion(self, now: int) -> CameraMotion | None:
+        if not self._frames:
+            return self._start
+        (before, earlier), (pose, framed) = self._frames[0], self._frames[-1]
+        if now - framed > LONGEST_GAP * 1e6:
+            return still(pose)
+        return motion_between(before, pose, framed - earlier)  # which is none between a frame and itself

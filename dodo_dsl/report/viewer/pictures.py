@@ -7,8 +7,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dodo_dsl import atomic
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.picture_size import too_large
@@ -55,7 +53,7 @@ def _senders(recording: Path, messages: MessageSet) -> list[int]:
     try:
         with Recording(recording) as opened:
             rows = opened.rows({messages.id(PICTURES)})
-            return [int(sender) for sender in np.unique(opened.index["sender_stamp"][rows])]
+            return sorted({*opened.index["sender_stamp"][rows].tolist()})  # numpy's unique loads masked arrays
     except (OSError, RecordingError):
         return []
 

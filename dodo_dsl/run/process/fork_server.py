@@ -38,21 +38,21 @@ LOADED = (
 
 
 def load() -> None:
-    """Imports what most services need."""
+    """Imports what most services need, which the garbage collection of the forks leaves alone."""
+    gc.disable()
     _import(LOADED)
     from dodo_dsl.opendlv.message_set import MessageSet
 
     MessageSet.standard()
-    _exempt()
+    gc.freeze()
 
 
 def load_services(modules: Iterable[str]) -> None:
-    """Imports what these services of DoDo's consist of, and what their packages name as LIBRARIES."""
+    """Imports what these services of DoDo's consist of."""
     for module in modules:
         _import([module, f"{module}.__main__"])
         sys.modules.pop(f"{module}.__main__", None)  # it runs as __main__
-        _import(getattr(sys.modules.get(module), "LIBRARIES", ()))
-    _exempt()
+    gc.freeze()
 
 
 def _import(names: Iterable[str]) -> None:
@@ -64,12 +64,6 @@ def _import(names: Iterable[str]) -> None:
             importlib.import_module(name)
     os.environ.clear()
     os.environ.update(before)  # OpenCV sets some, too, and applications inherit them
-
-
-def _exempt() -> None:
-    """Exempts all that is loaded from the garbage collection of the forks."""
-    gc.collect()
-    gc.freeze()
 
 
 def serve(runner: socket.socket) -> None:
@@ -97,6 +91,7 @@ def serve(runner: socket.socket) -> None:
 def _sandbox(runner: socket.socket, channel: int, log: int, slot: str, entered: str) -> int:
     """The fork's whole life; its exit code."""
     runner.close()
+    gc.enable()
     os.dup2(log, sys.stderr.fileno())
     os.close(log)
     os.setsid()
@@ -119,4 +114,4 @@ def main(argv: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    os._exit(main(sys.argv[1:]))  # the interpreter would take apart first what was loaded

@@ -171,7 +171,8 @@ class Sandbox:
         self.send(use=taken and asdict(self.children.with_ended(taken)))
 
     def _do_listeners(self, _descriptors: list[int]) -> None:
-        found = listening(self.children.names) if _has_own_proc() else None
+        application = {pid: name for pid, name in self.children.names.items() if name in self.children.limits}
+        found = listening(application) if _has_own_proc() else None
         self.send(listeners=None if found is None else sorted(found))
 
     def _do_keep(self, descriptors: list[int]) -> None:

@@ -174,5 +174,5 @@ def test_contention_is_the_total_of_some_in_seconds(tmp_path: Path) -> None:
 
 def test_the_own_wait_is_the_second_number_of_the_kernels_in_seconds(tmp_path: Path) -> None:
     (tmp_path / "schedstat").write_text("7000000000 2500000000 12\n")
-    assert own_wait_s(tmp_path / "schedstat") == 2.5
-    assert own_wait_s(tmp_path / "none") == 0.0
+    assert own_wait_s(str(tmp_path / "schedstat")) == 2.5
+    assert own_wait_s(str(tmp_path / "none")) == 0.0
