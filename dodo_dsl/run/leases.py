@@ -183,7 +183,7 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
     with _alone() as folder:
         if any(name in one.names and not (one.since or (one.shared and shared)) for one in _claims(folder)):
             return None
-        path = folder / f"{name}.{os.getpid()}.{next(_NUMBERS)}.json"
+        path = folder / f"{name}.{os.getpid()}.{next(_NUMBERS)}.lease"
         claim = Claim(frozenset({name}), 0, shared, about={"pid": os.getpid(), **about})
         return Lease(name, _written(path, claim), path)
 
@@ -264,7 +264,7 @@ async def in_turn(
 def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
     """This user's leases whose holders have ended and may have left something; each is yielded held, and about what."""
     with _alone() as folder:
-        paths = sorted(folder.glob(f"{prefix}*.json"))
+        paths = sorted(folder.glob(f"{prefix}*.lease"))
         list(_claims(folder))
     for path in paths:
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:

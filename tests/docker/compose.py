@@ -125,7 +125,7 @@ class Crate:
         names = [name for words in _LISTS for name in _docker(*words) if f"dodo-{self.mark}-" in name]
         lost = {name for name in names if _is_lost(name)}
         kept = {name.removesuffix("_default") for name in lost}
-        records = [path.name for path in (self.bench.folder / "leases").glob("*.json")]
+        records = [path.name for path in (self.bench.folder / "leases").glob("*.lease")]
         records = [name for name in records if not any(f"-{project}." in name for project in kept)]
         return [name for name in names if name not in lost] + records
 

@@ -49,4 +49,4 @@ def test_a_strangers_container_on_a_leftover_network_blocks_nothing_else(client:
     finally:
         stranger.remove(force=True)
     assert capabilities.clean().removed == ["a-blocked: 1 containers, networks and volumes"]
-    assert list(leases.lease_folder().glob("*.json")) == []
+    assert list(leases.lease_folder().glob("*.lease")) == []

@@ -59,7 +59,7 @@ def test_a_group_loses_its_write_permission(folder: Path) -> None:
     assert stat.S_IMODE(secured(folder).stat().st_mode) == 0o750
 
 
-@pytest.mark.parametrize("name", ["leases.lock", "cid-130.PID.0.json"])
+@pytest.mark.parametrize("name", ["leases.lock", "cid-130.PID.0.lease"])
 def test_a_planted_symlink_is_not_written_through(folder: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     folder.mkdir(mode=0o700)
     victim = folder.parent / "victim"
@@ -78,7 +78,7 @@ def test_a_planted_symlink_is_not_written_through(folder: Path, name: str, monke
 def test_a_record_that_never_ends_is_not_read(folder: Path) -> None:
     """A lease's record that never ends is not read."""
     folder.mkdir(mode=0o700)
-    os.mkfifo(folder / "cid-130.1.json")
+    os.mkfifo(folder / "cid-130.1.lease")
     assert leases.holder("cid-130") == "another process"
     assert list(leases.orphans("cid-")) == []
 

@@ -240,9 +240,9 @@ def test_a_waiter_that_is_killed_is_skipped_and_its_ticket_removed(folder: Path)
 
 @pytest.mark.parametrize("text", ["", "[]", '{"names": 3}', "[" * 100_000])
 def test_a_damaged_file_stands_for_its_name_as_long_as_somebody_has_it(folder: Path, text: str) -> None:
-    for name in ("queue.1.1.1", "cid-121.1.1.json"):
+    for name in ("queue.1.1.1", "cid-121.1.1.lease"):
         (folder / name).write_text(text)
-    with (folder / "cid-122.1.1.json").open("w") as file, (folder / "queue.2.1.1").open("w") as other:
+    with (folder / "cid-122.1.1.lease").open("w") as file, (folder / "queue.2.1.1").open("w") as other:
         for each in (file, other):
             each.write(text)
             each.flush()
@@ -288,5 +288,5 @@ def test_what_dead_holders_had_and_cannot_have_left_is_removed(folder: Path) -> 
     for name in ("machine", "device-1-3", "cid-121", "run-a", "docker-b"):
         take(name).leave()
     take("cid-122").release()
-    left = {path.name.partition(".")[0] for path in folder.glob("*.json")}
+    left = {path.name.partition(".")[0] for path in folder.glob("*.lease")}
     assert left == {"cid-121", "run-a", "docker-b"}

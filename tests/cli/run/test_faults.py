@@ -62,7 +62,7 @@ def test_disk_with_the_report_is_full(desk: Desk, small_disk: Path, book: Book) 
     assert f"\n'{small_disk}' {unwritten}\n" in out
     assert "Traceback" not in out
     assert gone(marks(desk))
-    assert list((desk.folder / "leases").glob("*.json")) == []
+    assert list((desk.folder / "leases").glob("*.lease")) == []
     book.record("The disk with the report is full", "process", "error", f"{reason}; 'dodo-report' {unwritten}")
 
 
@@ -93,7 +93,7 @@ def test_next_run_removes_what_a_killed_sandbox_left_on_the_host(desk: Desk, boo
     assert second.returncode == 0, out
     (note,) = [line for line in out.splitlines() if line.startswith("removed what a killed run left: test: 1 proc")]
     assert gone(marks(desk))
-    assert list((desk.folder / "leases").glob("*.json")) == []
+    assert list((desk.folder / "leases").glob("*.lease")) == []
     book.record("The runner is killed, and run again", "process", str(desk.results("second")[0]["outcome"]), note)
 
 

@@ -125,7 +125,7 @@ def test_tests_at_once_are_apart_and_leave_nothing(bench: Bench) -> None:
     assert [o.outcome for o in outcomes] == ["passed"] * 3
     assert processes_with(mark) == []
     assert _fork_servers() == []
-    assert list((bench.folder / "leases").glob("*.json")) == []
+    assert list((bench.folder / "leases").glob("*.lease")) == []
     shown = [bench.log(p, "application.app") for p in plans]
     if bench.isolation == "host":
         assert len({o.cid for o in outcomes}) == 3

@@ -69,7 +69,7 @@ def leased(cid: int, alone: bool = False) -> Slot:
 def test_foreign_traffic_is_an_error_that_names_its_sender(cid: int, traffic: int, folder: Path) -> None:
     with pytest.raises(BackendError, match=rf"CID {cid} carries foreign traffic from [0-9.]+:{traffic}; end it, or "):
         leased(cid)
-    assert list(folder.glob("*.json")) == []
+    assert list(folder.glob("*.lease")) == []
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_a_slot_has_names_of_its_own_unless_it_is_alone(cid: int, folder: Path) 
     assert all(leftovers.SLOT_NAME.fullmatch(slot.name) for slot in slots)
     assert [slot.memory_prefix for slot in slots] == [slots[0].name, slots[1].name, ""]
     assert slots[0].name != slots[1].name
-    assert list(folder.glob("*.json")) == []
+    assert list(folder.glob("*.lease")) == []
 
 
 @pytest.mark.slow
@@ -133,7 +133,7 @@ def test_what_a_killed_run_left_is_removed(cid: int, folder: Path) -> None:
         lease.leave()
         assert leftovers.reap() == ["killed: 1 processes and 1 shared memories"]
         assert (mine.wait(), other.poll()) == (-15, None)
-    assert list(Path("/tmp").glob(f"{name}*")) == list(folder.glob("*.json")) == []
+    assert list(Path("/tmp").glob(f"{name}*")) == list(folder.glob("*.lease")) == []
     assert leftovers.reap() == []
 
 
@@ -143,7 +143,7 @@ def test_a_strange_record_removes_nothing_but_itself(slot: object, folder: Path)
     assert lease is not None
     lease.leave()
     assert leftovers.reap() == []
-    assert list(folder.glob("*.json")) == []
+    assert list(folder.glob("*.lease")) == []
 
 
 @pytest.mark.slow

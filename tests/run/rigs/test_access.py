@@ -87,4 +87,4 @@ def test_a_rig_in_use_is_waited_for_and_then_left(tmp_path: Path, monkeypatch: p
     began = time.monotonic()
     assert query_exclusively(121, "'dodo rig home'", command, said.append) == {}
     assert (len(said), time.monotonic() - began < leases.DEFAULT_PATIENCE_S) == (1, True)
-    assert list(tmp_path.glob("*.json")) == []
+    assert list(tmp_path.glob("*.lease")) == []

@@ -33,5 +33,5 @@ def test_a_plan_with_a_network_of_its_own_is_examined_all_the_same(place: Place,
     place.dodo("run", "--compiled", str(file.parent), "--backend", backend, code=3)
     (test,) = results(place.folder / "dodo-report").values()
     assert test["reason"].startswith("rig 'fake' cannot be checked: '")
-    assert list((place.folder / "leases").glob("*.json")) == []
+    assert list((place.folder / "leases").glob("*.lease")) == []
     assert not list((place.folder / "state").glob("*"))

@@ -25,11 +25,11 @@ def test_cid_and_devices_are_held_together_and_released(folder: Path) -> None:
     async def scene() -> list[str]:
         async with leased(121, "mine", print, devices=["/dev/null", "/dev/zero"]) as descriptors:
             assert len(descriptors) == 3
-            return sorted(path.name.split(".")[0] for path in folder.glob("*.json"))
+            return sorted(path.name.split(".")[0] for path in folder.glob("*.lease"))
 
     names = asyncio.run(scene())
     assert names == sorted(["cid-121", *device_leases(["/dev/null", "/dev/zero"])])
-    assert list(folder.glob("*.json")) == []
+    assert list(folder.glob("*.lease")) == []
 
 
 def test_the_emulated_rig_has_none(folder: Path) -> None:
@@ -76,5 +76,5 @@ def test_a_busy_device_gives_the_cid_back(folder: Path) -> None:
 
     with pytest.raises(leases.LeaseTimeout, match=r"no device came free within 0\.1 s; test theirs"):
         asyncio.run(scene())
-    assert [path.name.split(".")[0] for path in folder.glob("*.json")] == [name]
+    assert [path.name.split(".")[0] for path in folder.glob("*.lease")] == [name]
     held.release()
