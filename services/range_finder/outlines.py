@@ -200,7 +200,7 @@ class Mesh:
     def load(cls, file: Path) -> Self:
         """Raises MapError."""
         vertices, triangles = load_obj(file)
-        return cls(vertices, triangles, is_closed(triangles))
+        return cls(vertices, triangles, is_closed(vertices, triangles))
 
     def at(self, height: float) -> Array:
         """The segments (n, 2, 2) at a height."""
