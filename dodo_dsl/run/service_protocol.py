@@ -1,4 +1,4 @@
-"""What services tell the runner: JSON over the channel of a test, or lines of output where they do not reach it.
+"""What services report to the runner: JSON over the channel of a test, or lines of output where they do not reach it.
 
 Such a line is an object with the key ``dodo``; everything else that services print is log.
 """

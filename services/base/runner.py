@@ -1,4 +1,4 @@
-"""What a service tells the runner: over the test's channel, or by lines of its output where no runner listens."""
+"""What a service reports to the runner: over the test's channel, or by lines of its output where no runner listens."""
 
 import json
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ _runner: Connection | None = None
 
 @contextmanager
 def connected(folder: Path | None, service: str) -> Iterator[None]:
-    """Within the block, a runner that listens in the folder hears what is told."""
+    """Within the block, a runner that listens in the folder hears what is reported."""
     global _runner  # noqa: PLW0603  (a process is one service)
     try:
         _runner = Connection.open(folder / RUNNER_SOCKET, service) if folder else None
@@ -27,7 +27,7 @@ def connected(folder: Path | None, service: str) -> Iterator[None]:
 
 
 def tell(kind: str, **facts: object) -> None:
-    """Tells the runner something of a kind that ``dodo_dsl/run/protocol.py`` knows."""
+    """Reports something of a kind to the runner, one that ``dodo_dsl/run/protocol.py`` knows."""
     say(json.dumps({"dodo": kind, **facts}))
 
 
