@@ -234,22 +234,6 @@ class RunState:
         """Whether a failure may come from what a program was given, unlike a message that it must not send."""
         return finding.result == "failed" and bool(finding.is_verdict or self._ended_by or self.is_unanswered)
 
-    def _without_display(self, finding: Finding) -> Finding:
-        """The end of a program of the application that wanted to draw, with what to do."""
-        if finding.result == "passed" or not self.is_application(finding.service):
-            return finding
-        told = windowless(self._tails.get(finding.service, ()))
-        return replace(finding, reason=f"{finding.reason}; {told}") if told else finding
-
-    def _elsewhere(self, finding: Finding, cid: int) -> Finding:
-        """A failure for silence, with the test's CID, and the one that the application has joined instead."""
-        if not finding.silent:
-            return finding
-        told = [finding.reason, f"the test is on CID {cid}"]
-        if others := sorted(self.buses - {cid}):
-            told += [f"the application talks on CID {others[0]}", f"write x-dodo: {{cid: {others[0]}}}"]
-        return replace(finding, reason="; ".join(told))
-
     def _explained(self, finding: Finding) -> Finding:
         """An error in place of a failure that may be due to what others used up.
 
@@ -259,8 +243,24 @@ class RunState:
         if shortage.is_of_others and self._is_of_conditions(finding):
             reason = f"the application cannot be judged here: {shortage.text}; it found: {finding.reason}"
             return replace(finding, result="error", reason=reason)
-        is_told = shortage.text and self.is_unstartable
-        return replace(finding, reason=f"{finding.reason}; {shortage.text}") if is_told else finding
+        return finding
+
+    def _details(self, finding: Finding, cid: int) -> list[str]:
+        """What helps to understand why a test ended so, behind the reason; ``cid`` is that of its bus."""
+        details = []
+        if finding.silent:
+            details.append(f"the test is on CID {cid}")
+            if others := sorted(self.buses - {cid}):
+                details.append(f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}")
+        if self.is_unstartable:
+            details.append(self.shortage.text)
+        if self.is_unanswered:
+            details += [each.words for each in self._unmatched]
+        if finding.result != "error":
+            details.append(told_in_words(self.plan.told))
+        if finding.result != "passed" and self.is_application(finding.service):
+            details.append(windowless(self._tails.get(finding.service, ())))
+        return list(filter(None, details))
 
     def _shortage_notes(self) -> tuple[str, ...]:
         is_told = self.shortage.is_of_others or self.is_unstartable or not self.shortage.text
@@ -307,8 +307,8 @@ class RunState:
         judged = [check for verdict in verdicts for check in verdict.checks]
         findings = (*answers.findings, *use.findings)
         considered, load = consider(decide(self.facts, findings), self._load())
-        found = self._explained(self._elsewhere(self._timed(considered), backend.cid))
-        finding = self._without_display(self._with_told(self._with_printed(found)))
+        found = self._explained(self._timed(considered))
+        finding = replace(found, reason="; ".join([found.reason, *self._details(found, backend.cid)]))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
             outcome_of(plan, finding, backend.name, backend.cid),
@@ -333,22 +333,10 @@ class RunState:
             resources=self.resources,
         )
 
-    def _with_printed(self, finding: Finding) -> Finding:
-        """A frame without an answer, with what the application printed instead where it answers by printing."""
-        words = [each.words for each in self._unmatched] if self.is_unanswered else []
-        return replace(finding, reason="; ".join([finding.reason, *words])) if words else finding
-
     def _printed_notes(self, finding: Finding) -> tuple[str, ...]:
         """Of services whose lines never matched, where that is not said already."""
         never = (each.words for each in self._unmatched if each.never)
         return () if self.is_unanswered or finding.result == "error" else tuple(never)
-
-    def _with_told(self, finding: Finding) -> Finding:
-        """A verdict on an application that hears what none hears on a road says so."""
-        words = told_in_words(self.plan.told)
-        if not words or finding.result == "error":
-            return finding
-        return replace(finding, reason=f"{finding.reason}; {words}")
 
     def is_application(self, service: str) -> bool:
         """Whether a service is the application's, or was started by it."""
