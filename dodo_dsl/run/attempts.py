@@ -78,7 +78,11 @@ class Attempts:
                 engine = Engine(chosen.plan, backend, say, stands, forget_pictures)
                 outcome, kept = await engine.run(self._keep)
                 self.kept.extend(kept)
-                if engine.state.is_unanswered and not self._keep and (why := await asyncio.to_thread(_silent, job)):
+                if (
+                    engine.state.finding.cause == "silence"
+                    and not self._keep
+                    and (why := await asyncio.to_thread(_silent, job))
+                ):
                     outcome = replace(outcome, reason=f"{outcome.reason}; {why}")
                 if outcome.machine and not self._keep and (job.report / RECORDING).is_file():
                     paused = await asyncio.to_thread(_paused, job, outcome.machine)

@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from dodo_dsl import atomic
 from dodo_dsl.check.wiring import ANYTHING
@@ -29,6 +30,11 @@ _NO_DISPLAY = re.compile(
 """What GTK, Qt, X11 and OpenCV say without a display."""
 
 
+Cause = Literal["", "verdict", "end", "silence", "start"]
+"""What decided: an evaluator, the end of a service, an application that did not answer the clock, or a program that
+could not be started; empty for anything else. A machine that is too busy may be the reason of the first three."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing that decides an outcome, and the service whose last lines explain it."""
@@ -36,8 +42,7 @@ class Finding:
     result: Result
     reason: str
     service: str = ""
-    is_verdict: bool = False
-    """Whether an evaluator found it: then a machine that is too busy may be the reason, unlike for a program's end."""
+    cause: Cause = ""
     silent: bool = False
     """Whether nothing came of the application, which may be on another bus."""
 
@@ -67,7 +72,7 @@ def outcome_of(plan: Plan, finding: Finding, backend: str, cid: int) -> Outcome:
         clock=plan.clock,
         backend=backend,
         goals=plan.goals,
-        decided_by=finding.service if finding.is_verdict and finding.result != "error" else "",
+        decided_by=finding.service if finding.cause == "verdict" and finding.result != "error" else "",
     )
 
 
@@ -92,14 +97,16 @@ def decide(facts: Facts, others: Sequence[Finding] = ()) -> Finding:
     deciding = [f for f in findings if f.result == result]
     if result == "passed":
         is_one = len(deciding) == 1
-        return Finding("passed", "; ".join(f.reason for f in deciding), deciding[0].service, is_one)
+        return Finding(
+            "passed", "; ".join(f.reason for f in deciding), deciding[0].service, "verdict" if is_one else ""
+        )
     return deciding[0]
 
 
 def _judged(evaluator: str, verdicts: Sequence[VerdictEvent]) -> list[Finding]:
     if len(verdicts) > 1:
         return [Finding("error", f"evaluator '{evaluator}' gave {len(verdicts)} verdicts, expected one", evaluator)]
-    return [Finding("passed" if v.passed else "failed", v.reason, evaluator, True, v.silent) for v in verdicts]
+    return [Finding("passed" if v.passed else "failed", v.reason, evaluator, "verdict", v.silent) for v in verdicts]
 
 
 def error_outcome(plan: Plan, backend: str, reason: str) -> Outcome:

@@ -14,6 +14,7 @@ from dodo_dsl.run.machine_load import judgement
 from dodo_dsl.run.machine_load.judgement import consider
 from dodo_dsl.run.machine_load.shortage import Shortage
 from dodo_dsl.run.outcomes import (
+    Cause,
     Facts,
     Finding,
     decide,
@@ -83,10 +84,6 @@ class RunState:
     finished: float | None = None
     setup_s: float | None = None
     input_ended: bool = False
-    is_unanswered: bool = False
-    """Whether the clock of a lockstep test gave up as the application did not answer."""
-    is_unstartable: bool = False
-    """Whether the test ended as a program could not be started."""
     shortage: Shortage = field(default_factory=Shortage)
     """What of the machine was used up when the test ended."""
     buses: frozenset[int] = frozenset()
@@ -95,8 +92,6 @@ class RunState:
     """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
     resources: tuple[ServiceUse, ...] = ()
-    _ended_by: str = ""
-    """The service whose end was that of the test."""
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _unmatched: tuple[Unmatched, ...] = ()
     _killed_before: int = field(init=False)
@@ -117,10 +112,9 @@ class RunState:
     def add_finding(self, result: Result, reason: str, service: str = "") -> None:
         self.facts.findings.append(Finding(result, reason, service))
 
-    def end(self, result: Result, reason: str, service: str = "") -> None:
+    def end(self, result: Result, reason: str, service: str = "", cause: Cause = "") -> None:
         """Adds a finding with which the test is over: raises Ended."""
-        self.add_finding(result, reason, service)
-        raise Ended
+        self._end_with(Finding(result, reason, service, cause))
 
     def _end_with(self, finding: Finding) -> None:
         self.facts.findings.append(finding)
@@ -145,8 +139,7 @@ class RunState:
             case Malformed(service, problem):
                 self.end("error", f"the verdict of evaluator '{service}' is malformed: {problem}", service)
             case Unstartable(service, why):
-                self.is_unstartable = True
-                self.end("error", unstartable(self.plan, service, why), service)
+                self.end("error", unstartable(self.plan, service, why), service, "start")
             case Lost(why):
                 self.end("error", why)
             case Flooded():
@@ -188,10 +181,9 @@ class RunState:
     def _take_stop(self, event: Stopped) -> None:
         if event.how == "timedout":
             self.time_out()
-        self.is_unanswered = event.how == "unanswered"
-        result: Result = "failed" if self.is_unanswered else "error"
-        service = self._first_application() if self.is_unanswered else CLOCK
-        self._end_with(Finding(result, event.reason, service, silent=event.silent))
+        if event.how == "unanswered":
+            self._end_with(Finding("failed", event.reason, self._first_application(), "silence", event.silent))
+        self.end("error", event.reason, CLOCK)
 
     def note_end(self, event: Exited, is_asked: bool) -> None:
         """Notes an end of the application's that decides nothing, unless it is a good one or by SIGTERM."""
@@ -215,24 +207,29 @@ class RunState:
             if not is_done and not self._all_verdicts_given():
                 reason = f"application service '{service}' {ended}, before the test was decided"
                 waits = start_order.waits(self.plan.application.services, service) if self.began is None else ""
-                self._end_by_exit("failed", f"{reason}; {waits}" if waits else reason, service)
+                self.end("failed", f"{reason}; {waits}" if waits else reason, service, "end")
             if not is_done:
                 self.note_end(event, is_asked=False)
         elif code != 0:
-            self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}", service)
+            self.end("error", f"service '{service}' of layer {layer} {ended}", service, "end")
         elif service not in self.ready and self.began is None:
-            self._end_by_exit("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service)
+            self.end("error", f"service '{service}' of layer {layer} {ended}, before it was ready", service, "end")
         elif service in self.facts.evaluators and not self.facts.verdicts.get(service):
             reason = f"evaluator '{service}' ended without a verdict {when}".rstrip()
-            self._end_by_exit("error", reason, service)
+            self.end("error", reason, service, "end")
 
     def is_to_explain(self) -> bool:
         """Whether the machine may be the reason for how the test ended, if something of it was used up."""
-        return self.is_unstartable or self._is_of_conditions(decide(self.facts))
+        return self.finding.cause == "start" or self._is_of_conditions(self.finding)
+
+    @property
+    def finding(self) -> Finding:
+        """What decides, as far as it is known."""
+        return decide(self.facts)
 
     def _is_of_conditions(self, finding: Finding) -> bool:
         """Whether a failure may come from what a program was given, unlike a message that it must not send."""
-        return finding.result == "failed" and bool(finding.is_verdict or self._ended_by or self.is_unanswered)
+        return finding.result == "failed" and finding.cause in ("verdict", "end", "silence")
 
     def _explained(self, finding: Finding) -> Finding:
         """An error in place of a failure that may be due to what others used up.
@@ -252,9 +249,9 @@ class RunState:
             details.append(f"the test is on CID {cid}")
             if others := sorted(self.buses - {cid}):
                 details.append(f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}")
-        if self.is_unstartable:
+        if finding.cause == "start":
             details.append(self.shortage.text)
-        if self.is_unanswered:
+        if finding.cause == "silence":
             details += [each.words for each in self._unmatched]
         if finding.result != "error":
             details.append(told_in_words(self.plan.told))
@@ -262,13 +259,9 @@ class RunState:
             details.append(windowless(self._tails.get(finding.service, ())))
         return list(filter(None, details))
 
-    def _shortage_notes(self) -> tuple[str, ...]:
-        is_told = self.shortage.is_of_others or self.is_unstartable or not self.shortage.text
+    def _shortage_notes(self, finding: Finding) -> tuple[str, ...]:
+        is_told = self.shortage.is_of_others or finding.cause == "start" or not self.shortage.text
         return () if is_told else (f"{self.shortage.text}, perhaps by the application itself",)
-
-    def _end_by_exit(self, result: Result, reason: str, service: str) -> None:
-        self._ended_by = service
-        self.end(result, reason, service)
 
     def _all_verdicts_given(self) -> bool:
         return all(self.facts.verdicts.get(name) for name in self.facts.evaluators)
@@ -280,7 +273,7 @@ class RunState:
 
     def _timed(self, finding: Finding) -> Finding:
         """With the time that the clock of a lockstep test had reached, where the end of a service decided."""
-        is_decided_so = self.began is not None and self._ended_by and finding.service == self._ended_by
+        is_decided_so = self.began is not None and finding.cause == "end"
         if not is_decided_so or not self.plan.lockstep or self.time is None or not self.time.last:
             return finding
         return replace(finding, reason=f"{finding.reason}, after {self.time.seconds:.1f} s of test time")
@@ -323,7 +316,7 @@ class RunState:
                 *([ON_EMULATED] if plan.rig and not plan.is_real else []),
                 *self.notes,
                 *self._printed_notes(finding),
-                *self._shortage_notes(),
+                *self._shortage_notes(finding),
                 *losses,
                 *answers.notes,
                 *use.notes,
@@ -336,7 +329,7 @@ class RunState:
     def _printed_notes(self, finding: Finding) -> tuple[str, ...]:
         """Of services whose lines never matched, where that is not said already."""
         never = (each.words for each in self._unmatched if each.never)
-        return () if self.is_unanswered or finding.result == "error" else tuple(never)
+        return () if finding.cause == "silence" or finding.result == "error" else tuple(never)
 
     def is_application(self, service: str) -> bool:
         """Whether a service is the application's, or was started by it."""

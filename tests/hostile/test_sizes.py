@@ -379,7 +379,7 @@ def test_a_kept_lock_fails_the_application(tmp_path: Path) -> None:
     event = read("camera", False, line)
     assert isinstance(event, MemoryTaken)
     finding = decided(state(tmp_path), event)
-    assert (finding.result, finding.is_verdict) == ("failed", False)
+    assert (finding.result, finding.cause) == ("failed", "")
     assert finding.reason == (
         "the application keeps service 'camera' from its shared memory: "
         "shared memory 'video0.argb' was locked by another for 5 s"

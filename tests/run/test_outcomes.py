@@ -50,7 +50,7 @@ def test_verdicts_are_findings() -> None:
     facts = Facts(("a", "b"), [], {"b": [verdict("b", True)], "a": [verdict("a", True)]})
     assert decide(facts) == Finding("passed", "a True; b True", "a")
     facts.verdicts["b"] = [verdict("b", False)]
-    assert decide(facts) == Finding("failed", "b False", "b", is_verdict=True)
+    assert decide(facts) == Finding("failed", "b False", "b", cause="verdict")
     facts.verdicts["a"] *= 2
     assert decide(facts) == Finding("error", "evaluator 'a' gave 2 verdicts, expected one", "a")
     facts.findings.append(Finding("error", "the engine is gone"))

@@ -49,7 +49,7 @@ def consider(finding: Finding, load: MachineLoad | None) -> tuple[Finding, Machi
     half of what was taken. DoDo's own services are such others. An emulated rig that stood still for more than it takes
     to be late at all is another machine than the rig, whatever else was measured.
     """
-    if load is None or finding.result != "failed" or not finding.is_verdict or not (why := too_busy(load)):
+    if load is None or finding.result != "failed" or finding.cause != "verdict" or not (why := too_busy(load)):
         return finding, load
     found = finding.reason if len(finding.reason) <= _MAX_FOUND else f"{finding.reason[:_MAX_FOUND]}..."
     reason = f"the machine was too busy to judge: {why}; it found: {found}; {_WAY_OUT}"

@@ -29,7 +29,7 @@ CALM = MachineLoad(
     7.5, 2, Wait(1.0, 0.9, 0.7, "perception"), Wait(1.5, 0.5, 0.4, "camera"), 0.61, 7.5, 0.05, 0.05, 0.06
 )
 CROWDED = replace(CALM, application=Wait(1.0, 2.0, 1.9, "perception"))
-FAILED = Finding("failed", "only 43 frames had an answer (at least 50)", "judge", is_verdict=True)
+FAILED = Finding("failed", "only 43 frames had an answer (at least 50)", "judge", cause="verdict")
 CRASHED = Finding("failed", "application service 'app' ended with exit code 3 after 2.0 s", "app")
 
 
