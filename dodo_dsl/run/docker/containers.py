@@ -11,10 +11,10 @@ from typing import Any
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.docker import cleanup
-from dodo_dsl.run.docker.backend import ContainerSide
 from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.pulls import Pulls
+from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.run.sides import Side, WatchedServices

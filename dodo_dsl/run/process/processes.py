@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation, leftovers
-from dodo_dsl.run.process.backend import ProcessSide
 from dodo_dsl.run.process.commands import own_modules
 from dodo_dsl.run.process.fork_server_client import ForkServer, serving
+from dodo_dsl.run.process.side import ProcessSide
 from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Say
 from dodo_dsl.run.sides import Side, WatchedServices

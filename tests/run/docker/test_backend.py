@@ -10,8 +10,8 @@ import pytest
 from docker.errors import APIError
 
 from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run.docker.backend import ContainerSide
 from dodo_dsl.run.docker.compose import Compose
+from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.protocol import Event, Exited, Noted, Ready, Unstartable
 from dodo_dsl.run.sides import WatchedServices
 from tests.run.scripted import plan

@@ -13,8 +13,8 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
-from dodo_dsl.run.docker.backend import ContainerSide
 from dodo_dsl.run.docker.container_use import ContainerUse
+from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.machine_load.service_use import Used
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.sides import WatchedServices

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process.backend import ProcessSide
 from dodo_dsl.run.process.sandbox_client import SandboxClient
+from dodo_dsl.run.process.side import ProcessSide
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.sides import WatchedServices
