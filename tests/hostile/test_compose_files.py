@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import yaml
 
+from dodo_dsl.plan.model import LAYERS
 from dodo_dsl.run.docker.compose import Compose
 from tests.application.compiled import FILE, Compiled, compiled, filled, repository
 from tests.emit.readers import compose
@@ -129,10 +130,10 @@ def given(test: Compiled, folder: Path) -> dict[str, Any]:
     own = test.plan.application.compose["services"]
     document["services"] |= {name: {**service, **document["services"][name]} for name, service in own.items()}
     file.write_text(json.dumps(document))
-    files = [*(f"{layer}.compose.yml" for layer in made.layers), str(file)]
-    code, out, problem = asyncio.run(made.run("config", "--format", "json", files=files))
+    files, out = [*(f"{layer}.compose.yml" for layer in LAYERS if layer != "application"), str(file)], folder / "out"
+    code, problem = asyncio.run(made.run("config", "--format", "json", "--output", str(out), files=files))
     assert code == 0, problem
-    return {name: json.loads(out)["services"][name] for name in own}
+    return {name: json.loads(out.read_text())["services"][name] for name in own}
 
 
 @pytest.mark.slow
