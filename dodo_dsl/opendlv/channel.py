@@ -4,6 +4,7 @@ Each service connects to the clock before it is ready, so before the application
 """
 
 import math
+import operator
 from pathlib import Path
 from typing import Self
 
@@ -56,7 +57,7 @@ class Done(Struct, tag=True, array_like=True):
 
 
 Message = Step | Show | Done
-_encode = msgspec.msgpack.Encoder().encode
+_encode = msgspec.msgpack.Encoder(enc_hook=operator.index).encode  # numbers of numpy
 _decode = msgspec.msgpack.Decoder(Message).decode
 
 

@@ -15,6 +15,7 @@ from typing import Self
 CLOCK_SOCKET, RUNNER_SOCKET = ".clock", ".runner"
 PACKET = 1 << 16
 _LAST, _MORE = b"\0", b"\1"
+_MOST_PARTS = 1024
 _AGAIN_S, _NAME_S = 0.005, 1.0
 
 
@@ -35,6 +36,7 @@ class Connection:
         self._socket = connection
         self._poll = select.poll()
         self._poll.register(connection, select.POLLIN)
+        self._parts: list[bytes] = []
 
     @classmethod
     def open(cls, path: Path, name: str, patience: float = 0.0) -> Self:
@@ -55,28 +57,40 @@ class Connection:
                 made.send(name.encode())
                 return made
 
-    def send(self, data: bytes) -> None:
-        """Sends a message; it is lost where the other end has gone."""
-        with contextlib.suppress(OSError):
+    def send(self, data: bytes) -> bool:
+        """Sends a message; whether the other end is there to take it."""
+        try:
             while len(data) > PACKET:
                 self._socket.send(_MORE + data[:PACKET])
                 data = data[PACKET:]
             self._socket.send(_LAST + data)
+        except OSError:
+            return False
+        return True
 
     def receive(self, timeout: float) -> bytes | None:
-        """The next message within ``timeout`` seconds; raises EOFError when the other end has gone."""
-        if not self._poll.poll(timeout * 1000):
-            return None
-        data, kind = b"", _MORE
-        while kind == _MORE:
+        """The next message, if each part of it comes within ``timeout`` seconds of the one before.
+
+        Raises EOFError when the other end has gone, and has left nothing to read.
+        """
+        while self._poll.poll(timeout * 1000):
             try:
                 packet = self._socket.recv(PACKET + 1)
-            except ConnectionError:
-                packet = b""
-            if not packet:
+            except ConnectionError:  # of what it was sent and has not read; what it said may still be there
+                continue
+            if not packet or len(self._parts) > _MOST_PARTS:
                 raise EOFError
-            kind, data = packet[:1], data + packet[1:]
-        return data
+            self._parts.append(packet[1:])
+            if packet[:1] == _LAST:
+                data = b"".join(self._parts)
+                self._parts.clear()
+                return data
+        return None
+
+    @property
+    def has_gone(self) -> bool:
+        """Whether the other end has closed the connection."""
+        return any(event & select.POLLHUP for _, event in self._poll.poll(0))
 
     def fileno(self) -> int:
         """The file descriptor to poll for reading."""
@@ -100,23 +114,33 @@ class Listener:
             self._socket.bind(address)
         path.chmod(0o666)
         self._socket.listen(socket.SOMAXCONN)
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
 
     def accept(self, timeout: float) -> tuple[str, Connection] | None:
         """A service that connects within ``timeout`` seconds, with its name; nobody can behind the last one."""
-        if not self.missing or not select.select([self._socket], [], [], timeout)[0]:
+        if not self.missing or not self._poll.poll(timeout * 1000):
             return None
         connection = Connection(self._socket.accept()[0])
         try:
             name = (connection.receive(_NAME_S) or b"").decode("utf-8", "replace")
         except EOFError:
             name = ""
-        if name not in self.missing:
+        if name not in self.missing or connection.has_gone:
             connection.close()
             return None
-        self.missing.remove(name)
+        self.named(name)
+        return name, connection
+
+    def connection(self) -> Connection | None:
+        """One that has been made, whose first message, the name, may not have come."""
+        return Connection(self._socket.accept()[0]) if self.missing and self._poll.poll(0) else None
+
+    def named(self, name: str) -> None:
+        """A service of this name is there; nobody can connect behind the last one."""
+        self.missing.discard(name)
         if not self.missing:
             self.close()
-        return name, connection
 
     def fileno(self) -> int:
         """The file descriptor to poll for a service that connects."""

@@ -120,6 +120,8 @@ class CombinedBackends:
         watched = WatchedServices(plan, job.folder, job.report)
         async with contextlib.AsyncExitStack() as stack:
             channel = stack.enter_context(meeting_place(job.work, keep))
+            if keep and self._own == CONTAINERS and isolation == "network":
+                channel = ""  # of kept containers nobody holds the folder: they meet in their volume
             slot = await stack.enter_async_context(self._slot(plan, isolation, channel, say, keep))
             sides: list[Side] = [stack.enter_context(kind.side(watched, slot, isolation, say)) for kind in self._kinds]
             yield Sides(self.name, slot.cid, isolation == "host", watched, sides[0], sides[-1])

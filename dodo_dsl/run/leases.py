@@ -10,8 +10,8 @@ import contextlib
 import contextvars
 import fcntl
 import io
-import itertools
 import os
+import secrets
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -33,9 +33,9 @@ _QUEUE, _LOCK = "queue", "leases.lock"
 _LOCKS = Path("/run/lock")
 _MODE = 0o660
 _RETRY_S = 0.2
+_ENDING = ".lease"
 _NO_CLAIM = (FileNotFoundError, IsADirectoryError, regular_file.NotAFile)
 """Raised by opening what is gone meanwhile, or what no holder has put there."""
-_NUMBERS = itertools.count()
 _ARRIVAL: contextvars.ContextVar[int | None] = contextvars.ContextVar("arrival", default=None)
 Taken = TypeVar("Taken")
 
@@ -161,12 +161,16 @@ def _lock(file: io.FileIO, kind: int) -> bool:
 
 def _claims(folder: Path) -> Iterator[Claim]:
     """Those of living processes; what dead ones waited for is removed, and what they had and cannot have left."""
-    for path in sorted(folder.iterdir()):
-        with contextlib.suppress(*_NO_CLAIM), regular_file.opened(path) as file:
-            if path.name != _LOCK and not _lock(file, fcntl.LOCK_SH):
-                yield _read(file, path)
-            elif not path.name.startswith((_LOCK, CID, RUN, PROJECT)):
-                path.unlink(missing_ok=True)
+    for path in sorted(folder.glob(f"*{_ENDING}")):
+        try:
+            with contextlib.suppress(*_NO_CLAIM), regular_file.opened(path) as file:
+                if not _lock(file, fcntl.LOCK_SH):
+                    yield _read(file, path)
+                elif not path.name.startswith((CID, RUN, PROJECT)):
+                    with contextlib.suppress(OSError):  # another user's, in a sticky folder
+                        path.unlink(missing_ok=True)
+        except PermissionError:
+            yield Claim(frozenset({path.name.partition(".")[0]}))
 
 
 def ahead(names: Collection[str], since: int, shared: bool = False) -> list[Claim]:
@@ -183,7 +187,7 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
     with _alone() as folder:
         if any(name in one.names and not (one.since or (one.shared and shared)) for one in _claims(folder)):
             return None
-        path = folder / f"{name}.{os.getpid()}.{next(_NUMBERS)}.lease"
+        path = folder / f"{name}.{secrets.token_hex(8)}{_ENDING}"
         claim = Claim(frozenset({name}), 0, shared, about={"pid": os.getpid(), **about})
         return Lease(name, _written(path, claim), path)
 
@@ -192,7 +196,7 @@ def try_lease(name: str, about: dict[str, Any], shared: bool = False) -> Lease |
 def ticket(names: Collection[str], since: int, *, shared: bool = False, turn: bool = False) -> Iterator[None]:
     """Waits in the queue within the block; raises OSError if the folder cannot be written."""
     with _alone() as folder:
-        path = folder / f"{_QUEUE}.{since:020d}.{os.getpid()}.{next(_NUMBERS)}"
+        path = folder / f"{_QUEUE}.{since:020d}.{secrets.token_hex(8)}{_ENDING}"
         waits = Lease(_QUEUE, _written(path, Claim(frozenset(names), since, shared, turn)), path)
     try:
         yield
@@ -264,7 +268,7 @@ async def in_turn(
 def orphans(prefix: str) -> Iterator[tuple[Lease, dict[str, Any]]]:
     """This user's leases whose holders have ended and may have left something; each is yielded held, and about what."""
     with _alone() as folder:
-        paths = sorted(folder.glob(f"{prefix}*.lease"))
+        paths = sorted(folder.glob(f"{prefix}*{_ENDING}"))
         list(_claims(folder))
     for path in paths:
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:

@@ -7,7 +7,7 @@ from typing import Any
 
 from dodo_dsl.check.senders import told_in_words
 from dodo_dsl.outcome import ON_EMULATED, EndedService, MachineLoad, Outcome, Response, Result, ServiceUse
-from dodo_dsl.plan.added_services import CLOCK, RECORDER
+from dodo_dsl.plan.added_services import CLOCK, RECORDER, TIME
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
 from dodo_dsl.run.machine_load import judgement
@@ -356,6 +356,7 @@ class RunState:
         return [
             {"name": name, "layer": layer, "uses": uses.get(name), "exit_code": self.exits.get(name)}
             for name, layer in sorted(self.layer_of.items(), key=lambda item: (LAYERS.index(item[1]), item[0]))
+            if name != TIME
         ]
 
 

@@ -91,28 +91,46 @@ class Reports:
         self._logs, self._put, self._outputs = logs, put, outputs
         self._recorded = Counter[str]()
         self._listener: Listener | None = None
+        self._unnamed: list[Connection] = []
         self._open: dict[str, tuple[Connection, asyncio.Event]] = {}
 
     def listen(self, folder: Path) -> None:
         """Listens in the folder where services meet until the application starts; raises OSError."""
         self._listener = Listener(folder / RUNNER_SOCKET, self._services)
-        asyncio.get_running_loop().add_reader(self._listener.fileno(), self._accept, self._listener.fileno())
+        asyncio.get_running_loop().add_reader(self._listener.fileno(), self._accept)
 
-    def _accept(self, number: int) -> None:
-        assert self._listener is not None
-        loop = asyncio.get_running_loop()
-        if accepted := self._listener.accept(0.0):
-            name, connection = accepted
-            self._open[name] = connection, asyncio.Event()
-            loop.add_reader(connection.fileno(), self._read, name)
-        if not self._listener.missing:
-            loop.remove_reader(number)
+    def _accept(self) -> None:
+        """Takes connections that have been made, and names that have come."""
+        while self._listener is not None and (connection := self._listener.connection()):
+            self._unnamed.append(connection)
+            asyncio.get_running_loop().add_reader(connection.fileno(), self._name, connection)
+        for connection in list(self._unnamed):
+            self._name(connection)
+
+    def _name(self, connection: Connection) -> None:
+        try:
+            name = connection.receive(0.0)
+        except EOFError:
+            name = b""
+        if name is None:
+            return
+        loop, service = asyncio.get_running_loop(), name.decode("utf-8", "replace")
+        loop.remove_reader(connection.fileno())
+        self._unnamed.remove(connection)
+        if service not in self._services or (service in self._open and not self._open[service][1].is_set()):
+            connection.close()
+            return
+        self._open[service] = connection, asyncio.Event()
+        loop.add_reader(connection.fileno(), self._read, service)
+        if {*self._services} <= {*self._open}:
+            self.stop_listening()
 
     def stop_listening(self) -> None:
-        """Nobody else can connect: the application is about to start."""
-        if self._listener is not None and self._listener.missing:
+        """Nobody else can connect: the application is about to start, or all services are there."""
+        if self._listener is not None:
             asyncio.get_running_loop().remove_reader(self._listener.fileno())
             self._listener.close()
+            self._listener = None
 
     def _read(self, name: str) -> None:
         connection, ended = self._open[name]
@@ -124,8 +142,12 @@ class Reports:
             connection.close()
             ended.set()
 
+    def take_line(self, name: str, line: bytes) -> bool:
+        """Takes a line that a service printed, if it is a message of one that did not connect; whether it is."""
+        return name not in self._open and self.take(name, line)
+
     def take(self, name: str, message: bytes) -> bool:
-        """Takes a message, or a line that a service printed; whether it is one."""
+        """Takes a message; whether it is one."""
         is_evaluator = self._services[name].judge
         if is_evaluator and message.startswith(JUDGED):
             self._record(name, message)
@@ -151,13 +173,18 @@ class Reports:
 
     async def ended(self, name: str) -> None:
         """Returns when a service that has ended has said all; another program may still hold its connection."""
+        self._accept()
         if name in self._open:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._open[name][1].wait(), _PATIENCE_S)
 
     def close(self) -> None:
         """Reads what is there already, and stops."""
+        self._accept()
         self.stop_listening()
+        for connection in self._unnamed:
+            asyncio.get_running_loop().remove_reader(connection.fileno())
+            connection.close()
         for name, (connection, ended) in self._open.items():
             if not ended.is_set():
                 self._read(name)

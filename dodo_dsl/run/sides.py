@@ -95,7 +95,7 @@ class WatchedServices:
         def on_line(line: bytes) -> bool:
             if self.prints(name):
                 self.lines.take(name, line)
-            return layer != APPLICATION and self.reports.take(name, line)
+            return layer != APPLICATION and self.reports.take_line(name, line)
 
         if name in self.outputs:  # it is started once more
             self.outputs[name].close()
@@ -194,9 +194,16 @@ class Sides:
         for turn in self._watched.turns:
             turn.cancel()
         await asyncio.gather(*self._watched.turns, return_exceptions=True)
-        kept = await asyncio.gather(*(side.close(keep) for side in self._both))
-        self._watched.close()
-        return [line for lines in kept for line in lines]
+        try:
+            kept = await asyncio.gather(*(side.close(keep) for side in self._both), return_exceptions=True)
+        finally:
+            self._watched.close()
+        lines: list[str] = []
+        for each in kept:
+            if isinstance(each, BaseException):
+                raise each
+            lines += each
+        return lines
 
     def unmatched(self) -> tuple[Unmatched, ...]:
         return self._watched.lines.unmatched({n: out.unfinished for n, out in self._watched.outputs.items()})

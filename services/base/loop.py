@@ -6,6 +6,7 @@ another stamp than its own is easily taken for silence.
 
 import functools
 import logging
+import operator
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -186,7 +187,7 @@ class Loop:
 
     def _hear_rest(self) -> None:
         """An observer gets what came before its end."""
-        end = self.clock.now()
+        end = time.time_ns() // 1000
         while self.observes and not self.clock.relays and self.service.verdict is None:
             envelope = self.receive(0.0)
             if envelope is None or envelope.received > end:
@@ -276,6 +277,8 @@ class Loop:
             if not self._world.holds(envelope):
                 frames.append(frame or datagram(envelope))
             elif self.members is not None:
+                self.session.send_frames(frames)
+                frames = []
                 self.members.send(envelope)
             elif not self.clock.relays:
                 name = self.session.messages.name(envelope.data_type)
@@ -286,4 +289,5 @@ class Loop:
         message, stamp, sampled = output if isinstance(output, Output) else Output(output, self.sender_stamp)
         messages, sent = self.session.messages, now if self.clock.is_virtual else time.time_ns() // 1000
         sample_time = now if sampled is None else sampled
-        return Envelope(messages.id(message), messages.encode(message), sent, 0, sample_time, stamp)
+        numbers = operator.index(sample_time), operator.index(stamp)  # a service may have them of numpy
+        return Envelope(messages.id(message), messages.encode(message), sent, 0, *numbers)

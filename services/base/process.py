@@ -187,6 +187,8 @@ def _serve(
             resources.enter_context(published(session, flags["log-id"]))
             if clock is None:
                 with interruptible():  # it waits for the clock service
+                    if stop():
+                        return DONE
                     clock = _clock(session, role)
             on_rig = bool(os.environ.get("DODO_RIG"))
             service = build(Context(manifest["name"], flags, session.messages, resources, clock, session, on_rig))

@@ -33,7 +33,5 @@ def tell(kind: str, **facts: object) -> None:
 
 def say(message: str) -> None:
     """As ``tell``, with a message that is written already."""
-    if _runner is None:
+    if _runner is None or not _runner.send(message.encode()):
         print(message, flush=True)
-    else:
-        _runner.send(message.encode())

@@ -171,6 +171,8 @@ class SteppedApplication:
             self._link.drain()  # what the application has sent before it can see the picture
             self.answers.seen()
             self._link.send(camera.service, Show(awaits=False, announces=True))
+            while len(shown) > 1 and self._link.result(camera.service) is None and not self._stopped():
+                self._link.pump(SLICE_S, [camera.service])  # pictures are shown in one order
         if not self.answers.is_expected:
             self._reading = {camera.service for camera in shown}
             for camera in shown:

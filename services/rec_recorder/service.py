@@ -78,7 +78,7 @@ def build(context: Context) -> Service:
     recording = RecordingFile(Path(flags["rec"]), max_size, _traffic(context))
     context.resources.callback(recording.close)
     if context.session is not None:
-        context.session.gathers = GATHERS
+        context.session.gather(GATHERS)
     if flags["paused"]:
         recording.is_on = False
     period, is_stepped = flags["frames"] and round(period_of(flags["frames"])), context.clock.relays

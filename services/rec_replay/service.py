@@ -70,14 +70,14 @@ class Replay(Service):
         together: list[Framed] = []
         while (taken := player.take()) is not None:
             entry, due = taken
+            memories = self._memories if self._memories and self._stream.shown[entry] else None
+            if together and (memories or len(together) == MOST_TOGETHER):  # before its picture is decoded
+                yield together
+                together = []
             envelope, frame, is_sent, picture = self._stream.take()
             too_large = len(frame) > LARGEST_FRAME
             if self._shifts:
                 envelope, frame = envelope._replace(sent=due, sample_time=due), b""
-            memories = self._memories if self._memories and self._stream.shown[entry] else None
-            if memories or len(together) == MOST_TOGETHER:
-                yield together
-                together = []
             if memories and (picture is None or not memories.show(picture, envelope.sample_time)):
                 yield Output(self._missed(entry, due, memories.misfits), 0, due)
             if is_sent and too_large:

@@ -240,9 +240,9 @@ def test_a_waiter_that_is_killed_is_skipped_and_its_ticket_removed(folder: Path)
 
 @pytest.mark.parametrize("text", ["", "[]", '{"names": 3}', "[" * 100_000])
 def test_a_damaged_file_stands_for_its_name_as_long_as_somebody_has_it(folder: Path, text: str) -> None:
-    for name in ("queue.1.1.1", "cid-121.1.1.lease"):
+    for name in ("queue.1.1.lease", "cid-121.1.1.lease"):
         (folder / name).write_text(text)
-    with (folder / "cid-122.1.1.lease").open("w") as file, (folder / "queue.2.1.1").open("w") as other:
+    with (folder / "cid-122.1.1.lease").open("w") as file, (folder / "queue.2.1.lease").open("w") as other:
         for each in (file, other):
             each.write(text)
             each.flush()
@@ -252,7 +252,7 @@ def test_a_damaged_file_stands_for_its_name_as_long_as_somebody_has_it(folder: P
         ((orphan, about),) = leases.orphans("cid-")
         assert (orphan.name, about) == ("cid-121", {})
         orphan.release()
-    assert [path.name for path in folder.glob("queue.*")] == ["queue.2.1.1"]
+    assert [path.name for path in folder.glob("queue.*")] == ["queue.2.1.lease"]
 
 
 def test_a_lease_that_cannot_be_written_is_not_held(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,7 +56,7 @@ class Containers:
     @contextlib.contextmanager
     def side(self, watched: WatchedServices, slot: Slot, _isolation: str, say: Say) -> Iterator[Side]:
         """One with its own project, and the project's lease."""
-        if self._is_whole:
+        if self._is_whole and slot.channel:
             Path(slot.channel).chmod(0o777)  # for users of images; the folder around it is closed
         assert self._pulls is not None, "there is no problem"
         plan = watched.plan

@@ -92,7 +92,7 @@ class ContainerSide:
     async def _open_channel(self) -> None:
         """Listens to services; where the engine does not see the folder, they meet in a volume, and print."""
         folder = Path(self._compose.channel)
-        if not self._compose.is_whole:  # DoDo's services are processes
+        if not self._compose.is_whole or not self._compose.channel:  # DoDo's services are processes, or meet apart
             return
         try:
             if not self._is_on_host:

@@ -80,8 +80,7 @@ def sandbox_words(
     words = ["--unshare-pid", "--die-with-parent", "--clearenv"]
     words += [word for name, value in environment.items() for word in ("--setenv", name, value)]
     if places is None:
-        masked = [*_masked(confined.masked), *(["--tmpfs", confined.channel] if confined.channel else [])]
-        words += ["--dev-bind", "/", "/", *masked, "--proc", "/proc"]
+        words += ["--dev-bind", "/", "/", *_masked(confined.masked, confined.channel), "--proc", "/proc"]
     else:
         words += ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try", "--cap-drop", "ALL"]
         words += _seen(confined, places, program)
@@ -95,9 +94,10 @@ def as_data(words: Sequence[str]) -> bytes:
     return b"".join(os.fsencode(f"{word}\0") for word in words)
 
 
-def _masked(devices: Iterable[str]) -> list[str]:
-    """Nothing in the place of devices; root then has no capability to look behind, or to make the device again."""
+def _masked(devices: Iterable[str], channel: str) -> list[str]:
+    """Nothing in the place of devices and the channel; root then has no capability to look behind, or to make them."""
     binds = [word for path in devices for word in ("--dev-bind", "/dev/null", path)]
+    binds += ["--tmpfs", channel] if channel else []
     return [*binds, *(word for name in _TO_UNMASK for word in ("--cap-drop", name))] if binds else []
 
 

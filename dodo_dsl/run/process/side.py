@@ -33,7 +33,7 @@ from dodo_dsl.spec.model import VIRTUAL
 LOG = "sandbox.log"
 _TIME_READY = b'{"dodo": "ready"}'
 """What gives the application the test's time prints when it does."""
-USE_PATIENCE_S = 2.0
+USE_PATIENCE_S, CONNECT_PATIENCE_S = 2.0, 30.0
 PIDS_PATIENCE_S = 5.0
 _OUTPUT_S = 1.0
 _NO_PROGRAM = "bwrap: execvp "
@@ -156,7 +156,7 @@ class ProcessSide:
         return True
 
     async def connect(self) -> Send:
-        if not await self._ask("relay", cid=self._slot.cid, folder=self._slot.channel):
+        if not await self._ask("relay", CONNECT_PATIENCE_S, cid=self._slot.cid, folder=self._slot.channel):
             raise BackendError("nothing can be sent to the test's services: the sandbox does not reach its bus")
         return self._send
 
@@ -209,7 +209,8 @@ class ProcessSide:
         application = self._plan.application
         known = hidden_paths(application, self._folder, self._report)
         roots = application_paths(application, self._folder).roots
-        return [*known, *own_data(), *roots, self._folder.resolve(), self._report.resolve()]
+        places = (self._folder, self._report, Path(self._slot.channel))
+        return [*known, *own_data(), *roots, *(place.resolve() for place in places)]
 
     async def beginning(self) -> Collection[int]:
         pids = [self._pids[s.name] for s in self._plan.application.services if s.name in self._pids]
@@ -227,13 +228,13 @@ class ProcessSide:
         names = [service.name for service in self._plan.application.services]
         return msgspec.convert(await self._ask("use", names=names), Snapshot | None)
 
-    async def _ask(self, what: str, **words: object) -> Any:
+    async def _ask(self, what: str, patience_s: float = USE_PATIENCE_S, **words: object) -> Any:
         """What the sandbox answers; None when it does not."""
         if what not in self._asked:
             self._asked[what] = asyncio.get_running_loop().create_future()
             self._sandbox.send({"do": what, **words})
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(USE_PATIENCE_S):  # wait_for of Python 3.11 may miss that it is cancelled
+            async with asyncio.timeout(patience_s):  # wait_for of Python 3.11 may miss that it is cancelled
                 return await asyncio.shield(self._asked[what])
         return None
 

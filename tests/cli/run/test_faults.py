@@ -79,6 +79,8 @@ def test_next_run_removes_what_a_killed_sandbox_left_on_the_host(desk: Desk, boo
     """Runner and sandbox both killed: of what does not end when its parent dies, only the lease's record says it."""
     process = desk.start(desk.bench.plan(judge=STUBBORN + READY + WAIT), "--isolation", "host")
     wait_for(process, "running")
+    while len(processes_with(f"{desk.folder}/test-app")) < 2:  # bubblewrap has started it, and ends with its parent
+        time.sleep(0.02)
     sandboxes = [pid for pid in processes_with("dodo_dsl.run.process.sandbox") if parent(pid) == process.pid]
     assert len(sandboxes) == 1
     os.kill(int(sandboxes[0]), signal.SIGSTOP)

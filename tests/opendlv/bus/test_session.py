@@ -171,7 +171,7 @@ def test_waiting_ends_with_the_timeout(cid: int) -> None:
 
 def test_messages_gather_behind_one_that_came(cid: int) -> None:
     with Session(cid) as session, Session(cid) as other:
-        session.gathers = 0.05
+        session.gather(0.05)
         other.send(STEERING())
         assert session.receive(5.0) is not None
         threading.Timer(0.001, other.send, [STEERING()]).start()
