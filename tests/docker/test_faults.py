@@ -108,7 +108,7 @@ def test_kept_project_stays_until_it_is_taken_down(crate: Crate) -> None:
     out, _ = run.communicate(timeout=600)
     assert run.returncode == 0, out
     (line,) = [text for text in out.splitlines() if text.startswith("take it down: ")]
-    assert len([name for name in crate.left() if crate.mark in name]) == 7
+    assert len([name for name in crate.left() if crate.mark in name]) == 8
     subprocess.run(line.removeprefix("take it down: ").split(), capture_output=True, check=True)
     assert not any(crate.mark in name for name in crate.left())
     work_folder.reap_folders()  # with the record of the run
