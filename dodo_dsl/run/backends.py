@@ -13,11 +13,12 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.process import host_isolation
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.processes import Processes
-from dodo_dsl.run.process.slot import Slot, meeting_place
+from dodo_dsl.run.process.slot import Slot
 from dodo_dsl.run.protocol import Backend, BackendError, Say
 from dodo_dsl.run.rigs.permission import refuse_unattended
 from dodo_dsl.run.rigs.session import RigSession, attended
 from dodo_dsl.run.sides import Side, Sides, WatchedServices
+from dodo_dsl.run.work_folder import meeting_place
 
 if TYPE_CHECKING:
     from dodo_dsl.run.docker.containers import Containers

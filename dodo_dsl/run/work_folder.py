@@ -1,13 +1,21 @@
-"""The temporary folder in which a run's tests are compiled; the next run removes that of a killed one."""
+"""The temporary folders of a run, of which the next run removes those of a killed one.
 
+In one its tests are compiled. Those where the services of a test meet are in one place, which is hidden from all
+applications: so none reaches another test's.
+"""
+
+import contextlib
+import os
 import secrets
 import shutil
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
 from dodo_dsl.run import leases
+from dodo_dsl.state_folder import secured
 
 FOLDER_PREFIX = "dodo-run-"
 
@@ -50,7 +58,23 @@ def reap_folders() -> None:
             lease.release()
 
 
+def _channels() -> Path:
+    return Path(tempfile.gettempdir()).resolve() / f"dodo-channels-{os.geteuid()}"
+
+
+@contextlib.contextmanager
+def meeting_place(work: Path, keep: bool) -> Iterator[str]:
+    """A folder where the services of a test of the run with a ``work`` folder meet; ``keep`` leaves it."""
+    folder = tempfile.mkdtemp(prefix=f"{work.name}-", dir=secured(_channels()))
+    try:
+        yield folder
+    finally:
+        if not keep:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
 def _remove(folder: Path, lease: leases.Lease) -> None:
     """Removes a folder; where that fails its record stays, and the next run tries again."""
-    shutil.rmtree(folder, ignore_errors=True)
+    for each in (folder, *_channels().glob(f"{folder.name}-*")):
+        shutil.rmtree(each, ignore_errors=True)
     lease.leave() if folder.exists() else lease.release()

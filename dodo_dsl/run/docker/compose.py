@@ -211,7 +211,7 @@ class Compose:
 
     def document(self) -> dict[str, Any]:
         """A compose file with the application, and where DoDo's services meet on this host; raises OSError."""
-        meeting = [Path(os.path.realpath(self.channel))] if self.channel else []  # in /tmp, which cars mount
+        meeting = [Path(os.path.realpath(self.channel)).parent] if self.channel else []  # in /tmp, which cars mount
         hidden, empty = [*self._hidden(), *meeting], self.folder / _EMPTY_FILE
         if any(path.is_file() for path in hidden):
             empty.touch()

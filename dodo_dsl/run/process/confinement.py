@@ -34,8 +34,8 @@ class Confinement:
     hidden: tuple[str, ...] = ()
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     masked: tuple[str, ...] = ()
-    channel: str = ""
-    """On the host: the folder where services meet, which it must not see."""
+    channels: str = ""
+    """On the host: where services of all tests meet, which it must not see."""
     time: str = ""
     """The folder by which it gets the test's time, where it may write into the page and wake its threads."""
 
@@ -80,7 +80,7 @@ def sandbox_words(
     words = ["--unshare-pid", "--die-with-parent", "--clearenv"]
     words += [word for name, value in environment.items() for word in ("--setenv", name, value)]
     if places is None:
-        words += ["--dev-bind", "/", "/", *_masked(confined.masked, confined.channel), "--proc", "/proc"]
+        words += ["--dev-bind", "/", "/", *_masked(confined.masked, confined.channels), "--proc", "/proc"]
     else:
         words += ["--unshare-uts", "--hostname", "application", "--unshare-cgroup-try", "--cap-drop", "ALL"]
         words += _seen(confined, places, program)
@@ -94,10 +94,10 @@ def as_data(words: Sequence[str]) -> bytes:
     return b"".join(os.fsencode(f"{word}\0") for word in words)
 
 
-def _masked(devices: Iterable[str], channel: str) -> list[str]:
-    """Nothing in the place of devices and the channel; root then has no capability to look behind, or to make them."""
+def _masked(devices: Iterable[str], channels: str) -> list[str]:
+    """Nothing in the place of devices and channels; root then has no capability to look behind, or to make them."""
     binds = [word for path in devices for word in ("--dev-bind", "/dev/null", path)]
-    binds += ["--tmpfs", channel] if channel else []
+    binds += ["--tmpfs", channels] if channels else []
     return [*binds, *(word for name in _TO_UNMASK for word in ("--cap-drop", name))] if binds else []
 
 

@@ -198,7 +198,7 @@ class ProcessSide:
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
         confined = confinement(command.folder, limits, hidden)
-        confined = replace(confined, channel=self._slot.channel if self._is_on_host else "")
+        confined = replace(confined, channels=str(Path(self._slot.channel).parent) if self._is_on_host else "")
         if self._gives_time:
             confined = replace(confined, time=self._commands.time_folder)
         return asdict(replace(confined, masked=command.masked))
@@ -209,7 +209,7 @@ class ProcessSide:
         application = self._plan.application
         known = hidden_paths(application, self._folder, self._report)
         roots = application_paths(application, self._folder).roots
-        places = (self._folder, self._report, Path(self._slot.channel))
+        places = (self._folder, self._report, Path(self._slot.channel).parent)
         return [*known, *own_data(), *roots, *(place.resolve() for place in places)]
 
     async def beginning(self) -> Collection[int]:

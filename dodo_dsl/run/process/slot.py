@@ -4,13 +4,10 @@ A sandbox enters its own namespaces, or those of a container, which the applicat
 services and sandboxes.
 """
 
-import contextlib
 import json
 import os
-import shutil
 import sys
-import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -20,17 +17,6 @@ from dodo_dsl.run.process import namespaces
 
 SLOT_VARIABLE = "DODO_SLOT"
 """Environment variable of a test's processes on the host: the name of its slot, by which leftovers are found."""
-
-
-@contextlib.contextmanager
-def meeting_place(work: Path, keep: bool) -> Iterator[str]:
-    """A folder in ``work`` where the services of a test meet; ``keep`` leaves it."""
-    folder = tempfile.mkdtemp(prefix="channel-", dir=work)
-    try:
-        yield folder
-    finally:
-        if not keep:
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,7 @@ def unrecorded(app: Application, number: int) -> None:
 
 def places() -> set[Path]:
     """Folders where services may meet: known ones, and what other processes have."""
-    found = {Path("/dodo/channel"), *Path("/tmp").glob("dodo-run-*/channel-*"), *Path("/tmp").glob("channel-*")}
+    found = {Path("/dodo/channel"), *Path("/tmp").glob("dodo-channels-*/*"), *Path("/tmp").glob("dodo-run-*")}
     for environment in Path("/proc").glob("[0-9]*/environ"):
         with contextlib.suppress(OSError):
             words = environment.read_bytes().split(b"\0")

@@ -62,13 +62,13 @@ def volumes(*mounts: Any, folder: Path, **more: Any) -> list[Any]:
 
 
 def test_where_services_meet_is_hidden(folder: Path) -> None:
-    """Also in the host's ``/tmp``, which programs of cars mount."""
+    """With those of other tests, also in the host's ``/tmp``, which programs of cars mount."""
     host = folder.parents[1] / "host"
-    (host / "channel-1").mkdir(parents=True)
+    (host / "channels" / "one").mkdir(parents=True)
     test = read(planned({"app": {"volumes": [f"{host}:/tmp"]}}), folder)
-    test.channel = str(host / "channel-1")
+    test.channel = str(host / "channels" / "one")
     mounts = test.document()["services"]["app"]["volumes"]
-    assert {"type": "tmpfs", "target": "/tmp/channel-1", "read_only": True} in mounts
+    assert {"type": "tmpfs", "target": "/tmp/channels", "read_only": True} in mounts
 
 
 def bind(source: str, target: str, makes: bool = True) -> dict[str, Any]:
