@@ -63,7 +63,7 @@ def _channels() -> Path:
 
 
 def _remove_place() -> None:
-    """Removes the place of all channels, unless there is one."""
+    """Removes the place of all channels, unless a test has one there."""
     with contextlib.suppress(OSError):
         _channels().rmdir()
 

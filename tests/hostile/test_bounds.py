@@ -10,6 +10,7 @@ import pytest
 
 from dodo_dsl.run.process import process_group
 from dodo_dsl.run.process.process_group import ProcessGroup
+from dodo_dsl.run.work_folder import meeting_place
 from dodo_dsl.spec.model import ResourceLimits
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.run.desk import gone, processes_with
@@ -84,6 +85,21 @@ def test_a_child_that_hides_does_not_outlive_its_test(bench: Bench, isolation: s
     (outcome,) = bench.run(plan)
     assert (outcome.outcome, outcome.reason) == ("passed", "it drove")
     assert gone(mark, 5.0), processes_with(mark)
+
+
+@pytest.mark.parametrize("isolation", ["network", "host"])
+def test_where_services_of_another_test_meet_is_not_there(bench: Bench, isolation: str) -> None:
+    """An application does not see the channels of other tests, also as root that takes away what hides them."""
+    bench.isolation = isolation
+    with meeting_place(Path("dodo-run-other"), keep=False) as other:
+        sought = Path(other) / "sought"
+        sought.touch()
+        look = f"import subprocess\nsubprocess.run(['umount', {str(sought.parents[1])!r}], check=False)\n"
+        look += f"print('seen' if os.path.exists({str(sought)!r}) else 'hidden', flush=True)\n"
+        plan = bench.plan(judge=READY + AFTER_START + PASS, application="import os\n" + look + STARTED + WAIT)
+        (outcome,) = bench.run(plan)
+    assert outcome.outcome == "passed"
+    assert "hidden" in bench.log(plan, "application.app").splitlines()
 
 
 def test_what_it_writes_goes_with_the_test(bench: Bench) -> None:

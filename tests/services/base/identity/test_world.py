@@ -72,7 +72,7 @@ def frame(name: str = FRAME) -> Envelope:
     ("told", "truth", "heard"),
     [
         pytest.param("", "", [READING], id="it hears readings alone"),
-        pytest.param(f"{FRAME}/0", "", [FRAME, READING], id="what it declares it is told"),
+        pytest.param(f"{FRAME}/0", "", [FRAME, READING], id="declared"),
         pytest.param(f"{READING}/0", f"{READING}/0", [], id="truth never, as it is judged by it"),
     ],
 )
