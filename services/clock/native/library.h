@@ -204,6 +204,15 @@ static inline int in_c11(int error)
         return in_c11(of((void *)object));                                                                             \
     }
 
+/* What glibc and musl have in different places, and what only one of them has: the library, compiled with glibc, runs in programs of both.
+ * musl takes libc.so.6 for itself and looks at no versions, so it is enough to need no function that it lacks. */
+extern const char *gnu_get_libc_version(void) __attribute__((weak));
+
+static inline int word_of(const void *object, unsigned in_glibc, unsigned in_musl)
+{
+    return __atomic_load_n((const int *)object + (gnu_get_libc_version ? in_glibc : in_musl), __ATOMIC_RELAXED);
+}
+
 static inline int64_t now_ns(void)
 {
     return atomic_load_explicit(&page->now_ns, memory_order_acquire);

@@ -6,13 +6,19 @@
 #define _GNU_SOURCE
 #include "library.h"
 
+#include <linux/futex.h>
 
-enum { MUTEX_KINDS = 3, MUTEX_ROBUST = 16, MUTEX_SHARED = 128, ONCE_RUNS = 1, ONCE_DONE = 2 }; /* glibc's bits */
+enum { MUTEX_KINDS = 3, MUTEX_ROBUST = 16 + 4 /* glibc's bit, musl's */, MUTEX_SHARED = 128, ONCE_RUNS = 1, ONCE_DONE = 2 };
 enum { LOOK_AGAIN_NS = 10000000, RETRY_NS = 100000 };
 
 static bool is_own(int owner)
 {
-    return self.slot && owner == self.slot->tid;
+    return self.slot && (owner & FUTEX_TID_MASK) == self.slot->tid;
+}
+
+static int kind_of(const pthread_mutex_t *mutex)
+{
+    return word_of(mutex, 4, 0);
 }
 
 /* Tries until it is not busy, or the deadline. */
@@ -44,21 +50,21 @@ static int try_mutex(void *mutex)
 
 int lock_mutex(pthread_mutex_t *mutex, int64_t deadline_ns)
 {
-    int kind = mutex->__data.__kind;
+    int kind = kind_of(mutex);
     bool managed = is_managed();
     int error = real.pthread_mutex_trylock(mutex);
     if (error != EBUSY)
         return error;
     if (!managed)
         return real.pthread_mutex_lock(mutex);
-    if ((kind & MUTEX_KINDS) == PTHREAD_MUTEX_ERRORCHECK && is_own(mutex->__data.__owner))
+    if ((kind & MUTEX_KINDS) == PTHREAD_MUTEX_ERRORCHECK && is_own(word_of(mutex, 2, 1)))
         return EDEADLK;
     return lock(mutex, try_mutex, kind & MUTEX_SHARED, deadline_ns, kind & MUTEX_ROBUST ? LOOK_AGAIN_NS : TIME_NEVER);
 }
 
 int unlock_mutex(pthread_mutex_t *mutex)
 {
-    bool managed = is_managed(), is_shared = mutex->__data.__kind & MUTEX_SHARED;
+    bool managed = is_managed(), is_shared = kind_of(mutex) & MUTEX_SHARED;
     int error = real.pthread_mutex_unlock(mutex);
     if (!error && managed)
         queue_wake(mutex, is_shared, 1, ~0U);
@@ -122,9 +128,9 @@ static int lock_readers_writer(pthread_rwlock_t *object, int (*attempt)(void *),
 {
     if (!is_managed())
         return attempt(object);
-    if (is_own(object->__data.__cur_writer))
+    if (gnu_get_libc_version && is_own(word_of(object, 6, 6)))
         return EDEADLK;
-    return lock(object, attempt, object->__data.__shared, deadline_ns, TIME_NEVER);
+    return lock(object, attempt, word_of(object, 7, 2), deadline_ns, TIME_NEVER);
 }
 
 static int lock_readers_writer_until(pthread_rwlock_t *object, int (*attempt)(void *), clockid_t clock,
@@ -155,7 +161,7 @@ WAYS_TO(wrlock, try_to_write)
 
 PUBLIC int pthread_rwlock_unlock(pthread_rwlock_t *object)
 {
-    bool managed = is_managed(), is_shared = object->__data.__shared;
+    bool managed = is_managed(), is_shared = word_of(object, 7, 2);
     int error = real.pthread_rwlock_unlock(object);
     if (!error && managed)
         queue_wake(object, is_shared, INT_MAX, ~0U);

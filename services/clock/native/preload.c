@@ -274,19 +274,35 @@ static void open_page(void)
         fail("the page of the test's time is of another version");
 }
 
+/* The number at the beginning of a variable, and what stands behind it. With new glibcs, strtoul would be a function that musl lacks. */
+static uint32_t number_in(const char *text, const char **end)
+{
+    uint32_t number = 0;
+    while (text && *text >= '0' && *text <= '9')
+        number = number * 10 + (uint32_t)(*text++ - '0');
+    if (end)
+        *end = text;
+    return number;
+}
+
+static uint32_t given_service(void)
+{
+    return number_in(getenv("DODO_TIME_SERVICE"), NULL) % TIME_SERVICES;
+}
+
 /* The number is known before where a process of the application began this one: after execve it is that of before. */
 static void take_process_number(void)
 {
     char *given = getenv("DODO_TIME_PROCESS");
-    char *end = NULL;
-    unsigned long number = given ? strtoul(given, &end, 10) : 0;
+    const char *end;
+    uint32_t number = number_in(given, &end);
     if (!given || end == given || *end != ':') {
         process.number = next_process_number();
         return;
     }
-    int of = atoi(end + 1), own = (int)RAW_1(SYS_getpid, 0);
+    int of = (int)number_in(end + 1, NULL), own = (int)RAW_1(SYS_getpid, 0);
     *given = 0; /* nobody inherits it */
-    process.number = of == 0 || of == own ? (uint32_t)number : next_process_number();
+    process.number = of == 0 || of == own ? number : next_process_number();
     for (unsigned at = 0; of == own && at < TIME_SLOTS; at++) {
         struct time_slot *slot = &page->slot[at];
         if (slot->service == process.service && slot->process == process.number && slot->pid == own)
@@ -297,12 +313,10 @@ static void take_process_number(void)
 static void start(void)
 {
     int error = errno;
-    const char *given;
     stage = STARTING;
     find_real_functions();
     open_page();
-    given = getenv("DODO_TIME_SERVICE");
-    process.service = given ? (uint32_t)strtoul(given, NULL, 10) % TIME_SERVICES : 0;
+    process.service = given_service();
     take_process_number();
     adopt_slot(take_slot(process.number, process.threads++));
     processes_start();
@@ -328,11 +342,10 @@ bool is_managed(void)
  * go on. It begins again without the library. */
 static void leave_to_outside(char **words)
 {
-    const char *given = getenv("DODO_TIME_SERVICE");
     if (stage != NEW || RAW_1(SYS_getppid, 0) != 0 || getenv("DODO_TIME_PROCESS"))
         return;
     open_page();
-    if (!page->processes[(given ? strtoul(given, NULL, 10) : 0) % TIME_SERVICES])
+    if (!page->processes[given_service()])
         return;
     const char *loaded = getenv("LD_PRELOAD"), *others = loaded ? strchr(loaded, ':') : NULL;
     if (others)
@@ -345,7 +358,9 @@ static void leave_to_outside(char **words)
 
 __attribute__((constructor)) static void on_load(int count, char **words)
 {
-    (void)count;
+    if (!gnu_get_libc_version) /* musl gives a constructor no words: they are before the environment, behind their number */
+        for (count = 0, words = environ - 1; (uintptr_t)words[-1] != (uintptr_t)count; count++)
+            words--;
     leave_to_outside(words);
     is_managed();
 }

@@ -17,6 +17,10 @@ enum { MOST_CHILDREN = 128, RETRY_NS = 1000000, LOOK_AGAIN_NS = 100000000 };
 
 static pthread_key_t at_end;
 
+/* glibc's and musl's. */
+extern int __register_atfork(void (*)(void), void (*)(void), void (*)(void), void *) __attribute__((weak));
+extern int pthread_atfork(void (*)(void), void (*)(void), void (*)(void)) __attribute__((weak));
+
 /* The last of the destructors that a thread has. */
 static void end_thread(void *value)
 {
@@ -29,7 +33,10 @@ static void end_thread(void *value)
 void processes_start(void)
 {
     pthread_key_create(&at_end, end_thread);
-    pthread_atfork(before_fork, NULL, in_forked_child);
+    if (__register_atfork)
+        __register_atfork(before_fork, NULL, in_forked_child, NULL);
+    else if (pthread_atfork)
+        pthread_atfork(before_fork, NULL, in_forked_child);
 }
 
 /* -- threads -------------------------------------------------------------------------------------------------------- */
@@ -277,7 +284,7 @@ PUBLIC int aio_suspend(const struct aiocb *const list[], int count, const struct
     int64_t deadline = timeout && is_managed() ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
     for (;;) {
         for (int at = 0; at < count; at++)
-            if (list[at] && __atomic_load_n(&list[at]->__error_code, __ATOMIC_ACQUIRE) != EINPROGRESS)
+            if (list[at] && aio_error(list[at]) != EINPROGRESS)
                 return 0;
         int64_t again = later(now_ns(), RETRY_NS);
         if (now_ns() >= deadline)

@@ -132,7 +132,11 @@ static void stamp(struct msghdr *message)
 {
     struct timespec now = timespec_of(now_ns());
     struct timeval now_in_us = {now.tv_sec, now.tv_nsec / 1000};
-    for (struct cmsghdr *each = CMSG_FIRSTHDR(message); each; each = CMSG_NXTHDR(message, each)) {
+    struct cmsghdr *each;
+    for (size_t at = 0; at + sizeof *each <= message->msg_controllen; at += CMSG_ALIGN(each->cmsg_len)) {
+        each = (struct cmsghdr *)((char *)message->msg_control + at);
+        if (each->cmsg_len < sizeof *each)
+            break;
         if (each->cmsg_level != SOL_SOCKET)
             continue;
         if (each->cmsg_type == SCM_TIMESTAMP)

@@ -7,6 +7,7 @@
 #include "library.h"
 
 #include <linux/futex.h>
+#include <string.h>
 
 /* One a slot: this process's thread there waits for `address`. */
 struct waiter {
@@ -138,11 +139,27 @@ int queue_wait(uint32_t kind, int64_t deadline_ns, bool is_interruptible)
 
 /* -- condition variables -------------------------------------------------------------------------------------------- */
 
-enum { COND_SHARED = 1, COND_MONOTONIC = 2 }; /* bits of glibc's pthread_cond_t */
+/* Only the functions here use one, and it says only this: zeros, as with PTHREAD_COND_INITIALIZER, are one process and CLOCK_REALTIME. */
+struct cond {
+    int is_shared;
+    clockid_t clock;
+};
+
+PUBLIC int pthread_cond_init(pthread_cond_t *restrict cond, const pthread_condattr_t *restrict attributes)
+{
+    struct cond wanted = {0, CLOCK_REALTIME};
+    memset(cond, 0, sizeof *cond);
+    if (attributes) {
+        pthread_condattr_getpshared(attributes, &wanted.is_shared);
+        pthread_condattr_getclock(attributes, &wanted.clock);
+    }
+    *(struct cond *)cond = wanted;
+    return 0;
+}
 
 static bool is_shared_cond(const pthread_cond_t *cond)
 {
-    return cond->__data.__wrefs & COND_SHARED;
+    return ((const struct cond *)cond)->is_shared;
 }
 
 static int wait_for_cond(pthread_cond_t *cond, pthread_mutex_t *mutex, int64_t deadline_ns)
@@ -176,8 +193,7 @@ PUBLIC int pthread_cond_clockwait(pthread_cond_t *restrict cond, pthread_mutex_t
 PUBLIC int pthread_cond_timedwait(pthread_cond_t *restrict cond, pthread_mutex_t *restrict mutex,
                                   const struct timespec *restrict until)
 {
-    bool is_monotonic = cond->__data.__wrefs & COND_MONOTONIC;
-    return pthread_cond_clockwait(cond, mutex, is_monotonic ? CLOCK_MONOTONIC : CLOCK_REALTIME, until);
+    return pthread_cond_clockwait(cond, mutex, ((const struct cond *)cond)->clock, until);
 }
 
 PUBLIC int pthread_cond_signal(pthread_cond_t *cond)
@@ -209,15 +225,10 @@ IN_C11(cnd_broadcast, cnd_t, pthread_cond_broadcast)
 
 /* -- semaphores ----------------------------------------------------------------------------------------------------- */
 
-/* glibc's semaphore: its value and whether threads wait, then 0 if it is of one process. */
-struct semaphore {
-    uint64_t data;
-    int shared;
-};
-
 static bool is_shared_semaphore(const sem_t *semaphore)
 {
-    return ((const struct semaphore *)semaphore)->shared != 0;
+    int found = word_of(semaphore, 2, 2);
+    return gnu_get_libc_version ? found : !found;
 }
 
 static int wait_for_semaphore(sem_t *semaphore, int64_t deadline_ns)

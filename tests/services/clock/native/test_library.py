@@ -61,9 +61,12 @@ def words_of(output: str) -> str:
     return ", ".join(output.splitlines())
 
 
+@pytest.mark.parametrize("libc", ["programs", "musl"])
 @pytest.mark.parametrize("program", WAITS)
-def test_waits_end_by_the_time_of_the_test(built: Path, program: str) -> None:
-    with Application(built, [built / "programs", program]) as application:
+def test_waits_end_by_the_time_of_the_test(built: Path, program: str, libc: str) -> None:
+    if not (built / libc).exists():
+        pytest.skip("needs musl-gcc (musl-tools)")
+    with Application(built, [built / libc, program]) as application:
         application.run(3)
         assert application.code() == 0
         assert words_of(application.output()) == WAITS[program]
