@@ -210,11 +210,14 @@ static void free_dead_slots(void)
 }
 
 /* Whether a thread runs by its slot: in wait4, for instance, the kernel calls one asleep that still runs. */
-static bool one_runs(void)
+static bool one_runs(bool *is_granted)
 {
+    *is_granted = false;
     for (unsigned at = 0, end = used_slots(); at < end; at++) {
         struct time_slot *slot = &page->slot[at];
-        if (slot->state == TIME_RUNNING && waits_unseen[at] != slot->wake + 1)
+        uint32_t state = slot->state;
+        *is_granted |= state == TIME_GRANTED;
+        if (state == TIME_RUNNING && waits_unseen[at] != slot->wake + 1)
             return true;
     }
     return false;
@@ -351,17 +354,22 @@ static bool await_quiet(void)
     int64_t since = wall_ns(), reported = since, asleep_since = 0;
     int64_t nap = SHORTEST_NAP_US;
     processes_begin_wait();
-    while (!has_ended) {
+    for (bool is_new = true; !has_ended;) {
         uint32_t seen = page->activity;
         int64_t now = wall_ns();
-        bool is_strict = one_runs() && (!asleep_since || now - asleep_since < UNSEEN_WAIT_MS * (SECOND / 1000));
-        if (processes_are_quiet(is_strict)) {
-            note_unseen_waits();
-            free_dead_slots();
-            repair_header();
-            return true;
+        bool is_granted, runs = one_runs(&is_granted), is_off = true;
+        if (is_new && (runs || is_granted)) { /* it says soon itself that it waits */
+        } else if (processes_are_quiet(runs ? &is_off : NULL)) {
+            asleep_since = is_off ? 0 : asleep_since ? asleep_since : now;
+            if (is_off || now - asleep_since > UNSEEN_WAIT_MS * (SECOND / 1000)) {
+                note_unseen_waits();
+                free_dead_slots();
+                repair_header();
+                return true;
+            }
+        } else {
+            asleep_since = 0;
         }
-        asleep_since = !is_strict || !processes_are_quiet(false) ? 0 : asleep_since ? asleep_since : now;
         if (now - since > 100 * SECOND / 1000) {
             char line[64];
             if (is_serving && next_command(line, sizeof line)) {
@@ -375,8 +383,8 @@ static bool await_quiet(void)
             }
         }
         struct timespec pause = {0, nap * 1000};
-        futex(&page->activity, FUTEX_WAIT, seen, &pause);
-        nap = nap * 3 / 2 < LONGEST_NAP_US ? nap * 3 / 2 : LONGEST_NAP_US;
+        is_new = !futex(&page->activity, FUTEX_WAIT, seen, &pause) || errno == EAGAIN;
+        nap = is_new ? SHORTEST_NAP_US : nap * 3 / 2 < LONGEST_NAP_US ? nap * 3 / 2 : LONGEST_NAP_US;
     }
     return false;
 }

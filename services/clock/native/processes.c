@@ -23,6 +23,7 @@ struct thread {
     int stat, runs; /* descriptors of its files stat, and schedstat or status */
     bool has_ended;
     uint64_t got;   /* how often it had got a processor at the first look */
+    bool slept;     /* at the last quiet moment, with `got` as it is */
     unsigned wait;  /* the wait in which `ran_before_ns` was read */
     uint64_t ran_before_ns;
 };
@@ -270,8 +271,13 @@ static bool sleeps(struct thread *each)
 static bool first_look(void)
 {
     for (int at = 0; at < thread_count; at++) {
-        threads[at].got = runs(&threads[at]);
-        if (!sleeps(&threads[at]))
+        struct thread *each = &threads[at];
+        uint64_t got = runs(each);
+        if (each->slept && got == each->got)
+            continue; /* it sleeps since then if it does at the second look */
+        each->slept = false;
+        each->got = got;
+        if (!sleeps(each))
             return false;
     }
     return true;
@@ -342,10 +348,16 @@ void processes_begin_wait(void)
     busy = (struct busy_thread){0};
 }
 
-bool processes_are_quiet(bool is_strict)
+bool processes_are_quiet(bool *is_off)
 {
-    if (!is_listed() || !first_look() || !network_is_empty() || (is_strict && !all_are_off()) || !second_look() || last_number() != listed_number)
+    if (!is_listed() || !first_look() || !network_is_empty())
         return false;
+    if (is_off)
+        *is_off = all_are_off();
+    if (!second_look() || last_number() != listed_number)
+        return false;
+    for (int at = 0; at < thread_count; at++)
+        threads[at].slept = true;
     if (!is_complete)
         is_complete = list() && !new_count;
     return is_complete;

@@ -23,8 +23,8 @@ struct busy_thread {
 void processes_init(const struct selection *selection);
 /* A new wait begins: processor time is counted anew. */
 void processes_begin_wait(void);
-/* Whether all threads slept at one moment during this call. */
-bool processes_are_quiet(bool is_strict);
+/* Whether all threads slept at one moment during this call; `is_off` says whether the kernel knows of each where. */
+bool processes_are_quiet(bool *is_off);
 /* The thread that was found busy at last. */
 struct busy_thread processes_busy(void);
 /* Whether nothing of the application is left. */
