@@ -215,7 +215,6 @@ static uint64_t ran_ns(const struct thread *each)
 
 static void note_busy(struct thread *each, char state)
 {
-    char path[64], text[MOST_TEXT];
     uint64_t ran = ran_ns(each);
     if (each->wait != current_wait) {
         each->wait = current_wait;
@@ -223,13 +222,6 @@ static void note_busy(struct thread *each, char state)
     }
     busy = (struct busy_thread){.pid = each->pid, .tid = each->tid, .state = state};
     busy.processor_s = ran > each->ran_before_ns ? (double)(ran - each->ran_before_ns) / 1e9 : 0;
-    snprintf(path, sizeof path, "/proc/%d/task/%d/status", each->pid, each->tid);
-    if (read_file(path, text, sizeof text) <= 0)
-        return;
-    depth(text, &busy.inner_tid);
-    const char *name = field(text, "Name:\t");
-    for (size_t at = 0; name && name[at] && name[at] != '\n' && at < sizeof busy.name - 1; at++)
-        busy.name[at] = name[at];
 }
 
 /* How often a thread has got a processor, or else how often it was switched off one. */
@@ -373,5 +365,11 @@ bool processes_have_ended(void)
 
 struct busy_thread processes_busy(void)
 {
+    char path[64], text[MOST_TEXT];
+    snprintf(path, sizeof path, "/proc/%d/task/%d/status", busy.pid, busy.tid);
+    if (read_file(path, text, sizeof text) > 0) {
+        depth(text, &busy.inner_tid);
+        snprintf(busy.name, sizeof busy.name, "%.*s", (int)strcspn(text + strlen("Name:\t"), "\n"), text + strlen("Name:\t"));
+    }
     return busy;
 }
