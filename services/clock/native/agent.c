@@ -53,7 +53,6 @@ static int folder_file = -1, command_file = -1, reply_file = -1, wakers[TIME_SLO
 static int64_t now_ns; /* the page shows it, and the application can write there */
 static bool is_overwritten, has_begun[TIME_SERVICES];
 static uint32_t waits_unseen[TIME_SLOTS]; /* one more than `wake` of a thread that was found to wait elsewhere, or has ended */
-static uint64_t grants;
 static uint32_t notes_told;
 static volatile sig_atomic_t is_over;
 static bool is_repeatable = true, has_ended, is_serving; /* before that, the clock's commands wait */
@@ -193,7 +192,6 @@ static void grant(struct time_slot *slot, uint32_t state)
     bool is_polling = state == TIME_WAITING && slot->kind == TIME_FD;
     if (!atomic_compare_exchange_strong(&slot->state, &state, TIME_GRANTED))
         return;
-    grants++;
     slot->wake++;
     futex(&slot->wake, FUTEX_WAKE, INT32_MAX, NULL);
     if (is_polling)
@@ -314,9 +312,11 @@ static void report_time(void)
         if (has_begun[at])
             length += snprintf(services + length, sizeof services - (size_t)length, "%s%u", length ? ", " : "", at);
     add_notes(notes, sizeof notes);
+    struct used used = processes_used();
     snprintf(line, sizeof line,
-             "{\"now\": %lld, \"grants\": %llu, \"services\": [%s], \"repeatable\": %s, \"notes\": [%s]}\n",
-             (long long)now_ns, (unsigned long long)grants, services, is_repeatable ? "true" : "false", notes);
+             "{\"now\": %lld, \"services\": [%s], \"repeatable\": %s, \"ran_s\": %.9f, \"has_ended\": %s, \"notes\": [%s]}\n",
+             (long long)now_ns, services, is_repeatable ? "true" : "false", used.seconds, used.one_has_ended ? "true" : "false",
+             notes);
     reply(line);
 }
 

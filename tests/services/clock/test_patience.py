@@ -7,10 +7,10 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
-
 from services.clock.application import ResponseTimes, SteppedApplication
-from services.clock.exchange import ApplicationSilent, Patience
 from services.clock.processor_time import ApplicationProcesses, ProcessorTimes, ThreadSpent
+
+from services.clock.exchange import ApplicationSilent, Patience
 
 PID = 7
 LIMIT_S, ANSWER_S = 0.05, 0.4

@@ -8,10 +8,10 @@ from unittest import mock
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from services.clock.application import ResponseTimes, SteppedApplication
 
 from dodo_dsl.opendlv.envelope import Envelope
 from services.clock.answers import Answers, MessageFilter
-from services.clock.application import ResponseTimes, SteppedApplication
 from services.clock.exchange import Patience
 
 STEER = MessageFilter("steer", 1090)

@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from services.clock.processor_time import (
     Account,
     ApplicationProcesses,

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from services.clock.application import ResponseTimes, processor_name
 from services.clock.processor_time import Spent
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+from services.clock.virtual import Busy, Destroyed, Reached, SentMessages, TimeAgent, VirtualApplication, report_of
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
@@ -19,7 +20,6 @@ from services.base.lockstep_clock import EPOCH
 from services.clock import virtual
 from services.clock.answers import filters
 from services.clock.exchange import ApplicationFloods, ApplicationSilent, Patience, ServiceLink, ServiceSilent
-from services.clock.virtual import Busy, Destroyed, Reached, SentMessages, TimeAgent, VirtualApplication, report_of
 from tests.services.clock.toys import STEER, STEP, Toys
 
 Answer = Callable[[int], list[object]]

@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from services.clock.application import ResponseTimes, SteppedApplication
+from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
+
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
@@ -19,10 +22,8 @@ from services.base.clock_link import ClockClient
 from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
 from services.clock.answers import Answers, filters
-from services.clock.application import ResponseTimes, SteppedApplication
 from services.clock.exchange import Exchange, IsStopped, Patience, Roles
 from services.clock.model import Stepper
-from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
