@@ -12,7 +12,6 @@ from typing import Any
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.numbers import is_whole, whole
-from services.base.lockstep_clock import EPOCH
 from services.clock.exchange import SLICE_S, ApplicationFloods, ApplicationSilent, IsStopped, Patience, ServiceLink
 
 MOST_SURPLUS = 100
@@ -161,7 +160,7 @@ class AnsweringApplication:
     def start(self, now: int, cameras: Collection[str]) -> int:
         """It may still be starting: the first picture waits for it."""
         self._has_cameras = bool(cameras)
-        return now or EPOCH
+        return now
 
     def expect(self, now: int) -> None:
         """Without cameras, it answers what services are about to send in the step of this time (us)."""

@@ -50,7 +50,7 @@ class Stepper:
     application: Application
     link: ServiceLink
     stopped: IsStopped
-    begin: int = 0
+    begin: int = EPOCH
     """When the test begins (us)."""
     now: int = EPOCH
     reached: int = EPOCH

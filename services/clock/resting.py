@@ -167,6 +167,7 @@ class RestingApplication:
         self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
         self._names, self._note = names, note
         self._noted: set[str] = set()
+        self._is_started = False
         self._shown_at = self._until = 0
         self._taken_s = 0.0
         """What it has computed in this step."""
@@ -181,9 +182,11 @@ class RestingApplication:
 
         Raises ApplicationSilent, ApplicationFloods and ServiceSilent.
         """
-        if not now:
+        if self._is_started:
+            now += START_US
+        else:
             self._agent.open(self._stopped)
-        now = now + START_US if now else EPOCH
+            self._is_started = True
         self._run(now)
         while (deaf := [camera for camera in cameras if not self._is_awaited(camera)]) and not self._stopped():
             if now - EPOCH >= MOST_START_US:

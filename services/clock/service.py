@@ -85,20 +85,22 @@ class ClockService(Service):
 
     def _step(self) -> None:
         ended: TestEnded | None = None
-        self._begun = time.monotonic()
         try:
             self._stepper.connect()
             self._exchange.ignore_services(self._heard)
-            if (begin := self._await_begin()) is not None:
-                self._report_time()
-                self._stepper.run(begin)
+            if (begin := self._await_begin()) is None:
+                return
+            self._begun = time.monotonic()
+            self._report_time()
+            self._stepper.run(begin)
         except TestEnded as problem:
             ended = problem
         spent = sorted(((n, s) for n, s in self._stepper.spent.items() if n), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
         if facts := self._application.facts():
             tell("response", response=facts)
-        self._report_time(last=True)
+        if self._begun:
+            self._report_time(last=True)
         if ended is not None:
             tell("stopped", how=ended.kind, reason=str(ended), silent=ended.silent)
 
@@ -114,6 +116,8 @@ class ClockService(Service):
         self._answers.take(envelope)
 
     def _over(self) -> bool:
+        if not self._begun:
+            return self._stopped()
         now = time.monotonic()
         is_further = self._stepper.reached != self._reached
         period = max(_FIRST_REPORT_S, _REPORT_SHARE * (now - self._begun)) if is_further else _REPORT_S
