@@ -130,11 +130,6 @@ class ComposeService:
         """Whether its process is to have an X server."""
         return self._true("display") is not None
 
-    @property
-    def timed(self) -> Span | None:
-        """The place that declares its own timers."""
-        return self._true("timed")
-
     def _true(self, key: str) -> Span | None:
         """The place of a key of ``x-dodo`` that is true."""
         entry = source.entries(self.node, KEYS[0]).get(key)
@@ -193,11 +188,6 @@ class ApplicationSource:
         """The CID that is built into the application, so that its tests use it."""
         values = [cid.value for cid in self.cids if isinstance(cid.value, int)]
         return values[0] if values else None
-
-    @property
-    def timed(self) -> tuple[Word, ...]:
-        """The services that declare their own timers, each with the place."""
-        return tuple((each.name, each.timed) for each in self.services.values() if each.timed)
 
     @functools.cached_property
     def paths(self) -> HostPaths:

@@ -12,7 +12,7 @@ from dodo_dsl.source import Entry, Mapping, Scalar, plain
 from dodo_dsl.spec.arguments import Argument
 from dodo_dsl.spec.deployment import RESERVED_CIDS, Deployment
 from dodo_dsl.spec.load import members
-from dodo_dsl.spec.model import VIRTUAL, Goal, Use
+from dodo_dsl.spec.model import Goal, Use
 from dodo_dsl.spec.quantity import SHARE, QuantityError, convert
 from dodo_dsl.spec.registry import KEYWORDS, SUFFIX, is_free, is_name
 from dodo_dsl.spec.rig import CAMERA_SOURCE, EMULATED, EMULATED_RIGS, KIND_TAGS, MEMORY, PORT, Rig, is_simulated
@@ -44,36 +44,15 @@ def check_levels(context: RuleContext) -> Iterator[Diagnostic]:
             spec.span("kind"), "level-kind", message, "use kind open-loop or perception, or level sil or hil"
         )
     if spec.level == "hil" and spec.is_stepped:
-        how = "in lockstep" if spec.clock != VIRTUAL else "with clock virtual"
-        message = f"a hil test cannot run {how}: hardware does not wait"
+        message = "a hil test cannot run in lockstep: hardware does not wait"
         yield Diagnostic(spec.span("clock"), "clock-level", message, "use clock realtime")
 
 
 def check_clock_rates(context: RuleContext) -> Iterator[Diagnostic]:
     if not context.spec.is_stepped or not context.spec.is_whole:
         return
-    yield from _rates(context)
-    if context.spec.clock == VIRTUAL:
-        yield from _own_time(context)
-
-
-def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
-    spec = context.spec
-    if spec.level == "hil":
-        return
-    if spec.max_response_s is not None and "clock" in spec.spans:  # else the command line chose it
-        message = "with clock virtual computing takes no test time, so that no answer is slow"
-        hint = "limit answers with clock lockstep, or processor time with 'resources'"
-        yield Diagnostic(spec.span("response"), "clock-virtual", message, hint)
-    if printed := context.wiring.printed:
-        message = f"'{printed[0].service}' prints its messages, and lines have no time of the test"
-        hint = "send them on the bus, or use clock lockstep"
-        yield Diagnostic(spec.span("clock"), "clock-virtual", message, hint)
-
-
-def _rates(context: RuleContext) -> Iterator[Diagnostic]:
     known = rates(context.services)
-    step = step_hz(context.wiring, known, context.spec.clock)
+    step = step_hz(context.wiring, known)
     for use in context.spec.uses:
         rate = known.get(use.name)
         if rate is None or rates_fit(rate, step):

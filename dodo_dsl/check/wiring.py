@@ -15,7 +15,6 @@ from dodo_dsl.diagnostics import Span
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Ports
-from dodo_dsl.spec.model import VIRTUAL
 
 Kind = Literal["message", "memory"]
 
@@ -199,16 +198,14 @@ def rates(services: Iterable[ResolvedService]) -> dict[str, float]:
     return found
 
 
-def step_hz(wiring: Wiring, rates: Mapping[str, float], clock: str = "lockstep") -> float:
-    """Steps per second: the rate of the fastest camera; ``rates`` are the services' in Hz.
+def step_hz(wiring: Wiring, rates: Mapping[str, float]) -> float:
+    """Steps per second: the rate of the fastest camera, or else of the fastest service that the application hears.
 
-    Where the application's own time is the test's, without a camera that of the fastest service that it hears.
+    ``rates`` are the services' in Hz.
     """
-    sources = cameras_of(wiring)
-    if clock == VIRTUAL and not sources:
-        sources = {
-            e.service for e in wiring.produced if any(i.port.consumes(e.port) for i in wiring.application_consumes)
-        }
+    sources = cameras_of(wiring) or {
+        e.service for e in wiring.produced if any(i.port.consumes(e.port) for i in wiring.application_consumes)
+    }
     return max((rates[name] for name in sources if name in rates), default=DEFAULT_HZ)
 
 
@@ -246,11 +243,6 @@ def other_inputs(wiring: Wiring) -> list[str]:
     """Other messages of the application that services of the test consume."""
     chosen = answers(wiring)
     return [name for name in _names(_from_application(wiring)) if name not in chosen]
-
-
-def all_inputs(wiring: Wiring) -> list[str]:
-    """All messages of the application that services of the test consume."""
-    return _names(_from_application(wiring))
 
 
 def _from_application(wiring: Wiring) -> list[End]:

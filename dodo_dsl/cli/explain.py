@@ -1,12 +1,14 @@
 """dodo explain: explain a rule, or how a test is wired and what its application must provide."""
 
 import argparse
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, TextIO
 
+from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import catalogue
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.senders import told, told_in_words
@@ -15,8 +17,10 @@ from dodo_dsl.cli import selection
 from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.diagnostics import Span, did_you_mean, shown_path
+from dodo_dsl.run import application_time
+from dodo_dsl.source import plain
 from dodo_dsl.spec.arguments import Argument, default_value
-from dodo_dsl.spec.model import LEVEL_WORDS, Use
+from dodo_dsl.spec.model import LEVEL_WORDS, Spec, Use
 from dodo_dsl.spec.quantity import SHARE
 from dodo_dsl.spec.rig import EMULATED_FILE
 from dodo_dsl.terminal import json_text, printable
@@ -56,7 +60,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         near = did_you_mean(options.word, rules) if "-" in options.word else ""
         said = str(error).replace("unknown test", "unknown test or rule", 1)
         raise UsageError(f"{said}; " + (f"or the rule: {near}" if near else "'dodo explain' lists the rules")) from None
-    found = [explain(test) for test in checked.tests]
+    found = [explain(test, checked.application) for test in checked.tests]
     files = groupby(found, itemgetter("file"))
     stdout.write(json_text(found) if options.json else "\n".join(_file(list(instances)) for _, instances in files))
     stderr.write(selection.left_out(checked))
@@ -68,8 +72,8 @@ def _page(page: catalogue.Page) -> dict[str, str]:
     return {**asdict(page), "good": page.good}
 
 
-def explain(test: ResolvedTest) -> Explanation:
-    """One instance, as far as it can be read."""
+def explain(test: ResolvedTest, application: ApplicationSource | None = None) -> Explanation:
+    """One instance with the application, as far as they can be read."""
     spec, wiring = test.spec, test.wiring
     services = [
         {"layer": use.layer, "name": use.name, "uses": use.uses.text, "arguments": list(_arguments(test, use))}
@@ -89,6 +93,7 @@ def explain(test: ResolvedTest) -> Explanation:
         "file": shown_path(str(spec.path)),
         "level": spec.level or "?",
         "kind": spec.kind or "?",
+        "clock": _clock(spec, application),
         "rig": spec.rig or "",
         "pool": spec.pool,
         "services": services,
@@ -100,6 +105,18 @@ def explain(test: ResolvedTest) -> Explanation:
         "has_application": wiring.has_application,
         "undeclared": list(wiring.undeclared),
     }
+
+
+def _clock(spec: Spec, application: ApplicationSource | None) -> str:
+    """The test's clock, and why it is lockstep by answers where a program that is started as a process says so."""
+    if application is None or not spec.is_stepped:
+        return spec.clock
+    for service in application.services.values():
+        words = plain(service.node).get("x-dodo-process") or ()
+        for word in words[:1]:
+            if why := application_time.refusal(service.name, str(word), os.environ, application.folder):
+                return f"{spec.clock} by answers: {why}"
+    return spec.clock
 
 
 def _arguments(test: ResolvedTest, use: Use) -> Iterator[dict[str, str]]:
@@ -198,7 +215,7 @@ def _head(one: Explanation) -> str:
     rig = (f", rig {one['rig']}" if one["rig"] else "") + (f" of any {one['pool']}" if one["pool"] else "")
     level = f"{LEVEL_WORDS[one['level']]}\n" if one["level"] in LEVEL_WORDS else ""
     title = f"{one['name']} ({one['level']}, {one['kind']}{rig})"
-    return f"{printable(title)}\n{printable(one['file'])}\n{level}"
+    return f"{printable(title)}\n{printable(one['file'])}\n{level}clock: {printable(one['clock'])}\n"
 
 
 def _services(one: Explanation) -> str:

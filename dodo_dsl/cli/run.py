@@ -38,7 +38,7 @@ from dodo_dsl.run.runner import BackendName, Policy, Runner, default_backend
 from dodo_dsl.run.schedule import schedule
 from dodo_dsl.run.work_folder import reap_folders, work_folder
 from dodo_dsl.spec.deployment import Deployment
-from dodo_dsl.spec.model import LEVELS
+from dodo_dsl.spec.model import CLOCKS, LEVELS
 from dodo_dsl.terminal import printable
 
 
@@ -135,7 +135,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
     )
-    parser.add_argument("--clock", choices=("realtime", "lockstep", "virtual"), help="override the specs' clock")
+    parser.add_argument("--clock", choices=tuple(CLOCKS), help="override the specs' clock")
     parser.add_argument("--wall-timeout", type=seconds, metavar="S", help="maximum wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
     parser.add_argument("--emulate", action="store_true", help="take emulated rigs, also in place of those of dodo.yml")

@@ -31,6 +31,7 @@ from dodo_dsl.run.backends import Job
 from dodo_dsl.search.space import space_of, sweep
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
 from dodo_dsl.spec.load import Settings, of_test
+from dodo_dsl.spec.model import CLOCKS
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.spec.rig import EMULATED, PORT, SIMULATION_TAG
 from dodo_dsl.spec.vary import Values
@@ -78,9 +79,8 @@ def _is_emulated(test: ResolvedTest) -> bool:
 
 def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[list[Job], Deployment]:
     """The jobs of the command line, compiled into ``folder`` unless they are compiled already."""
-    kept = getattr(options, "keeps_virtual", False)
     emulate, wall = options.emulate, options.wall_timeout
-    settings = Settings(options.clock, options.isolation, options.seed, wall, options.repeat, kept, emulate)
+    settings = Settings(CLOCKS.get(options.clock), options.isolation, options.seed, wall, options.repeat, emulate)
     tests: dict[str, str] = {}
     if options.compiled:
         if options.test or options.level or options.application or options.samples:

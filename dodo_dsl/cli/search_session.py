@@ -27,6 +27,7 @@ from dodo_dsl.search.drives import DriveHost, DriveLimits, Drives, KeptBackends,
 from dodo_dsl.search.store import Drive, Store
 from dodo_dsl.search.study import Study
 from dodo_dsl.spec.load import Settings
+from dodo_dsl.spec.model import LOCKSTEP
 from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.terminal import printable, unescaped
 
@@ -45,9 +46,7 @@ class SearchSession:
     def selected(self, words: Sequence[str]) -> compiler.Checked:
         """The tests that the words mean."""
         options = self.options
-        return selection.select(
-            words, (), options.application, Settings("lockstep", options.isolation, keeps_virtual=True)
-        )
+        return selection.select(words, (), options.application, Settings(LOCKSTEP, options.isolation))
 
     def compiled(self, checked: compiler.Checked) -> compiler.Compilation:
         """The tests at their nominal values, with their problems shown; raises UsageError if some are errors."""

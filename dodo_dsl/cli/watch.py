@@ -27,6 +27,7 @@ from dodo_dsl.report.results import GivenReport
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.work_folder import WorkFolder, work_folder
 from dodo_dsl.spec.deployment import Deployment, find_deployment, load_deployment
+from dodo_dsl.spec.model import LOCKSTEP
 from dodo_dsl.terminal import printable
 
 MOST_FILES = 20_000
@@ -82,8 +83,7 @@ def main(options: argparse.Namespace, stdout: TextIO) -> int:
     for name in ("compiled", "keep"):
         if getattr(options, name):
             raise UsageError(f"--watch and --{name} do not go together")
-    options.keeps_virtual = options.clock is None
-    options.clock = options.clock or "lockstep"
+    options.clock = options.clock or LOCKSTEP
     with work_folder() as folder:
         watch = Watch(options, folder, stdout)
         try:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
-from dodo_dsl.plan.added_services import CLOCK, RUNNER_VARIABLE
+from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, CLOCK, RUNNER_VARIABLE
 from dodo_dsl.plan.model import LAYERS, READY_S, Application, Flag, Plan, PlannedService
 from dodo_dsl.plan.test_files import SHARED
 
@@ -40,6 +40,7 @@ _NOTES = {
     "DODO_WORLD": "The services that get what the application must not hear.",
     "DODO_TOLD": "What the application gets of that, as it declares in x-dodo.",
     "DODO_TRUTH": "What only evaluators get.",
+    ANSWERS_VARIABLE: "Where it is not empty, programs keep the machine's time, and the test waits for their answers.",
     RUNNER_VARIABLE: "dodo run sets it, and begins the test. When it is empty, the test begins by itself.",
 }
 """What a reader of a compose file would ask about a variable."""
@@ -108,7 +109,7 @@ def containers(plan: Plan, layer: str, defaults: Defaults = NO_DEFAULTS) -> Laye
             tuple(_word(flag) for flag in _written(plan, service, defaults)),
             _volumes(plan, service),
             math.ceil(_TRIES_A_SECOND * (READY_S + service.setup_s)),
-            _environment(service),
+            _environment(plan, service),
             service.devices,
             ("dialout",) if service.port else ("video",) if service.devices else (),
         )
@@ -169,10 +170,11 @@ def _word(flag: Flag) -> str:
     return f"--{flag.name}={folder}{flag.value}".replace("$", "$$")
 
 
-def _environment(service: PlannedService) -> tuple[Variable, ...]:
+def _environment(plan: Plan, service: PlannedService) -> tuple[Variable, ...]:
     own = {"DODO_SERVICE": service.name}
     if service.name == CLOCK:
         own[RUNNER_VARIABLE] = f"${{{RUNNER_VARIABLE}:-}}"
+        own[ANSWERS_VARIABLE] = "1" if plan.isolation == "host" else f"${{{ANSWERS_VARIABLE}:-}}"
     return tuple(Variable(*each) for each in own.items())
 
 

@@ -19,7 +19,6 @@ from dodo_dsl.plan.added_services import RECORDER, TIME, TIME_MOUNT, agent_flags
 from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.plan.plan_json import json_text, to_json
 from dodo_dsl.source import resolve
-from dodo_dsl.spec.model import VIRTUAL
 from dodo_dsl.template_cache import compiled_templates
 
 _SERVICE_DEPTH = 2
@@ -162,7 +161,7 @@ def _render(template: str, **values: object) -> str:
 
 def _sandbox_command(plan: Plan) -> tuple[str, ...]:
     """It sleeps, or gives the application the test's time."""
-    if plan.clock != VIRTUAL:
+    if plan.lockstep is None:
         return ("sleep", "infinity")
     return (f"{TIME_MOUNT}/{TIME}", *agent_flags(len(plan.application.services), plan.seed))
 
@@ -188,7 +187,7 @@ def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:
                 own_network=own_network,
                 sandbox=own_network and layer == LAYERS[0],
                 sandbox_command=_sandbox_command(plan),
-                time=TIME_MOUNT if plan.clock == VIRTUAL else "",
+                time=TIME_MOUNT if plan.lockstep else "",
                 copies=plan.application.copies if layer == LAYERS[0] else {},
                 files_service=FILES,
                 copy_command=copy_command(plan.application),

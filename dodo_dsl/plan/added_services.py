@@ -10,16 +10,16 @@ from dataclasses import replace
 
 from dodo_dsl.application.model import Declared
 from dodo_dsl.check.resolve import ResolvedTest
-from dodo_dsl.check.wiring import ANYTHING, Wiring, all_inputs, answers, cameras_of, other_inputs, rates, step_hz
+from dodo_dsl.check.wiring import ANYTHING, Wiring, answers, cameras_of, other_inputs, rates, step_hz
 from dodo_dsl.plan.model import Flag, Lockstep, PlannedService
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
-from dodo_dsl.spec.model import NEVER, ON_FAILURE, VIRTUAL, Spec
+from dodo_dsl.spec.model import NEVER, ON_FAILURE, Spec
 
 CLOCK = "dodo-clock"
 CLOCK_MANIFEST = "clock"
 TIME = "dodo-time"
-"""What gives the application the test's time, where the clock is virtual; its folder has that name, too."""
+"""What gives the application the test's time in lockstep; its folder has that name, too."""
 RUNNER_VARIABLE = "DODO_RUNNER"
 """Empty in the clock's container if no runner announces the start of the test, as with ``docker compose up``."""
 
@@ -38,13 +38,13 @@ def lockstep(
 
 
 TIME_FOLDER = "time-folder"
-"""The clock's flag where the application's own time is the test's; on the host its value is another."""
+"""The clock's flag for where library and agent meet; on the host its value is another."""
+ANSWERS_VARIABLE = "DODO_ANSWERS"
+"""Says to the clock that the application keeps the machine's time, so that it is awaited by its answers."""
 OWN_TIME = f"/dev/shm/{TIME}"
 """Where library and agent meet in a test's own memory."""
 TIME_MOUNT = "/opt/dodo/time"
 """Where containers have the library and the agent."""
-SPARE_S = 10
-"""Seconds of its own time that the application has before the test begins."""
 _EPOCH_S, _SECOND = 1_700_000_000, 1_000_000_000
 _POOLS = ("OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Threads of the application run one at a time, so that pools of them only cost time."""
@@ -52,9 +52,8 @@ _POOLS = ("OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 def agent_flags(services: int, seed: int, folder: str = OWN_TIME) -> tuple[str, ...]:
     """The flags of what gives an application of so many ``services`` the test's time."""
-    begin = _EPOCH_S * _SECOND
-    start = begin - SPARE_S * _SECOND
-    return (f"--folder={folder}", f"--services={services}", f"--start={start}", f"--begin={begin}", f"--seed={seed}")
+    start = _EPOCH_S * _SECOND
+    return (f"--folder={folder}", f"--services={services}", f"--start={start}", f"--begin={start}", f"--seed={seed}")
 
 
 def time_variables(
@@ -76,26 +75,22 @@ def clock(
     cameras = cameras_of(wiring)
     sense.sort(key=lambda name: name in cameras)
     values = {
-        "freq": f"{step_hz(wiring, rates(test.services), spec.clock):.12g}",
+        "freq": f"{step_hz(wiring, rates(test.services)):.12g}",
         "advance": ",".join(_ordered(layers["action"], wiring)),
         "sense": ",".join(sense),
         "judge": ",".join(u.name for u in spec.uses if u.layer == "evaluation"),
         "watch": ",".join(watch),
-        **_expected(spec, wiring, application),
+        "answers": ",".join(answers(wiring)),
+        "hears": ",".join(other_inputs(wiring)),
+        "done": wiring.done,
+        TIME_FOLDER: OWN_TIME,
+        "application": ",".join(application),
         "timeout": f"{spec.timeout_s or 0.0:g}",
         "max-response": "" if spec.max_response_s is None else f"{spec.max_response_s:g}",
         "cid": str(cid),
     }
     flags = tuple(Flag(name, value) for name, value in values.items() if value)
     return PlannedService("environment", CLOCK, manifest.name, image, manifest.process, flags)
-
-
-def _expected(spec: Spec, wiring: Wiring, application: Sequence[str]) -> dict[str, str]:
-    """What the clock is to expect of the application: answers to frames, or messages whenever it sends them."""
-    if spec.clock == VIRTUAL:
-        own = {TIME_FOLDER: OWN_TIME, "application": ",".join(application)}
-        return {"hears": ",".join(all_inputs(wiring)), **own}
-    return {"answers": ",".join(answers(wiring)), "hears": ",".join(other_inputs(wiring)), "done": wiring.done}
 
 
 def _ordered(names: Sequence[str], wiring: Wiring) -> list[str]:

@@ -26,7 +26,7 @@ from dodo_dsl.spec.arguments import Argument, ResolvedService, default_value
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
-from dodo_dsl.spec.model import LAYERS, VIRTUAL
+from dodo_dsl.spec.model import LAYERS
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
@@ -185,7 +185,7 @@ class _Builder:
             privileged_allowed=rig is not None and rig.privileged,
             limits=self.shared.limits,
             given=tuple(self.test.variables.items()),
-            time_seed=spec.seed if spec.clock == VIRTUAL else None,
+            time_seed=spec.seed if spec.is_stepped and isolated == "network" else None,
         )
         messages = self._messages()
         return Plan(
@@ -221,7 +221,6 @@ class _Builder:
             goals=resolved_goals(self.test)[0],
             import_paths=self.shared.imports,
             source_map=self.places,
-            timed=tuple(name for name, _ in self.application.timed),
         )
 
     def _pooled(self) -> Pooled:

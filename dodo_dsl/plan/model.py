@@ -150,7 +150,6 @@ class Plan:
     ``truth`` are messages by which evaluators judge, which the application never gets.
     ``world`` are the services that get what the application must not hear, and those of the deployment with what they
     consume of it, as ``judge?=opendlv.sim.Frame/0``; ``told`` is what the application declares to take of it, and gets.
-    ``timed`` are services of the application that act by their own timers.
     ``import_paths`` are folders that hold Python packages of the deployment's own services, relative to the compiled
     test's. ``shared`` are files below ``files/`` that are links, each with the name of its file in the folder of files
     that tests share.
@@ -186,7 +185,6 @@ class Plan:
     import_paths: tuple[str, ...] = ()
     shared: dict[str, str] = field(default_factory=dict)
     source_map: dict[str, Place] = field(default_factory=dict)
-    timed: tuple[str, ...] = ()
     emulated: bool = False
 
     @property

@@ -19,13 +19,13 @@ ALIVE_S = 1.0
 TEST_BEGIN = "dodo.TestBegin"
 
 
-def begin_frame(seed: int, application: Iterable[int] = ()) -> bytes:
+def begin_frame(seed: int, deaf: Iterable[str] = ()) -> bytes:
     """``dodo.TestBegin`` as a datagram, with the current time as its sample time.
 
-    ``application`` are the process ids of the application's services, where the test's services see them.
+    With ``deaf`` services, which do not listen to the bus yet, the test does not begin yet.
     """
     begin = MessageSet.standard().type(TEST_BEGIN)
-    return frame_of(begin(seed=seed, application=",".join(map(str, application))))
+    return frame_of(begin(seed=seed, deaf=",".join(deaf)))
 
 
 def frame_of(

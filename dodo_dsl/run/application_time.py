@@ -1,4 +1,4 @@
-"""What gives an application the test's time (``clock: virtual``): built where it is not yet, and who cannot have it.
+"""What gives an application the test's time in lockstep: built where it is not yet, and who cannot have it.
 
 It is a library that is preloaded into the application's processes, and an agent that lets their time go on; their C
 sources are in ``services/clock/native``.
@@ -29,7 +29,6 @@ PAGE_DESTROYED = 3
 _BUILD_S = 120.0
 _OF_MAKE = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
 """Variables by which a make that has started DoDo would speak to this one."""
-_WAY_OUT = "run it with --clock lockstep or --clock realtime"
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def built() -> ApplicationTime:
     try:
         folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}")
     except (OSError, KeyError) as error:
-        raise BackendError(f"clock: virtual needs a cache folder of this user: {error}") from None
+        raise BackendError(f"DoDo's library needs a cache folder of this user: {error}") from None
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not _is_ready(folder):
@@ -90,18 +89,18 @@ def _is_ready(folder: Path) -> bool:
 
 def _build(sources: Path, folder: Path) -> None:
     if not shutil.which("make") or not shutil.which(os.environ.get("CC", "cc")):
-        raise BackendError("clock: virtual needs a C compiler and make: apt-get install gcc make, or run scripts/setup")
+        raise BackendError("DoDo's library needs a C compiler and make: apt-get install gcc make, or run scripts/setup")
     words = ["make", "--silent", "-C", str(sources), f"BUILD={folder}"]
     environment = {name: value for name, value in os.environ.items() if name not in _OF_MAKE}
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=_BUILD_S, env=environment)
         said = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise BackendError(f"clock: virtual cannot be built: {error}") from None
+        raise BackendError(f"DoDo's library cannot be built: {error}") from None
     if done.returncode:
         for name in (LIBRARY, AGENT):
             (folder / name).unlink(missing_ok=True)
-        raise BackendError(f"clock: virtual cannot be built: {said[0]}")
+        raise BackendError(f"DoDo's library cannot be built: {said[0]}")
 
 
 _INTERPRETER = 3
@@ -131,7 +130,7 @@ def refusal(service: str, name: str, environment: Mapping[str, str], folder: Pat
         if program is None:
             return ""
         if why := _unreachable(program):
-            return f"service '{service}' starts '{program}', {why}: it would keep the machine's time; {_WAY_OUT}"
+            return f"service '{service}' starts '{program}', {why}"
         head = _head(program, 256)
         if head[:2] != b"#!":
             return ""

@@ -1,6 +1,6 @@
 """What a backend is, and the events that it reports to the engine while a test runs."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, Protocol
 
@@ -88,6 +88,12 @@ class Time(Struct, tag_field="dodo", tag="time", frozen=True):
     last: bool = False
 
 
+class Started(Struct, tag_field="dodo", tag="started", frozen=True):
+    """The application rests in lockstep, ``seconds`` after its start, and waits for pictures where there are any."""
+
+    seconds: float
+
+
 class Responded(Struct, tag_field="dodo", tag="response", frozen=True):
     """How long the application took for its answers in lockstep."""
 
@@ -131,7 +137,8 @@ class GivenVerdict(Said, tag="verdict", frozen=True):
 
 
 Message = (
-    Ready | InputEnded | Overrun | Late | Paused | Flooded | MemoryTaken | Noted | Foreign | Time | Responded | Stopped
+    Ready | InputEnded | Overrun | Late | Paused | Flooded | MemoryTaken | Noted | Foreign | Time | Started | Responded
+    | Stopped
     | GivenVerdict
 )  # fmt: skip
 """What services say to the runner; besides ``judged``, which is for the report to read."""
@@ -236,8 +243,13 @@ class Backend(Running, Protocol):
 
     async def next_event(self) -> Event: ...
 
-    async def begin(self) -> None:
-        """Announces on the test's bus that everything is ready; may be repeated. Raises BackendError."""
+    @property
+    def by_answers(self) -> bool:
+        """Whether the application keeps the machine's time in lockstep."""
+        ...
+
+    async def begin(self, deaf: Iterable[str] = ()) -> None:
+        """Announces that everything is ready, or which services are ``deaf`` yet; may be repeated."""
         ...
 
     def tail(self, service: str) -> list[str]:

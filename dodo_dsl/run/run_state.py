@@ -42,13 +42,13 @@ from dodo_dsl.run.protocol import (
     Paused,
     Ready,
     Responded,
+    Started,
     Stopped,
     Time,
     Unmatched,
     Unstartable,
     VerdictEvent,
 )
-from dodo_dsl.spec.model import VIRTUAL
 
 MOST_NOTES = 100
 MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
@@ -78,6 +78,8 @@ class RunState:
     late: dict[str, Late] = field(default_factory=dict)
     paused: dict[str, float] = field(default_factory=dict)
     load: MachineLoad | None = None
+    started_s: float | None = None
+    """For how long the application has run when it waited at last, in lockstep; None when that is dealt with."""
     response: Response | None = None
     notes: list[str] = field(default_factory=list)
     began: float | None = None
@@ -175,6 +177,8 @@ class RunState:
                 self.input_ended = True
             case Time():
                 self.time = event
+            case Started(seconds):
+                self.started_s = seconds
             case Responded(answers):
                 self.response = answers
 
@@ -291,10 +295,8 @@ class RunState:
     def outcome(self, backend: Backend) -> Outcome:
         """The test's outcome; the last lines are those of the service that decided it."""
         plan = self.plan
-        timed = () if plan.clock == VIRTUAL else plan.timed
-        answers = judgement.judged_response(
-            self.response, plan.lockstep, [s.name for s in plan.application.services], timed
-        )
+        services = [service.name for service in plan.application.services]
+        answers = judgement.judged_response(self.response, plan.lockstep, services)
         use = judgement.judged_use(self.resources, plan.resources)
         verdicts = [v for name in self.facts.evaluators for v in self.facts.verdicts.get(name, [])]
         judged = [check for verdict in verdicts for check in verdict.checks]
@@ -322,7 +324,7 @@ class RunState:
                 *use.notes,
             ),
             machine=load,
-            response=None if plan.clock == VIRTUAL else self.response,
+            response=self.response,
             resources=self.resources,
         )
 

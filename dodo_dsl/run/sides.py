@@ -39,6 +39,8 @@ class WatchedServices:
         self.may_be_ill = one_off(plan.application.services) | optional(plan.application.services)
         self.turns: set[asyncio.Task[None]] = set()
         """The services of the application that wait for others."""
+        self.by_answers = False
+        """Whether the application keeps the machine's time in lockstep, so that it is awaited by its answers."""
 
     def of(self, layer: str) -> tuple[PlannedService | ApplicationService, ...]:
         """The services of a layer."""
@@ -49,6 +51,11 @@ class WatchedServices:
 
     def note(self, text: str) -> None:
         self.tell(Noted(text))
+
+    def await_answers(self, why: str) -> None:
+        """In lockstep the application cannot have the test's time."""
+        self.by_answers = True
+        self.note(f"lockstep by answers: {why}; timers and threads of the application may make its results differ")
 
     def not_started(self, name: str, why: str) -> None:
         self.tell(Unstartable(name, why))
@@ -140,10 +147,6 @@ class Side(Running, Protocol):
         """What sends to DoDo's services, which this side has, and on the bus; raises BackendError."""
         ...
 
-    async def beginning(self) -> Collection[int]:
-        """The application's processes as DoDo's services see them; raises BackendError where the test cannot begin."""
-        ...
-
 
 class Sides:
     """The backend of one test; ``own`` is DoDo's side, which may be the ``application``'s, too."""
@@ -174,10 +177,13 @@ class Sides:
         self._watched.lines.connect(self._send)
         return await self._application.start(layer)
 
-    async def begin(self) -> None:
-        processes = await self._application.beginning()
+    @property
+    def by_answers(self) -> bool:
+        return self._watched.by_answers
+
+    async def begin(self, deaf: Iterable[str] = ()) -> None:
         assert self._send is not None, "the application was started"
-        self._send(begin_frame(self._watched.plan.seed, processes), hearers(self._watched.plan))
+        self._send(begin_frame(self._watched.plan.seed, deaf), hearers(self._watched.plan))
 
     async def use(self) -> Snapshot | None:
         """What all have used; the load of the machine is measured if both sides know it."""

@@ -13,7 +13,7 @@ from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, sho
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, path_of, read
 from dodo_dsl.spec import matrix, slips, vary
 from dodo_dsl.spec.matrix import MATRIX, Choice, Placeholders, without
-from dodo_dsl.spec.model import LAYERS, VIRTUAL, Spec, spec_of
+from dodo_dsl.spec.model import LAYERS, Spec, spec_of
 from dodo_dsl.spec.registry import Location, near_path
 from dodo_dsl.spec.rig import KIND_TAGS, Rig
 from dodo_dsl.spec.validation import Path as ValuePath
@@ -255,7 +255,7 @@ class Settings:
     """Inputs of a compilation; None keeps the value of the specs.
 
     ``wall_timeout_s`` limits the wall time of a test in lockstep, in seconds. ``repeat`` is how often each test runs.
-    ``keeps_virtual`` leaves those in lockstep that have the clock virtual. ``emulate`` takes emulated rigs for all.
+    ``emulate`` takes emulated rigs for all.
     """
 
     clock: str | None = None
@@ -263,17 +263,13 @@ class Settings:
     seed: int | None = None
     wall_timeout_s: float | None = None
     repeat: int = 1
-    keeps_virtual: bool = False
     emulate: bool = False
 
 
 def applied(spec: Spec, settings: Settings) -> Spec:
     """The spec with the settings; a test on hardware keeps its clock."""
-    is_kept = settings.keeps_virtual and spec.clock == VIRTUAL
-    if settings.clock and spec.level != "hil" and not is_kept:
-        left_out = {"clock"} if settings.clock == VIRTUAL else set()
-        spans = {key: span for key, span in spec.spans.items() if key not in left_out}
-        spec = replace(spec, clock=settings.clock, spans=spans)
+    if settings.clock and spec.level != "hil":
+        spec = replace(spec, clock=settings.clock)
     if settings.isolation:
         spans = {key: span for key, span in spec.spans.items() if key != "isolation"}
         spec = replace(spec, isolation=settings.isolation, spans=spans)

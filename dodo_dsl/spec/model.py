@@ -59,8 +59,9 @@ class Use:
     parameters: dict[str, Entry] = field(default_factory=dict)
 
 
-VIRTUAL = "virtual"
-STEPPED_CLOCKS = ("lockstep", VIRTUAL)
+REALTIME, LOCKSTEP = "realtime", "lockstep"
+CLOCKS = {REALTIME: REALTIME, LOCKSTEP: LOCKSTEP, "virtual": LOCKSTEP}
+"""What may be written, and what it means; ``virtual`` is another word until 1.0."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class Spec:
     level: str | None = None
     kind: str | None = None
     timeout_s: float | None = None
-    clock: str = "realtime"
+    clock: str = REALTIME
     rig: str | None = None
     pool: str = ""
     isolation: str | None = None
@@ -124,8 +125,8 @@ class Spec:
 
     @property
     def is_stepped(self) -> bool:
-        """Whether the world waits for the application: in lockstep, with its own time or the test's."""
-        return self.clock in STEPPED_CLOCKS
+        """Whether the world waits for the application."""
+        return self.clock == LOCKSTEP
 
     def span(self, key: str) -> Span:
         return self.spans.get(key, Span(str(self.path)))
@@ -140,7 +141,8 @@ def spec_of(location: Location, node: Mapping, choice: Choice, spans: dict[str, 
     is_rate = frames not in FRAMES
     return Spec(
         location,
-        **{key: raw[key] for key in _PLAIN if key in raw},
+        **{key: raw[key] for key in _PLAIN if key in raw and key != "clock"},
+        clock=CLOCKS[raw.get("clock", REALTIME)],
         description=" ".join(raw.get("description", "").split()) or None,
         timeout_s=raw.get("timeout"),
         frames=ALWAYS if is_rate else frames,

@@ -44,13 +44,12 @@ class Inbox(Protocol):
 
 
 class Clock(Protocol):
-    """Test time, in microseconds since the epoch. ``relays``: messages come from the clock, not from the bus.
+    """Test time, in microseconds since the epoch.
 
-    ``is_virtual``: the application's own time is the test's, so that messages are sent at the test's time, too.
+    ``relays``: messages come from the clock, not from the bus, and are sent at the test's time.
     """
 
     relays: bool
-    is_virtual: bool
 
     @property
     def has_new_picture(self) -> bool:
@@ -93,7 +92,6 @@ class RealTimeClock:
     """
 
     relays = False
-    is_virtual = False
     has_new_picture = False
     _has_memory = False
 

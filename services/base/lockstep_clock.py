@@ -104,7 +104,7 @@ class Announcer:
 
 
 EPOCH = 1_700_000_000_000_000
-"""The time at which every test in lockstep begins, in microseconds since the epoch."""
+"""The time at which applications start in lockstep, and tests begin by default, in microseconds since the epoch."""
 
 LONGEST = 2 * 86_400_000_000
 """Longest test, in microseconds."""
@@ -124,7 +124,6 @@ class Observer:
     def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:
         self._marked = marked
         self._collected: list[Envelope] = []
-        self._first: set[_Key] = set()
         self._relayed: deque[set[_Key]] = deque()
         self._counts: Counter[_Key] = Counter()
         """In how many of the sets each key is."""
@@ -140,8 +139,6 @@ class Observer:
         """
         own = [envelope for envelope in relayed if not envelope.received]
         keys = {_key(envelope) for envelope in own}
-        if len(self._first) < len(keys) and until <= EPOCH:
-            self._first = keys  # the clock repeats these for applications that start late
         self._remember(keys)
         collected, self._collected = self._collected, []
         for envelope in collected:
@@ -169,7 +166,7 @@ class Observer:
                     del self._counts[key]
 
     def _is_known(self, key: _Key) -> bool:
-        return key in self._first or key in self._counts
+        return key in self._counts
 
 
 def _key(envelope: Envelope) -> _Key:
@@ -230,9 +227,7 @@ class LockstepClock:
         name: str,
         readers: int,
         source: StepSource | None = None,
-        is_virtual: bool = False,
     ) -> None:
-        """With ``is_virtual`` the application's own time is the test's."""
         self._name = name
         self._source: StepSource = source or ClockClient(session, name)
         self._now = EPOCH - 1
@@ -243,7 +238,6 @@ class LockstepClock:
         self._next = 0
         self._address = session.address
         self._about: About | None = None
-        self.is_virtual = is_virtual
 
     def now(self) -> int:
         return self._now
@@ -261,7 +255,7 @@ class LockstepClock:
             self._observer.flush(inbox)
 
     def _steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
-        number, due = 0, EPOCH
+        number, begin = 0, 0
         while (command := self._command(inbox, stopped)) is not None:
             if isinstance(command, Show):
                 if not self._show(command, stopped):
@@ -270,7 +264,9 @@ class LockstepClock:
             if inbox.observes:
                 self._observer.deliver(inbox, command.time, command.messages)
             messages = in_order(command.messages)
-            while due <= command.time:
+            if not begin and command.time >= EPOCH:  # the step before only asks what the service consumes
+                begin = due = command.time
+            while begin and due <= command.time:
                 while messages and messages[0][0] <= due:
                     self._hand(messages.popleft()[1], inbox)
                 if stopped():
@@ -278,7 +274,7 @@ class LockstepClock:
                 self._now = due
                 yield due
                 number += 1
-                due = EPOCH + round(number * period)
+                due = begin + round(number * period)
             self._now = command.time
             for _, envelope in messages:
                 self._hand(envelope, inbox)
@@ -339,7 +335,7 @@ class LockstepClock:
         sent, about, announcer = self._sent, self._about, self._announcer
         self._sent, self._about, self._open = [], None, False
         pictures = len(announcer.new)
-        awaited = pictures > 0 and announcer.is_awaited
+        awaited = bool(announcer.memories) and announcer.is_awaited
         self._source.answer(Done(self._name, sent, pictures, announcer.sampled, self._next, ended, about, awaited))
 
 

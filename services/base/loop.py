@@ -287,7 +287,7 @@ class Loop:
 
     def _envelope(self, output: Message | Output, now: int) -> Envelope:
         message, stamp, sampled = output if isinstance(output, Output) else Output(output, self.sender_stamp)
-        messages, sent = self.session.messages, now if self.clock.is_virtual else time.time_ns() // 1000
+        messages, sent = self.session.messages, now if self.clock.relays else time.time_ns() // 1000
         sample_time = now if sampled is None else sampled
         numbers = operator.index(sample_time), operator.index(stamp)  # a service may have them of numpy
         return Envelope(messages.id(message), messages.encode(message), sent, 0, *numbers)

@@ -254,12 +254,11 @@ def _clock(session: Session, role: str) -> Clock:
         from services.base.recorded_clock import clock_of
 
         return clock_of(recording, session, role)
-    if os.environ.get("DODO_CLOCK") not in ("lockstep", "virtual"):
+    if os.environ.get("DODO_CLOCK") != "lockstep":
         return RealTimeClock()
     from services.base.lockstep_clock import LockstepClock
 
-    is_virtual = os.environ["DODO_CLOCK"] == "virtual"
-    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1), is_virtual=is_virtual)
+    return LockstepClock(session, role, int(os.environ.get("DODO_READERS") or 1))
 
 
 def _membership(session: Session, role: str, world: World) -> Members | None:

@@ -107,7 +107,6 @@ class RecordingClock:
     """
 
     relays = False
-    is_virtual = False
     has_new_picture = False
 
     def __init__(self, path: Path, messages: MessageSet) -> None:

@@ -1,14 +1,23 @@
-"""Which of the application's messages answer a frame."""
+"""The application that keeps the machine's time, as programs do that cannot load DoDo's library: it answers each frame.
 
+A frame, or where there is none a step, is answered when all messages came that it is to answer with.
+"""
+
+import time
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
+from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.numbers import is_whole, whole
+from services.clock.exchange import SLICE_S, ApplicationFloods, ApplicationSilent, IsStopped, Patience, ServiceLink
 
 MOST_SURPLUS = 100
 """Surplus messages of one kind to a frame; more of them are a flood that would keep others from the bus."""
+WALL_FACTOR = 10.0
+"""How many times its patience an answer may take of wall time: others may have the processor."""
 
 
 @dataclass(frozen=True)
@@ -29,29 +38,20 @@ class Answers:
     """Collects the application's messages that answer a frame.
 
     ``required`` have to come once each, unless ``done`` comes; ``relayed`` are others that services of the test
-    consume, all of which are passed on; so are those under other sender stamps, which services only count. ``surplus``
-    counts answers beyond the one that counts, ``surplus_frames`` the frames with any, ``differing`` those that say
-    something else than the one that counts for the same frame, and ``heard`` all messages that matter.
+    consume, all of which are passed on; so are those under other sender stamps, which services only count. Further
+    answers to a frame are dropped.
     """
 
     required: tuple[MessageFilter, ...]
     relayed: tuple[MessageFilter, ...] = ()
     done: MessageFilter | None = None
-    surplus: int = 0
-    surplus_frames: int = 0
-    differing: int = 0
-    heard: int = 0
-    _strangers: Counter[tuple[int, int]] = field(default_factory=Counter)
+    is_silent: bool = True
+    """Whether nothing that matters has come yet."""
     _times: set[int] = field(default_factory=set)
     _all_times: set[int] = field(default_factory=set)
     _chosen: dict[MessageFilter, Envelope] = field(default_factory=dict)
-    _chosen_before: dict[MessageFilter, Envelope] = field(default_factory=dict)
     _others: list[Envelope] = field(default_factory=list)
-    _surplus_now: Counter[str] = field(default_factory=Counter)
-    is_silent: bool = True
-    """Whether nothing that matters has come yet."""
-    is_copied: bool = True
-    """Whether all that matters and came since the frame was expected carries the sample time of a frame."""
+    _surplus: Counter[str] = field(default_factory=Counter)
     _is_seen: bool = False
     _is_done: bool = False
     _is_collected: bool = False
@@ -60,10 +60,8 @@ class Answers:
         """A frame will be shown, with these sample times (us): answers that copy one of them count at once."""
         self._times = set(times)
         self._all_times |= self._times
-        self._chosen_before = self._chosen
         self._chosen, self._is_seen, self._is_done, self._is_collected = {}, False, False, False
-        self._surplus_now.clear()
-        self.is_copied = True
+        self._surplus.clear()
 
     def seen(self) -> None:
         """The frame was seen: all that is taken from now on came after it."""
@@ -73,7 +71,7 @@ class Answers:
         """Take a message from the bus.
 
         An answer counts by the frame's sample time. Where the application does not copy sample times, the first message
-        after the frame counts, and gets the frame's sample time.
+        after the frame counts, and gets the frame's sample time. Raises ApplicationFloods.
         """
         if not self._times:
             return
@@ -82,29 +80,25 @@ class Answers:
         known = envelope if copies else envelope._replace(sample_time=max(self._times))
         if self.done is not None and self.done.matches(envelope) and not stale:
             self._is_done = True
-        if any(each.matches(envelope) for each in self.filters):
-            self.is_silent = False
-            self.heard += 1
-            self.is_copied &= copies
+        is_own = any(each.matches(envelope) for each in self.filters)
+        self.is_silent &= not is_own
         for each in self.required:
             if each.matches(envelope):
                 if stale or each in self._chosen or self._is_collected:
-                    self._add_surplus(each, envelope, (self._chosen_before if stale else self._chosen).get(each))
+                    self._refuse_flood(each)
                 else:
                     self._chosen[each] = known
                 return
-        is_stranger = not any(each.matches(envelope) for each in self.filters)
-        if is_stranger and any(each.data_type == envelope.data_type for each in self.filters):
-            self._strangers[envelope.data_type, envelope.sender_stamp] += 1
         consumed = (*self.required, *self.relayed)
-        if any(each.data_type == envelope.data_type if is_stranger else each.matches(envelope) for each in consumed):
+        if any(each.matches(envelope) if is_own else each.data_type == envelope.data_type for each in consumed):
             self._others.append(known)
 
-    def _add_surplus(self, each: MessageFilter, envelope: Envelope, chosen: Envelope | None) -> None:
-        self.surplus += 1
-        self.surplus_frames += not self._surplus_now
-        self.differing += chosen is not None and chosen.payload != envelope.payload
-        self._surplus_now[each.name] += 1
+    def _refuse_flood(self, each: MessageFilter) -> None:
+        self._surplus[each.name] += 1
+        if self._surplus[each.name] > MOST_SURPLUS:
+            message = each.name.rpartition(".")[2]
+            sent = f"sent more than {MOST_SURPLUS} {message}s that nobody asked for"
+            raise ApplicationFloods(f"the application {sent} within a frame: it floods the bus")
 
     @property
     def filters(self) -> tuple[MessageFilter, ...]:
@@ -117,34 +111,11 @@ class Answers:
         return bool(self.required) or self.done is not None
 
     @property
-    def is_complete(self) -> bool:
-        """Whether the frame is answered."""
-        if self.done is not None:
-            return self._is_done
-        return len(self._chosen) == len(self.required)
-
-    @property
-    def flood(self) -> str:
-        """The message of which more than MOST_SURPLUS came since the frame was expected; empty if none."""
-        ((name, count),) = self._surplus_now.most_common(1) or [("", 0)]
-        return name if count > MOST_SURPLUS else ""
-
-    @property
     def missing(self) -> list[str]:
         """Names of the messages that the answer lacks."""
         if self.done is not None:
             return [] if self._is_done else [self.done.name]
         return [each.name for each in self.required if each not in self._chosen]
-
-    @property
-    def strangers(self) -> dict[int, int]:
-        """How often messages came that the answer lacks, but under another sender stamp, by stamp."""
-        names = self.missing
-        lacking = {each.data_type for each in self.filters if each.name in names}
-        counts: Counter[int] = Counter()
-        for (id_, stamp), count in self._strangers.items():
-            counts[stamp] += count if id_ in lacking else 0
-        return dict(+counts)
 
     def collect(self) -> list[Envelope]:
         """The answer, in an order that does not depend on which sender was faster."""
@@ -166,3 +137,103 @@ def filters(names: Iterable[str], ids: Mapping[str, int]) -> tuple[MessageFilter
             )
         found.append(MessageFilter(text, ids[name], whole(stamp) if stamp else None))
     return tuple(found)
+
+
+class AnsweringApplication:
+    """Shows pictures to the application and waits for its answers; ``frames`` counts what was shown."""
+
+    def __init__(self, answers: Answers, patience: Patience, link: ServiceLink, stopped: IsStopped) -> None:
+        self.answers = answers
+        self.frames = 0
+        self.waited_first, self.waited = 0.0, 0.0
+        """Wall time in s for the first answer, and for all others."""
+        self._patience, self._link, self._stopped = patience, link, stopped
+        self._began = 0.0
+        self._has_cameras = self._is_shown = False
+        self._reading: set[str] = set()
+        """Cameras whose readers do not wait for the next picture yet, where no message completes a frame."""
+
+    def facts(self) -> dict[str, Any]:
+        """Nothing is measured: what it waits for a processor is not known."""
+        return {}
+
+    def start(self, now: int, cameras: Collection[str]) -> int:
+        """It may still be starting: the first picture waits for it."""
+        self._has_cameras = bool(cameras)
+        return now
+
+    def expect(self, now: int) -> None:
+        """Without cameras, it answers what services are about to send in the step of this time (us)."""
+        if not self._has_cameras:
+            self._link.drain()
+            self.answers.expect([now])
+            self.answers.seen()
+
+    def show(self, shown: Sequence[Done], now: int) -> None:
+        """Announce new pictures as soon as readers wait for them; raises ApplicationSilent and ApplicationFloods."""
+        self._is_shown = bool(shown) or not self._has_cameras
+        self.frames += self._is_shown
+        self._began = time.monotonic()
+        if shown:
+            self.answers.expect(camera.sampled for camera in shown)
+        for camera in shown:
+            if not camera.awaited:
+                self._link.send(camera.service, Show(awaits=True, announces=False))
+                self._await_reader(camera.service)
+            self._link.drain()  # what the application has sent before it can see the picture
+            self.answers.seen()
+            self._link.send(camera.service, Show(awaits=False, announces=True))
+            while len(shown) > 1 and self._link.result(camera.service) is None and not self._stopped():
+                self._link.pump(SLICE_S, [camera.service])  # pictures are shown in one order
+        if not self.answers.is_expected:
+            self._reading = {camera.service for camera in shown}
+            for camera in shown:
+                self._link.send(camera.service, Show(awaits=True, announces=False))
+
+    def _await_reader(self, camera: str) -> None:
+        while self._link.result(camera) is None and not self._stopped():
+            if self._left <= 0:
+                raise ApplicationSilent(self._sentence(f"no reader waited for a picture of '{camera}'"))
+            self._link.pump(SLICE_S, [camera])
+
+    def await_answer(self, until: int) -> None:
+        """Wait for the answer to what was shown, whenever (``until``) the next step is.
+
+        Raises ApplicationSilent and ApplicationFloods.
+        """
+        while not (self._stopped() or not self._is_shown or self._is_answered):
+            if self._left <= 0:
+                raise ApplicationSilent(self._sentence(self._missing), silent=self.answers.is_silent)
+            self._link.pump(self._left, self._reading)
+        spent = time.monotonic() - self._began
+        self.waited_first += spent if self.frames == 1 else 0.0
+        self.waited += spent if self.frames > 1 else 0.0
+
+    def collect(self) -> list[Envelope]:
+        """The application's messages since the last time, for the services."""
+        return self.answers.collect()
+
+    @property
+    def _limit(self) -> float:
+        return self._patience.first if self.frames == 1 else WALL_FACTOR * self._patience.others
+
+    @property
+    def _left(self) -> float:
+        return self._began + self._limit - time.monotonic()
+
+    @property
+    def _is_answered(self) -> bool:
+        """Whether all answers came; where none are declared, whether the readers wait for the next picture."""
+        if self.answers.is_expected:
+            return not self.answers.missing
+        self._reading = {name for name in self._reading if self._link.result(name) is None}
+        return not self._reading
+
+    @property
+    def _missing(self) -> str:
+        if self.answers.is_expected:
+            return " and ".join(name.rpartition(".")[2] for name in self.answers.missing) + " missing"
+        return f"no reader waited for the next picture of '{min(self._reading)}'"
+
+    def _sentence(self, what: str) -> str:
+        return f"the application did not answer frame {self.frames} within {self._limit:g} s ({what})"

@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.channel import Channel, Done, Show, Step
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.packets import Listener
 from dodo_dsl.opendlv.session import Session
-from services.base.members import SenderTable, World
+from services.base.members import SenderTable
 
 
 class Exchange:
@@ -37,7 +37,6 @@ class Exchange:
         """Raises OSError."""
         self._session, self._take_other = session, take
         self._senders = senders or SenderTable(session.messages)
-        self._world = World.load(session.messages)
         self._listener = Listener(path, services)
         self._channels: dict[str, Channel] = {}
         self._unsent: dict[str, Step | Show] = {}
@@ -85,12 +84,6 @@ class Exchange:
             channels = [self._channels[name].fileno() for name in services if name in self._channels]
             select.select([self._session.fileno(), *channels], [], [], max(0.0, min(timeout, SLICE_S)))
 
-    def repeat_on_bus(self, messages: Iterable[Envelope]) -> None:
-        """Send messages of services on the bus again, but for those that are not for the application."""
-        for envelope in messages:
-            if not self._world.holds(envelope):
-                self._session.send_envelope(envelope)
-
     def drain(self) -> None:
         """Take everything that is on the bus already."""
         while self._take_from_bus():
@@ -100,7 +93,8 @@ class Exchange:
         envelope = self._session.receive(0.0)
         if envelope is None:
             return False
-        self.hear(envelope, self._session.source)
+        if not self._session.was_direct:
+            self.hear(envelope, self._session.source)
         return True
 
     def hear(self, envelope: Envelope, source: Address) -> None:
@@ -174,7 +168,6 @@ class ServiceLink(Protocol):
     def send(self, service: str, command: Step | Show) -> None: ...
     def result(self, service: str, timeout: float = 0.0) -> Done | None: ...
     def pump(self, timeout: float, services: Collection[str] = ()) -> None: ...
-    def repeat_on_bus(self, messages: Iterable[Envelope]) -> None: ...
     def drain(self) -> None: ...
 
 
@@ -198,10 +191,7 @@ class Roles:
 
 @dataclass
 class Patience:
-    """Wall time in s that the application has for the first frame, and for each other one.
-
-    What it waited for a processor meanwhile does not count: others are to blame for that.
-    """
+    """Processor time in s that the application may compute without a wait, at its start and later."""
 
     first: float
     others: float
@@ -209,7 +199,7 @@ class Patience:
 
 @dataclass(frozen=True)
 class Timing:
-    """``period`` and ``timeout`` in us of test time; answers are counted that take longer than ``max_response`` s."""
+    """``period`` and ``timeout`` in us of test time; answers that take longer than ``max_response`` s count."""
 
     period: Fraction | int
     timeout: int

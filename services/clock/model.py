@@ -2,7 +2,7 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Protocol
@@ -23,27 +23,18 @@ from services.clock.exchange import (
 SERVICE_PATIENCE = 60.0
 """Wall time in s that a service of the test has for a step; none takes nearly as long."""
 FIRST_TIMES = 4
-"""How many times as long it has for its first one without a runner, as the clock begins while others still start.
-
-Compose then starts one layer after the other, of which each may take as long.
-"""
+"""How many times as long it has for its first one, as the clock begins while others still start: layer after layer."""
 
 
 class Application(Protocol):
-    """The application as SteppedApplication and VirtualApplication show it to a Stepper.
+    """The application as RestingApplication and AnsweringApplication show it to a Stepper."""
 
-    ``has_own_time`` is whether it goes on without pictures, too, as its time is the test's.
-    """
-
-    has_own_time: bool
     frames: int
     waited_first: float
     waited: float
 
-    def begin(self, now: int) -> None: ...
-    def pause(self) -> None: ...
-    def expect_at(self, now: int) -> None: ...
-    def remember(self, messages: Iterable[Envelope]) -> None: ...
+    def start(self, now: int, cameras: Collection[str]) -> int: ...
+    def expect(self, now: int) -> None: ...
     def show(self, shown: Sequence[Done], now: int) -> None: ...
     def await_answer(self, until: int) -> None: ...
     def collect(self) -> list[Envelope]: ...
@@ -51,10 +42,7 @@ class Application(Protocol):
 
 @dataclass
 class Stepper:
-    """Steps a test; ``period`` and ``timeout`` in us of test time.
-
-    ``waits_for_start`` is whether services may still have to start when it begins.
-    """
+    """Steps a test; ``period`` and ``timeout`` in us of test time."""
 
     roles: Roles
     period: Fraction | int
@@ -62,8 +50,9 @@ class Stepper:
     application: Application
     link: ServiceLink
     stopped: IsStopped
+    begin: int = EPOCH
+    """When the test begins (us)."""
     now: int = EPOCH
-    waits_for_start: bool = False
     reached: int = EPOCH
     """The last step that the evaluators have finished."""
     _judging: list[str] = field(default_factory=list)
@@ -74,7 +63,7 @@ class Stepper:
     _ended: set[str] = field(default_factory=set)
     _next: dict[str, int] = field(default_factory=dict)
     _exact: Fraction = Fraction(EPOCH)
-    _memories: int = 0
+    _cameras: list[str] = field(default_factory=list)
     _spent: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def __post_init__(self) -> None:
@@ -93,31 +82,33 @@ class Stepper:
     def connect(self) -> None:
         """Find all services and what they consume, before time begins; raises ServiceSilent."""
         results = self._go(self.roles.all, EPOCH - 1)
-        self._memories = sum(result.about.memories for result in results if result.about)
+        self._cameras = [result.service for result in results if result.about and result.about.memories]
         self._consumed = {r.service: frozenset(r.about.consumes) for r in results if r.about and r.about.consumes}
+
+    def start(self) -> None:
+        """Let the application start, or go on for a while if it has, as it needs it before the test can begin.
+
+        Raises ApplicationSilent and ServiceSilent.
+        """
+        self.begin = self.now = self.reached = self.application.start(self.begin, self._cameras)
+        self._exact = Fraction(self.begin)
 
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
-        self._deliver([begin], "")
-        self.application.begin(self.now)
+        self._deliver([begin._replace(sample_time=self.begin, received=0)], "")
         while not self.stopped():
-            self.application.pause()
-            if not self._memories:
-                self.application.expect_at(self.now)
+            self.application.expect(self.now)
             going = self._go_each((*self.roles.advance, *self.roles.sense))
-            shown = [result for result in going if result.pictures]
             if self._is_over():
                 return
-            awaits_answer = bool(shown) or not self._memories or self.application.has_own_time
-            if awaits_answer:
-                self.application.show(shown, self.now)
+            self.application.show([result for result in going if result.pictures], self.now)
             self._judge()
             try:
-                if awaits_answer and not self._is_answered():
+                if not self._is_answered():
                     return
             finally:
                 self._watch()
-            if self.now - EPOCH >= self.timeout and not self._is_over():
+            if self.now - self.begin >= self.timeout and not self._is_over():
                 raise TimeOver
             self._deliver(self.application.collect(), "")
             self._go_on()
@@ -172,7 +163,7 @@ class Stepper:
         results: list[Done] = []
         began = time.monotonic()
         for name in names:
-            patience = SERVICE_PATIENCE * (FIRST_TIMES if self.waits_for_start and name not in self._next else 1)
+            patience = SERVICE_PATIENCE * (1 if name in self._next else FIRST_TIMES)
             while (result := self.link.result(name, SLICE_S)) is None:
                 if self.stopped():
                     return results
@@ -184,7 +175,6 @@ class Stepper:
         return results
 
     def _take(self, result: Done) -> None:
-        self.application.remember(result.messages)
         self._deliver(result.messages, result.service)
         self._next[result.service] = result.next
         if result.ended:

@@ -8,22 +8,19 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dodo_dsl.opendlv.address import Address
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageError
-from dodo_dsl.opendlv.numbers import is_whole, whole
 from dodo_dsl.opendlv.session import Session
 from services.base.clock import MICROSECONDS
 from services.base.lockstep_clock import EPOCH
 from services.base.members import SenderTable
 from services.base.runner import tell
 from services.base.service import Service
-from services.clock.answers import Answers
-from services.clock.application import ResponseTimes, SteppedApplication
+from services.clock.agent import TimeAgent
+from services.clock.answers import AnsweringApplication, Answers
 from services.clock.exchange import Exchange, Roles, TestEnded, Timing
 from services.clock.model import Stepper
-from services.clock.processor_time import ApplicationProcesses
-from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
+from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 
 _FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
 """Seconds between reports at first and later, and their share of the time that passed.
@@ -31,7 +28,6 @@ _FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
 A short test needs them closer, because what was measured by the wall clock is put to its time by them.
 """
 _SLICE = 0.05
-_MOST_EARLY = 1000
 BEGIN = "dodo.TestBegin"
 """What the clock consumes besides the application's answers."""
 
@@ -58,27 +54,23 @@ class ClockService(Service):
         senders: SenderTable | None = None,
         own_time: OwnTime | None = None,
     ) -> None:
-        """Services connect at ``path``. With ``own_time`` the application's time is the test's.
-
-        Then ``answers`` are SentMessages.
-        """
+        """Services connect at ``path``. With ``own_time``, which SentMessages have, the application rests."""
         self._session = session
         self._begin_id = session.messages.id(BEGIN)
         self._senders = senders or SenderTable(session.messages)
         answering = (each.data_type for each in answers.filters)
         self._heard = frozenset([*answering, *self._senders.ids])
-        self._early: list[tuple[Envelope, Address]] = []
         self._answers = answers
         self._exchange = exchange = Exchange(session, path, roles.all, self._take, self._senders)
-        self._application: SteppedApplication | VirtualApplication
+        self._application: AnsweringApplication | RestingApplication
         if isinstance(answers, SentMessages):
             assert own_time is not None, "the program gives it"
-            self._application = VirtualApplication(
-                answers, own_time.agent, timing.patience, exchange, self._over, own_time.names, self._note
+            response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
+            self._application = RestingApplication(
+                answers, own_time.agent, timing.patience, exchange, self._over, response, own_time.names, self._note
             )
         else:
-            response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
-            self._application = SteppedApplication(answers, timing.patience, exchange, self._over, response)
+            self._application = AnsweringApplication(answers, timing.patience, exchange, self._over)
         self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
         self._reported = self._begun = 0.0
         self._reached = 0
@@ -92,33 +84,25 @@ class ClockService(Service):
             self._step()
 
     def _step(self) -> None:
-        begin = self._await_begin()
-        if begin is None:
-            return
-        self._begun = time.monotonic()
-        self._report_time()
-        self._application.processes = ApplicationProcesses(self._pids(begin))
         ended: TestEnded | None = None
         try:
             self._stepper.connect()
-            for envelope, source in self._early:
-                self._exchange.hear(envelope, source)
             self._exchange.ignore_services(self._heard)
-            self._stepper.run(begin._replace(sample_time=EPOCH, received=0))
+            if (begin := self._await_begin()) is None:
+                return
+            self._begun = time.monotonic()
+            self._report_time()
+            self._stepper.run(begin)
         except TestEnded as problem:
             ended = problem
         spent = sorted(((n, s) for n, s in self._stepper.spent.items() if n), key=lambda item: -item[1])
         _log.info("waited for %s", ", ".join(f"{name} {seconds:.3f} s" for name, seconds in spent))
         if facts := self._application.facts():
             tell("response", response=facts)
-        self._report_time(last=True)
+        if self._begun:
+            self._report_time(last=True)
         if ended is not None:
             tell("stopped", how=ended.kind, reason=str(ended), silent=ended.silent)
-
-    def _pids(self, begin: Envelope) -> list[int]:
-        """The process ids of the application's services; none where the runner gives none."""
-        message: Any = self._session.messages.decode(begin.data_type, begin.payload)
-        return [whole(word) for word in message.application.split(",") if is_whole(word) and len(word) < 10]
 
     def _take(self, envelope: Envelope) -> None:
         """Take a message of the application."""
@@ -126,10 +110,14 @@ class ClockService(Service):
         if takers and any(each.matches(envelope) for each in self._answers.filters):
             with suppress(MessageError):  # its takers say so
                 message = self._session.messages.decode(envelope.data_type, envelope.payload)
-                self._senders.check_numbers(message, envelope.sender_stamp, takers, self._stepper.now - EPOCH)
+                self._senders.check_numbers(
+                    message, envelope.sender_stamp, takers, self._stepper.now - self._stepper.begin
+                )
         self._answers.take(envelope)
 
     def _over(self) -> bool:
+        if not self._begun:
+            return self._stopped()
         now = time.monotonic()
         is_further = self._stepper.reached != self._reached
         period = max(_FIRST_REPORT_S, _REPORT_SHARE * (now - self._begun)) if is_further else _REPORT_S
@@ -138,27 +126,39 @@ class ClockService(Service):
         return self._stopped()
 
     def _await_begin(self) -> Envelope | None:
-        """The start that the runner announces; one of its own where DODO_RUNNER says that there is none."""
-        if os.environ.get("DODO_RUNNER") == "":
-            self._stepper.waits_for_start = True
-            begin = self._session.messages.type(BEGIN)()
-            return Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)
+        """The start, when the application waits for pictures and the runner says that it listens to the bus.
+
+        Where DODO_RUNNER says that there is no runner, it is one of this clock's own.
+        """
+        begin = self._session.messages.type(BEGIN)()
+        envelope = Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)
+        while not self._stopped():
+            self._stepper.start()
+            if os.environ.get("DODO_RUNNER") == "":
+                return envelope
+            tell("started", seconds=(self._stepper.begin - EPOCH) / 1e6)
+            if (announced := self._receive_begin()) is None:
+                return None
+            message: Any = self._session.messages.decode(announced.data_type, announced.payload)
+            if not message.deaf:
+                self._session.hear_directly(False)
+                return announced
+        return None
+
+    def _receive_begin(self) -> Envelope | None:
         while not self._stopped():
             envelope = self._session.receive(_SLICE)
             if envelope is None:
                 continue
             if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope, self._session.source):
-                self._session.hear_directly(False)
                 return envelope
-            if self._session.was_direct:
-                continue
-            if envelope.data_type in self._senders.ids and len(self._early) < _MOST_EARLY:
-                self._early.append((envelope, self._session.source))
+            if not self._session.was_direct:
+                self._exchange.hear(envelope, self._session.source)
         return None
 
     def _report_time(self, last: bool = False) -> None:
         self._reported, self._reached = time.monotonic(), self._stepper.reached
-        seconds = (self._reached - EPOCH) / 1e6
+        seconds = (self._reached - self._stepper.begin) / 1e6
         tell("time", seconds=seconds, last=last)
 
     def _note(self, text: str) -> None:

@@ -20,7 +20,6 @@ from dodo_dsl.run.docker.shared_files import IMAGE
 from dodo_dsl.run.process import namespaces
 from dodo_dsl.run.process.slot import Entered
 from dodo_dsl.run.protocol import BackendError
-from dodo_dsl.spec.model import VIRTUAL
 
 _SEEN = ("/bin", "/lib", "/lib64", "/usr")
 """Folders of this machine that hold the program and its libraries."""
@@ -44,7 +43,7 @@ def without_own(made: dict[str, Any], plan: Plan, needed: Iterable[Path]) -> dic
     if plan.isolation == "network":
         shown = Entered.with_own(0, *needed).shown
         services[SANDBOX] = {"image": IMAGE, "user": "65534:65534", "volumes": machine}
-        if plan.clock == VIRTUAL:  # with what this machine has built, the holder lets the application's time go on
+        if plan.lockstep:  # with what this machine has built, the holder lets the application's time go on
             place = escaped(str(application_time.built().library.parent))
             volumes[TIME] = {"driver_opts": {"type": "none", "o": "bind", "device": place}}
     mounts = covers(shown)

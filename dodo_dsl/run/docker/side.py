@@ -24,7 +24,6 @@ from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Unstartable
 from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
 from dodo_dsl.run.start_order import LONGEST_S
-from dodo_dsl.spec.model import VIRTUAL
 
 _KILLED = 128 + signal.SIGKILL
 """The exit code of a container whose program was killed by a signal that it cannot refuse."""
@@ -66,11 +65,8 @@ class ContainerSide:
         return self._plan.isolation == "host"
 
     async def open(self, entered: int = 0) -> int:
-        if self._plan.clock == VIRTUAL and self._is_on_host:
-            raise BackendError(
-                "clock: virtual needs a network of the test's own where the application runs in containers: "
-                "remove 'isolation: host', or run with --backend process"
-            )
+        if self._plan.lockstep and self._is_on_host:
+            self._watched.await_answers("containers on the host's network cannot have the test's time")
         await asyncio.to_thread(self._compose.read)
         await self._pulls.once("docker compose", self._compose.require_plugin)
         await self._require_files()
@@ -208,7 +204,10 @@ class ContainerSide:
         async def start(name: str) -> None:
             await self._start(layer, name)
 
-        return await self._watched.start(names, start, reports, self._patience)
+        started = await self._watched.start(names, start, reports, self._patience)
+        if layer == APPLICATION:
+            await self._require_here()
+        return started
 
     def _patience(self, name: str) -> dict[str, float]:
         after = self._watched.conditions.of(name)
@@ -266,14 +265,14 @@ class ContainerSide:
     async def listeners(self) -> Collection[str] | None:
         return await asyncio.to_thread(self._use.listeners, self._application, self._plan.cid)
 
-    async def beginning(self) -> Collection[int]:
-        """None, as DoDo's services do not see them; raises on the network of a host that is not this machine.
+    async def _require_here(self) -> None:
+        """Raises BackendError on the network of a host that is not this machine.
 
         The engine shows a service that has just ended as a process that is not here, so it is asked again.
         """
         for _ in range(_HOST_TURNS):
             if not self._is_on_host or await self.application() is not None:
-                return ()
+                return
             await asyncio.sleep(_HOST_TURN_S)
         raise BackendError(f"{ELSEWHERE}, on whose network DoDo cannot begin the test; use --isolation network")
 

@@ -34,7 +34,7 @@ MOST_LATE = 0.1
 LEAST_CROWDED = 0.1
 """Share of the test's time in which others must have filled the machine for lateness to be their fault."""
 _MAX_FOUND = 300
-_WAY_OUT = "run it with --clock lockstep, or virtual if it has timers, or fewer tests at once (-j 1)"
+_WAY_OUT = "run it with --clock lockstep, or fewer tests at once (-j 1)"
 
 
 def consider(finding: Finding, load: MachineLoad | None) -> tuple[Finding, MachineLoad | None]:
@@ -79,15 +79,12 @@ def too_busy(load: MachineLoad) -> str:
     return ""
 
 
-UNSEEN = "the limit of the time of an answer is not judged, because what containers wait for a processor cannot be seen"
-UNTIMED = "the time of answers is not judged, as with clock virtual computing takes no test time"
+UNMEASURED = "the limit of the time of an answer is not judged, as nothing was measured"
 UNSEEN_USE = (
     "the limits of processor time and memory are not judged, because what the application uses cannot be measured here"
 )
 MOST_SLOW = 0.1
 """Share of answers that may take longer than the frames' period before a note says so."""
-MOST_SURPLUS_FRAMES = 0.1
-"""Share of frames that may have surplus answers before a note says so."""
 MOST_PERIODS = 10
 """The periods of frames that one answer may take before a note says so."""
 SOON_S = 600.0
@@ -117,61 +114,32 @@ class JudgedFigures:
         return replace(self, notes=(*self.notes, *filter(None, notes)))
 
 
-def judged_response(
-    response: Response | None, lockstep: Lockstep | None, services: Sequence[str], timed: Sequence[str] = ()
-) -> JudgedFigures:
-    """Judges the answers by the limits of the test; ``services`` are the application's, ``timed`` those with timers."""
+def judged_response(response: Response | None, lockstep: Lockstep | None, services: Sequence[str]) -> JudgedFigures:
+    """Judges what answers took by the limits of the test; ``services`` are the application's."""
     judged, who = JudgedFigures(), services[0] if services else ""
-    if response is None or lockstep is None:
+    if lockstep is None:
         return judged
+    if response is None:
+        return judged.noted("" if lockstep.max_response_s is None else UNMEASURED)
     answers, over, allowed = response.answers, response.over, lockstep.response_over
-    is_seen = response.processor_median_s is not None  # else what a busy machine kept from it is among these times
-    if lockstep.max_response_s is not None and over is not None and is_seen:
+    if lockstep.max_response_s is not None and over is not None:
         limit = f"{lockstep.max_response_s * 1000:g} ms (at most {allowed * 100:g} %)"
         reason = f"{over} of {answers} answers took longer than {limit}: {response.in_words()}"
         judged = judged.judged(SLOW_ANSWERS, over / answers, allowed, reason, who)
     if lockstep.is_copied:
         reason = f"{response.uncopied} of {answers} answers did not carry the sample time of their frame"
         judged = judged.judged(SAMPLE_TIMES, response.uncopied, 0, reason, who)
-    return judged.noted(*_notes(response, lockstep, timed, is_seen))
+    return judged.noted(*_notes(response))
 
 
-def _notes(response: Response, lockstep: Lockstep, timed: Sequence[str], is_seen: bool) -> Iterator[str]:
-    yield own_clock(response, timed)
+def _notes(response: Response) -> Iterator[str]:
     if response.slow > MOST_SLOW * response.answers:
         slow = f"{response.slow} of {response.answers} answers took longer than the frames' period"
         yield f"too slow for real time: {slow} of {response.period_s * 1000:g} ms; {response.in_words()}"
     if response.worst_s > MOST_PERIODS * response.period_s:
         which = f" to frame {response.worst_frame}" if response.worst_frame else ""
-        waits = "" if is_seen else " with what it waited for a processor"
         frames = f"{response.worst_s / response.period_s:.0f} frames, which outside lockstep would not have waited"
-        yield f"the answer{which} took {response.worst_s:.3g} s{waits}, as long as {frames}"
-    if lockstep.max_response_s is not None and response.over is None:
-        yield UNTIMED
-    if not is_seen and (response.over or 0) > lockstep.response_over * response.answers:
-        yield UNSEEN
-
-
-def own_clock(response: Response, timed: Sequence[str] = ()) -> str:
-    """That an application does not only answer frames, and what follows for its results; empty where it does.
-
-    It is a note, and not an error: a program with timers may well give the same verdict each time, as one that answers
-    each frame twice does, and of the drive that was judged everything is true.
-    """
-    frames, counts = response.answers + 1, []
-    if timed:
-        counts.append(f"'{timed[0]}' declares timers (x-dodo: timed)")
-    if response.unasked:
-        counts.append(f"it sent messages in {response.unasked} of {response.pauses} pauses without a frame")
-    if response.surplus_frames > MOST_SURPLUS_FRAMES * frames:
-        others = f", {response.differing} of them with other values" if response.differing else ""
-        counts.append(f"{response.surplus} surplus answers in {response.surplus_frames} of {frames} frames{others}")
-    if not counts:
-        return ""
-    if response.unasked or timed:
-        way = "results can differ from run to run; run it with --clock realtime, or --clock virtual"
-        return f"the application acts by its own clock: {'; '.join(counts)}: {way}"
-    return f"{counts[0]}: the first answer to a frame counts, and the others are dropped"
+        yield f"the answer{which} took {response.worst_s:.3g} s, as long as {frames}"
 
 
 def judged_use(uses: Sequence[ServiceUse], limits: ResourceLimits | None) -> JudgedFigures:

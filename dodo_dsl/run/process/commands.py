@@ -11,7 +11,7 @@ from dodo_dsl.application.model import OFFSCREEN
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
-from dodo_dsl.plan.added_services import TIME, TIME_FOLDER
+from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, TIME, TIME_FOLDER
 from dodo_dsl.plan.model import DISPLAY_SERVER, ApplicationService, Flag, Plan, PlannedService
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.application_time import ApplicationTime, folder_of
@@ -50,7 +50,9 @@ class Commands:
     report: Path
     slot: Slot
     time: ApplicationTime | None = None
-    """What gives the application the test's time, where its clock is virtual."""
+    """What gives the application the test's time, where it runs here."""
+    by_answers: bool = False
+    """Whether the clock waits for answers, as the application keeps the machine's time."""
 
     def of(self, service: PlannedService | ApplicationService) -> Command:
         """The service's command; raises EnvironmentProblem."""
@@ -66,6 +68,7 @@ class Commands:
             CHANNEL_VARIABLE: self.slot.channel,
             "DODO_ODVD": os.pathsep.join(str(self.folder / FILES / path) for path in self.plan.messages),
             **self.plan.variables,
+            **({ANSWERS_VARIABLE: "1"} if self.by_answers else {}),
         }
         words = (*service.process, *(self._flag(flag) for flag in service.flags))
         hidden = tuple(masked(self.plan, service))

@@ -28,13 +28,11 @@ from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError, Lost, Ready
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
-from dodo_dsl.spec.model import VIRTUAL
 
 LOG = "sandbox.log"
 _TIME_READY = b'{"dodo": "ready"}'
 """What gives the application the test's time prints when it does."""
 USE_PATIENCE_S, CONNECT_PATIENCE_S = 2.0, 30.0
-PIDS_PATIENCE_S = 5.0
 _OUTPUT_S = 1.0
 _NO_PROGRAM = "bwrap: execvp "
 """How bubblewrap says that it cannot start the application's program."""
@@ -60,10 +58,8 @@ class ProcessSide:
         self._plan, self._folder, self._report = watched.plan, watched.folder, watched.report
         self._slot = slot
         self._is_on_host, self._is_apart = isolation == "host", is_apart
-        self._gives_time, self._has_time = is_whole and self._plan.clock == VIRTUAL, False
+        self._gives_time, self._has_time = is_whole and self._plan.lockstep is not None, False
         self._commands = Commands(self._plan, self._folder, self._report, slot)
-        self._pids: dict[str, asyncio.Future[int]] = {}
-        """Of what was started, as the test's services see it; cancelled where it could not be."""
         self._starts: dict[str, list[Command]] = {}
         """The commands by which each service was started, several where a mount went meanwhile."""
         self._exits: list[asyncio.Future[None]] = []
@@ -74,10 +70,8 @@ class ProcessSide:
     async def open(self, entered: int = 0) -> int:
         needed = [*needed_paths(self._plan, self._folder, self._report), Path(self._slot.channel)]
         if self._gives_time:
-            time = await asyncio.to_thread(application_time.built)
-            self._commands = replace(self._commands, time=time)
-            needed += [time.library.parent, time.agent.parent]
-            self._require_time()
+            needed += await self._open_time()
+        self._commands = replace(self._commands, by_answers=self._watched.by_answers)
         namespaces = None if self._is_on_host else Entered.with_own(entered, *needed)
         with atomic.appended(self._report / LOG) as log:
             await self._sandbox.open(self._slot, log.fileno(), namespaces)
@@ -86,13 +80,11 @@ class ProcessSide:
 
     def _take(self, message: dict[str, Any]) -> None:
         if name := message.get("started"):
-            self._pids[name].set_result(message["pid"])
             self._watched.conditions.started(name)
             self._watched.conditions.healthy(name)  # as nothing asks for its health
             if self._watched.conditions.of(name):
                 self._watched.tell(Ready(name))
         elif name := message.get("unstartable"):
-            self._pids[name].cancel()
             self._watched.not_started(name, message["why"])
         elif asked := self._asked.keys() & message.keys():
             for what in asked:
@@ -136,12 +128,22 @@ class ProcessSide:
 
         return await self._watched.start(commands, start, () if layer == APPLICATION else commands)
 
-    def _require_time(self) -> None:
-        """Raises BackendError where the application cannot be given the test's time."""
+    async def _open_time(self) -> list[Path]:
+        """The folders of what gives the application the test's time; none where it cannot have that."""
+        try:
+            self._require_loadable()
+            time = await asyncio.to_thread(application_time.built)
+        except BackendError as error:
+            self._gives_time = False
+            self._watched.await_answers(str(error))
+            return []
+        self._commands = replace(self._commands, time=time)
+        return [time.library.parent, time.agent.parent]
+
+    def _require_loadable(self) -> None:
+        """Raises BackendError where a program of the application cannot load DoDo's library."""
         if not self._is_confined:
-            raise BackendError(
-                "clock: virtual needs process namespaces, which this machine refuses: dodo doctor says why"
-            )
+            raise BackendError("process namespaces are refused by this machine: dodo doctor says why")
         for service in self._plan.application.services:
             with contextlib.suppress(EnvironmentProblem, IndexError):  # it is reported when the service is started
                 command = self._commands.of(service)
@@ -166,7 +168,6 @@ class ProcessSide:
     def _start(self, command: Command) -> None:
         output = self._output(command)
         self._starts.setdefault(command.name, []).append(command)
-        self._pids[command.name] = asyncio.get_running_loop().create_future()
         hidden = command.masked if self._is_on_host and self._is_apart else ()
         words = {"argv": command.argv, "cwd": str(command.folder), "fork": command.is_module, "masked": hidden}
         own = {"id": command.name, "env": dict(command.environment), "confined": self._confined(command)}
@@ -211,12 +212,6 @@ class ProcessSide:
         roots = application_paths(application, self._folder).roots
         places = (self._folder, self._report, Path(self._slot.channel).parent)
         return [*known, *own_data(), *roots, *(place.resolve() for place in places)]
-
-    async def beginning(self) -> Collection[int]:
-        pids = [self._pids[s.name] for s in self._plan.application.services if s.name in self._pids]
-        if pids:
-            await asyncio.wait(pids, timeout=PIDS_PATIENCE_S)
-        return [pid.result() for pid in pids if pid.done() and not pid.cancelled()]
 
     async def listeners(self) -> Collection[str] | None:
         """As the sandbox sees them; None when it does not answer."""

@@ -54,7 +54,6 @@ static int folder_file = -1, command_file = -1, reply_file = -1, wakers[TIME_SLO
 static int64_t now_ns; /* the page shows it, and the application can write there */
 static bool is_overwritten, has_begun[TIME_SERVICES];
 static uint32_t waits_unseen[TIME_SLOTS]; /* one more than `wake` of a thread that was found to wait elsewhere, or has ended */
-static uint64_t grants;
 static struct time_slot *last_granted;
 static int64_t window_ns, window_cpu_ns; /* when test time last went on by WINDOW_NS, and the agent's processor time then */
 static int64_t waits_since, listened, reported; /* wall time: for quiet; the last look for a command, and report */
@@ -203,7 +202,6 @@ static void grant(struct time_slot *slot, uint32_t state)
     bool is_polling = state == TIME_WAITING && slot->kind == TIME_FD;
     if (!atomic_compare_exchange_strong(&slot->state, &state, TIME_GRANTED))
         return;
-    grants++;
     last_granted = slot;
     slot->wake++;
     futex(&slot->wake, FUTEX_WAKE, INT32_MAX, NULL);
@@ -335,9 +333,11 @@ static void report_time(void)
         if (has_begun[at])
             length += snprintf(services + length, sizeof services - (size_t)length, "%s%u", length ? ", " : "", at);
     add_notes(notes, sizeof notes);
+    struct used used = processes_used();
     snprintf(line, sizeof line,
-             "{\"now\": %lld, \"grants\": %llu, \"services\": [%s], \"repeatable\": %s, \"notes\": [%s]}\n",
-             (long long)now_ns, (unsigned long long)grants, services, is_repeatable ? "true" : "false", notes);
+             "{\"now\": %lld, \"services\": [%s], \"repeatable\": %s, \"ran_s\": %.9f, \"has_ended\": %s, \"notes\": [%s]}\n",
+             (long long)now_ns, services, is_repeatable ? "true" : "false", used.seconds, used.one_has_ended ? "true" : "false",
+             notes);
     reply(line);
 }
 

@@ -14,6 +14,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { MOST_THREADS = 4096, MOST_PROCESSES = 4096, MOST_TEXT = 4096, MOST_REFUSALS = 50, LISTINGS = 3 };
@@ -26,6 +27,7 @@ struct thread {
     bool slept;     /* at the last quiet moment, with `got` as it is */
     unsigned wait;  /* the wait in which `ran_before_ns` was read */
     uint64_t ran_before_ns;
+    uint64_t used_ns; /* of a process's first thread: what all of its threads had used when it was asked last */
 };
 
 static struct selection chosen;
@@ -35,6 +37,7 @@ static int others[MOST_PROCESSES], other_count; /* processes that will never be 
 static int undecided[MOST_PROCESSES], undecided_count;
 static long listed_number = -1;
 static bool is_complete; /* two lists with all asleep in between were the same: none is about to begin that has its number */
+static bool one_has_ended; /* a process, since it was asked last what all have used */
 static int new_count;    /* threads that the last list had and the one before had not */
 static bool has_schedstat;
 static unsigned current_wait = 1;
@@ -184,8 +187,10 @@ static bool list(void)
         }
         if (proc)
             closedir(proc);
-        for (int at = 0; at < old_count; at++)
+        for (int at = 0; at < old_count; at++) {
+            one_has_ended |= before[at].stat >= 0 && before[at].pid == before[at].tid;
             close_thread(&before[at]);
+        }
         listed_number = proc && number == last_number() ? number : -1;
         is_complete = false;
         if (listed_number >= 0)
@@ -372,4 +377,20 @@ struct busy_thread processes_busy(void)
         snprintf(busy.name, sizeof busy.name, "%.*s", (int)strcspn(text + strlen("Name:\t"), "\n"), text + strlen("Name:\t"));
     }
     return busy;
+}
+
+struct used processes_used(void)
+{
+    struct used used = {.one_has_ended = one_has_ended};
+    one_has_ended = false;
+    for (int at = 0; at < thread_count; at++) {
+        struct timespec now;
+        clockid_t clock;
+        if (threads[at].pid != threads[at].tid || clock_getcpuclockid(threads[at].pid, &clock) || clock_gettime(clock, &now))
+            continue;
+        uint64_t ns = (uint64_t)now.tv_sec * UINT64_C(1000000000) + (uint64_t)now.tv_nsec;
+        used.seconds += ns > threads[at].used_ns ? (double)(ns - threads[at].used_ns) / 1e9 : 0;
+        threads[at].used_ns = ns;
+    }
+    return used;
 }

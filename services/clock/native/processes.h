@@ -20,6 +20,12 @@ struct busy_thread {
     char name[16];
 };
 
+/* Processor time since it was asked last, which lacks the last part of processes that have ended meanwhile. */
+struct used {
+    double seconds;
+    bool one_has_ended;
+};
+
 void processes_init(const struct selection *selection);
 /* A new wait begins: processor time is counted anew. */
 void processes_begin_wait(void);
@@ -27,6 +33,7 @@ void processes_begin_wait(void);
 bool processes_are_quiet(bool *is_off);
 /* The thread that was found busy at last. */
 struct busy_thread processes_busy(void);
+struct used processes_used(void);
 /* Whether nothing of the application is left. */
 bool processes_have_ended(void);
 

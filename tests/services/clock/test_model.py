@@ -55,8 +55,6 @@ def test_the_way_is_as_computed_by_hand_whatever_the_manners(toys: Toys, manner:
     assert stepper.application.frames == 21
     assert application.seen[:2] == pytest.approx([0.01, 0.11], abs=0.05)
     assert len(application.seen) in (20, 21), "every picture once"
-    most = 21 * (application.times - 1)
-    assert max(most - 2, 0) <= stepper.application.answers.surplus <= most
 
 
 @pytest.mark.thorough
@@ -98,9 +96,8 @@ def test_two_cameras_each_with_a_reader_of_its_own(toys: Toys) -> None:
     """One answers at once and long before the other is even seen."""
     toys.cast = {**DRIVE, "other": lambda _, memory: Eye(memory())}
     slow = toys.application("other", times=0, boxes=1, pause=lambda _: 0.02)
-    way, stepper = toys.run(toys.application(), slow)
+    way, _ = toys.run(toys.application(), slow)
     assert close(way, expected(21))
-    assert stepper.application.answers.surplus == 0
     assert len(slow.seen) in (20, 21)
 
 
@@ -153,7 +150,7 @@ def test_a_service_that_does_not_answer_is_named(toys: Toys, monkeypatch: pytest
     ("patience", "manner", "said"),
     [
         (Patience(0.5, 0.2), {"times": 0}, "frame 1 within 0.5 s (GroundSteeringRequest missing)"),
-        (Patience(2.0, 0.2), {"most": 7}, "frame 8 within 0.2 s (no reader waited for a picture of 'eye')"),
+        (Patience(2.0, 0.02), {"most": 7}, "frame 8 within 0.2 s (no reader waited for a picture of 'eye')"),
     ],
 )
 def test_silence_is_named_with_frame_and_cause(

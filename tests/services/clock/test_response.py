@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.clock.application import ResponseTimes, processor_name
-from services.clock.processor_time import Spent
+from services.clock.resting import ResponseTimes, processor_name
 
 times = st.lists(st.floats(0.0, 10.0), min_size=1, max_size=50)
 
@@ -16,35 +15,28 @@ times = st.lists(st.floats(0.0, 10.0), min_size=1, max_size=50)
 @given(times)
 def test_figures_are_those_of_numpy(taken: list[float]) -> None:
     response = ResponseTimes()
-    for wall in taken:
-        response.add(wall, None)
+    for frame, seconds in enumerate([99.0, *taken], 1):
+        response.add(frame, seconds)
     facts = response.facts()
     assert facts["answers"] == len(taken)
     assert facts["median_s"] == pytest.approx(np.median(taken))
     assert facts["p95_s"] == np.percentile(taken, 95, method="inverted_cdf")
     assert facts["worst_s"] == max(taken)
-    assert facts["processor_median_s"] is None and facts["over"] is None
-
-
-@given(wall=st.floats(0, 10), ran=st.floats(0, 10), waited=st.floats(0, 10))
-def test_a_wait_for_the_processor_does_not_count_and_its_use_does(wall: float, ran: float, waited: float) -> None:
-    response = ResponseTimes()
-    response.add(wall, Spent(ran, waited))
-    facts = response.facts()
-    assert facts["median_s"] == pytest.approx(max(wall - waited, min(ran, wall)))
-    assert facts["processor_worst_s"] == ran
+    assert (facts["worst_frame"], facts["over"]) == (taken.index(max(taken)) + 2, None)
 
 
 def test_answers_beyond_period_and_limit_are_counted() -> None:
     response = ResponseTimes(period_s=0.1, limit_s=0.3)
-    for wall in (0.05, 0.1, 0.2, 0.3, 0.31):
-        response.add(wall, Spent(wall, 0.0))
+    for frame, seconds in enumerate((9.0, 0.05, 0.1, 0.2, 0.3, 0.31)):
+        response.add(frame, seconds)
     facts = response.facts()
     assert (facts["slow"], facts["over"]) == (3, 1)
 
 
-def test_without_an_answer_there_is_nothing_to_report() -> None:
-    assert ResponseTimes().facts() == {}
+def test_without_a_second_answer_there_is_nothing_to_report() -> None:
+    response = ResponseTimes()
+    response.add(1, 0.5)
+    assert response.facts() == {}
 
 
 @pytest.mark.parametrize(

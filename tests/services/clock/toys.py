@@ -18,11 +18,11 @@ from services.base import Service, Verdict
 from services.base.clock_link import ClockClient
 from services.base.lockstep_clock import EPOCH, LockstepClock
 from services.base.loop import Loop
-from services.clock.answers import Answers, filters
-from services.clock.application import ResponseTimes, SteppedApplication
+from services.clock.agent import TimeAgent
+from services.clock.answers import AnsweringApplication, Answers, filters
 from services.clock.exchange import Exchange, IsStopped, Patience, Roles
 from services.clock.model import Stepper
-from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
+from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 
 STEP = 100_000
 STEER, PLACE = "opendlv.proxy.GroundSteeringRequest", "opendlv.sim.Frame"
@@ -249,6 +249,7 @@ class Toys:
                         app.start()
                         started.append(app)
                     stepper.connect()
+                    stepper.start()
                     stepper.run(Envelope(ids["dodo.TestBegin"], b"", 0, 0, EPOCH, 0))
         finally:
             for app in started:  # the services have removed the memory that it waits for
@@ -257,8 +258,8 @@ class Toys:
 
     def _under_test(self, answers: Any, link: Exchange, stopped: IsStopped) -> Any:
         if self.agent:
-            return VirtualApplication(answers, self.agent, self.patience, link, stopped, ("toy",), lambda _: None)
-        return SteppedApplication(answers, self.patience, link, stopped, ResponseTimes())
+            return RestingApplication(answers, self.agent, self.patience, link, stopped, ResponseTimes(), ("toy",))
+        return AnsweringApplication(answers, self.patience, link, stopped)
 
     @contextmanager
     def _services(self, stop: threading.Event, makers: dict[str, Maker], path: Path) -> Iterator[None]:
@@ -277,6 +278,6 @@ class Toys:
     def _loop(self, name: str, maker: Maker, path: Path, resources: ExitStack) -> Loop:
         session = resources.enter_context(Session(self.cid))
         client = ClockClient(session, name, path)
-        clock = LockstepClock(session, name, self.readers, client, is_virtual=self.agent is not None)
+        clock = LockstepClock(session, name, self.readers, client)
         service = maker(session, lambda: resources.enter_context(clock.memory(self.memory_name(name), 8)))
         return Loop(name, service, session, clock, 0)

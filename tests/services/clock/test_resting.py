@@ -4,9 +4,11 @@ import json
 import os
 import struct
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
@@ -16,10 +18,12 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base.lockstep_clock import EPOCH
-from services.clock import virtual
+from services.clock import agent as agents
+from services.clock import resting
+from services.clock.agent import TimeAgent
 from services.clock.answers import filters
 from services.clock.exchange import ApplicationFloods, ApplicationSilent, Patience, ServiceLink, ServiceSilent
-from services.clock.virtual import Busy, Destroyed, Reached, SentMessages, TimeAgent, VirtualApplication, report_of
+from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 from tests.services.clock.toys import STEER, STEP, Toys
 
 Answer = Callable[[int], list[object]]
@@ -27,11 +31,12 @@ Answer = Callable[[int], list[object]]
 
 
 def reached(until: int, **more: object) -> dict[str, object]:
-    return {"now": until * 1000, "grants": 1, "services": [0, 1], "notes": [], "repeatable": True, **more}
+    return {"now": until * 1000, "services": [0, 1], "notes": [], "repeatable": True, **more}
 
 
 @contextmanager
 def agent(folder: Path, answer: Answer = lambda until: [reached(until)]) -> Iterator[TimeAgent]:
+    folder.mkdir(exist_ok=True)
     for name in ("command", "reply"):
         os.mkfifo(folder / name, 0o600)
     command = os.open(folder / "command", os.O_RDWR)
@@ -80,12 +85,13 @@ def steering(sent: int, sampled: int = 5, stamp: int = 0) -> Envelope:
     return Envelope(IDS[STEER], b"", sent, 1, sampled, stamp)
 
 
-def application(agent: TimeAgent, sent: SentMessages | None = None, link: object = None) -> VirtualApplication:
+def application(agent: TimeAgent, sent: SentMessages | None = None, link: object = None) -> RestingApplication:
     heard = sent or SentMessages(filters([STEER], IDS))
     patience = Patience(0.4, 0.2)
     notes: list[str] = []
-    made = VirtualApplication(
-        heard, agent, patience, cast(ServiceLink, link or Link()), lambda: False, ("driver", "eye"), notes.append
+    known = cast(ServiceLink, link or Link())
+    made = RestingApplication(
+        heard, agent, patience, known, lambda: False, ResponseTimes(), ("driver", "eye"), notes.append
     )
     made.notes = notes  # type: ignore[attr-defined]
     return made
@@ -107,12 +113,12 @@ def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path
 
     with agent(tmp_path, answer) as time:
         driven = application(time, sent, Link(drain))
-        driven.begin(EPOCH)
+        driven.start(EPOCH, ())
         assert not waiting
         driven.show((), EPOCH)
         driven.await_answer(EPOCH + STEP)
         taken = [(e.received - EPOCH, e.sample_time, e.sender_stamp) for e in driven.collect()]
-    assert taken == [(1, 5, 0), (8, 5, 0), (8, 5, 3), (STEP, 5, 0)], "what was sent before the test is left out"
+    assert taken == [(1, 5, 0), (1, 5, 0), (8, 5, 0), (8, 5, 3), (STEP, 5, 0)], "what it sent as it started, too"
     assert driven.collect() == []
 
 
@@ -122,9 +128,10 @@ def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path
         (1, {"processor_s": 0.5, "wall_s": 0.5}, "thread 'loop' of service 'eye' computed for 0.4 s without waiting; "),
         (1, {"processor_s": 0.3, "wall_s": 0.5}, ""),
         (2, {"processor_s": 0.3, "wall_s": 0.3}, "thread 'loop' of service 'eye' computed for 0.2 s without waiting; "),
-        (2, {"processor_s": 0.0, "wall_s": 2.5}, "did not wait within 2 s of wall time (state D); with clock: virtual"),
+        (2, {"processor_s": 0.0, "wall_s": 2.5}, "did not wait within 2 s of wall time (state D); in lockstep"),
         (2, {"processor_s": 0.0, "wall_s": 1.5}, ""),
-        (2, {"processor_s": "x", "wall_s": -1}, ""),
+        (2, {"processor_s": "x", "wall_s": 9.0}, ""),
+        (2, {"processor_s": 9.0, "wall_s": -1}, ""),
     ],
 )
 def test_who_does_not_wait_is_named(tmp_path: Path, frame: int, report: dict[str, Any], sentence: str) -> None:
@@ -138,7 +145,7 @@ def test_who_does_not_wait_is_named(tmp_path: Path, frame: int, report: dict[str
         driven = application(time)
 
         def drive() -> None:
-            driven.begin(EPOCH)
+            driven.start(EPOCH, ())
             for step in range(frame):
                 driven.show((), EPOCH + step * STEP)
                 driven.await_answer(EPOCH + (step + 1) * STEP)
@@ -156,32 +163,17 @@ def test_it_goes_on_only_when_the_time_is_reached(tmp_path: Path) -> None:
     noise = [b"{}\n[]\n\xff\nnull\n" + b"[" * 5000 + b"\n", {"now": "1"}, {"busy": 3}, reached(EPOCH - 1), b"{"]
     with agent(tmp_path, lambda until: [*noise, b"\n", reached(until), reached(until)]) as time:
         driven = application(time)
-        driven.begin(EPOCH)
+        driven.start(EPOCH, ())
         for step in range(3):
             driven.show((), EPOCH + step * STEP)
             driven.await_answer(EPOCH + (step + 1) * STEP)
     assert driven.frames == 3
 
 
-@pytest.mark.parametrize(
-    ("line", "expected"),
-    [
-        (b'{"destroyed": true}', Destroyed()),
-        (b'{"busy": {"service": true, "name": "a\\u001bb", "state": 7, "wall_s": 1}}', Busy(-1, "a?b", "", 1.0, 0.0)),
-        (b'{"now": 5, "services": [0, "x"], "notes": [3, {"kind": "spin"}], "repeatable": false}',
-         Reached(5, frozenset({0, -1}), (("spin", -1, ""),), False)),
-        (b'{"now": true}', None),
-        (b'{"now": 5, "services": 7}', Reached(5, frozenset(), (), True)),
-    ],
-)  # fmt: skip
-def test_reports_are_taken_as_far_as_they_can_be(line: bytes, expected: object) -> None:
-    assert report_of(line) == expected
-
-
 def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(tmp_path: Path) -> None:
     with agent(tmp_path, lambda _: [{"destroyed": True}]) as time:
         with pytest.raises(ApplicationSilent, match="the application destroyed the page"):
-            application(time).begin(EPOCH)
+            application(time).start(EPOCH, ())
         (tmp_path / "command").write_text("end\n")
         with pytest.raises(ServiceSilent, match="has ended"):
             while True:
@@ -189,9 +181,8 @@ def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(
 
 
 def test_a_flood_ends_the_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(virtual, "MOST_SENT", 3)
+    monkeypatch.setattr(resting, "MOST_SENT", 3)
     sent = SentMessages(filters([f"{STEER}/0"], IDS))
-    sent.begin()
     for step in range(4):
         for n in range(3):
             sent.take(steering(EPOCH + n))
@@ -202,17 +193,64 @@ def test_a_flood_ends_the_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         sent.take(steering(EPOCH))
 
 
-def test_copied_sample_times_are_counted_and_nothing_is_measured() -> None:
+def test_copied_sample_times_are_counted() -> None:
     sent = SentMessages(filters([STEER], IDS))
-    assert sent.facts() == {}
-    sent.begin()
     sent.expect([7, 9])
     for sampled in ((7,), (7, 9), (7, 8), ()):
         for each in sampled:
             sent.take(steering(EPOCH, each))
         sent.collect(EPOCH, EPOCH + STEP)
-    facts = sent.facts()
-    assert (facts["answers"], facts["uncopied"], facts["slow"], facts["worst_s"]) == (3, 1, 0, 0.0)
+    assert (sent.answers, sent.uncopied) == (3, 1)
+
+
+def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
+    """By the agent, but by the wall clock where a process has ended: nobody knows its last part."""
+    sent = SentMessages(filters([STEER], IDS))
+    ran = iter([(0.5, False), (0.0, False), (0.0, False), *[(1e-6, False)] * 2, (9.0, False), (0.0, True)])
+
+    def answer(until: int) -> list[object]:
+        seconds, has_ended = next(ran)
+        return [reached(until, ran_s=seconds, has_ended=has_ended)]
+
+    with agent(tmp_path, answer) as time:
+        driven = application(time, sent)
+        driven.start(EPOCH, ())
+        for step in range(3):
+            driven.show((), EPOCH + step * STEP)
+            sent.take(steering(EPOCH + step * STEP))
+            driven.await_answer(EPOCH + (step + 1) * STEP)
+            driven.collect()
+    facts = driven.facts()
+    assert (facts["answers"], facts["worst_frame"], facts["uncopied"]) == (2, 3, 3)
+    assert 1e-6 < facts["worst_s"] < 9.0, "no more than passed on the wall"
+
+
+class Cameras(Link):
+    """Their pictures are awaited from the n-th time on at which they are asked."""
+
+    def __init__(self, **awaited: int) -> None:
+        super().__init__()
+        self._awaited, self._asked = awaited, Counter[str]()
+
+    def result(self, service: str, timeout: float = 0.0) -> Any:
+        self._asked[service] += 1
+        return SimpleNamespace(awaited=self._asked[service] >= self._awaited[service])
+
+
+def test_the_test_begins_when_the_application_waits_for_all_cameras(tmp_path: Path) -> None:
+    with agent(tmp_path) as time:
+        driven = application(time, link=Cameras(left=2, right=4))
+        assert driven.start(EPOCH, ()) == EPOCH
+    with agent(tmp_path / "b") as time:
+        driven = application(time, link=Cameras(left=2, right=4))
+        began = driven.start(EPOCH, ("left", "right"))
+        assert began == EPOCH + 3 * resting.START_US
+        assert driven.start(began, ("left", "right")) == began + resting.START_US, "it goes on where that was too early"
+    with (
+        agent(tmp_path / "c") as time,
+        pytest.raises(ApplicationSilent, match="picture of 'left' within 10 s of the app"),
+    ):
+        application(time, link=Cameras(left=5000)).start(EPOCH, ("left",))
 
 
 def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(tmp_path: Path) -> None:
@@ -220,9 +258,9 @@ def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(
     begun = iter([[0], [0, 1], [0, 1], [0]])
     with agent(tmp_path, lambda until: [reached(until, notes=notes, services=next(begun), repeatable=False)]) as time:
         with pytest.raises(ServiceSilent, match="service 'eye' never loaded DoDo's clock"):
-            application(time).begin(EPOCH)
+            application(time).start(EPOCH, ())
         driven = application(time)
-        driven.begin(EPOCH)
+        driven.start(EPOCH, ())
         driven.await_answer(EPOCH + STEP)
         driven.show((), EPOCH + STEP)  # once the test has begun, none can say that it has not
     first, second = driven.notes  # type: ignore[attr-defined]
@@ -231,9 +269,9 @@ def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(
 
 
 def test_without_an_agent_the_test_cannot_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(virtual, "AGENT_PATIENCE_S", 0.0)
+    monkeypatch.setattr(agents, "PATIENCE_S", 0.0)
     with pytest.raises(ServiceSilent, match="lets the application's time go on"):
-        application(TimeAgent(tmp_path)).begin(EPOCH)
+        application(TimeAgent(tmp_path)).start(EPOCH, ())
 
 
 def expected(steps: int, every: int) -> list[tuple[int, float]]:

@@ -1,0 +1,323 @@
+"""The application whose own time is the test's: the world waits until it rests.
+
+The agent lets it run up to a time of the test, and says when all its threads wait for later. What the application sends
+counts at the time at which it sent it. Computing takes none; how much it computes is measured all the same.
+"""
+
+import statistics
+import time
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dodo_dsl.opendlv.channel import Done, Show
+from dodo_dsl.opendlv.envelope import Envelope
+from services.base.lockstep_clock import EPOCH
+from services.clock.agent import Busy, Report, TimeAgent
+from services.clock.answers import MessageFilter
+from services.clock.exchange import (
+    SLICE_S,
+    ApplicationFloods,
+    ApplicationSilent,
+    IsStopped,
+    Patience,
+    ServiceLink,
+    ServiceSilent,
+)
+
+MOST_SENT = 1000
+"""Messages of one kind in a step; more of them are a flood."""
+PATIENCE_S = 60.0
+"""Wall time in s for an application that goes on without reaching the time, and for a camera."""
+WALL_FACTOR = 10.0
+"""How many times as long as it may compute a thread may take of wall time: others may have the processor."""
+START_US, MOST_START_US = 10_000, 10_000_000
+"""Steps of its own time for an application that does not wait for pictures yet, and the longest that it has."""
+_NS = 1000
+_MOST_NOTES = 64
+
+
+@dataclass
+class SentMessages:
+    """Collects all that the application sends and services consume, those of ``heard``.
+
+    Messages under other sender stamps are passed on, too, as services count them.
+    """
+
+    heard: tuple[MessageFilter, ...]
+    answers: int = 0
+    """Steps in which it sent something that matters."""
+    uncopied: int = 0
+    """Those of them in which that did not carry the sample time of a frame."""
+    _frames: set[int] = field(default_factory=set)
+    _sent: list[Envelope] = field(default_factory=list)
+    _counts: Counter[int] = field(default_factory=Counter)
+
+    @property
+    def filters(self) -> tuple[MessageFilter, ...]:
+        """All messages that matter here."""
+        return self.heard
+
+    def expect(self, sampled: Iterable[int]) -> None:
+        """Frames with these sample times (us) are shown."""
+        self._frames.update(sampled)
+
+    def take(self, envelope: Envelope) -> None:
+        """Take a message from the bus; raises ApplicationFloods."""
+        if all(each.data_type != envelope.data_type for each in self.heard):
+            return
+        self._counts[envelope.data_type] += 1
+        if self._counts[envelope.data_type] > MOST_SENT:
+            name = next(each.name for each in self.heard if each.data_type == envelope.data_type)
+            message = name.partition("/")[0].rpartition(".")[2]
+            raise ApplicationFloods(
+                f"the application sent more than {MOST_SENT} {message}s within a step: it floods the bus"
+            )
+        self._sent.append(envelope)
+
+    def collect(self, after: int, until: int) -> list[Envelope]:
+        """What was sent, by the application's own time, which lies in the step that begins ``after`` a time (us).
+
+        It counts from the next microsecond on, so that it acts on no update of the time at which it was sent.
+        """
+        sent, self._sent = self._sent, []
+        self._counts.clear()
+        own = [envelope for envelope in sent if any(each.matches(envelope) for each in self.heard)]
+        self.answers += bool(own)
+        self.uncopied += any(envelope.sample_time not in self._frames for envelope in own)
+        return [envelope._replace(received=min(max(envelope.sent, after) + 1, until)) for envelope in sent]
+
+
+@dataclass
+class ResponseTimes:
+    """What the application computed for its answers, without the first, for which programs load their libraries.
+
+    ``limit_s`` is the longest that an answer may take, ``period_s`` the period of the frames.
+    """
+
+    period_s: float = 0.1
+    limit_s: float | None = None
+    _taken: list[float] = field(default_factory=list)
+    _frames: list[int] = field(default_factory=list)
+
+    def add(self, frame: int, taken_s: float) -> None:
+        """One more answer, to the frame with this number."""
+        self._taken.append(taken_s)
+        self._frames.append(frame)
+
+    def facts(self) -> dict[str, Any]:
+        """What the clock reports: numbers in s, none without an answer; ``over`` counts answers beyond the limit."""
+        taken = self._taken[1:]
+        if not taken:
+            return {}
+        worst = max(taken)
+        times = {"median_s": statistics.median(taken), "p95_s": _percentile(taken, 0.95), "worst_s": worst}
+        return {
+            "answers": len(taken),
+            "period_s": self.period_s,
+            **times,
+            "slow": sum(each > self.period_s for each in taken),
+            "worst_frame": self._frames[1 + taken.index(worst)],
+            "over": None if self.limit_s is None else sum(each > self.limit_s for each in taken),
+            "processor": processor_name(),
+        }
+
+
+def _percentile(values: Sequence[float], share: float) -> float:
+    """The smallest value that at least this share of the values does not exceed."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, max(0, -int(-share * len(ordered) // 1) - 1))]
+
+
+def processor_name(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
+    """The processor as Linux names it, with its clock where it says one; empty if it says nothing."""
+    try:
+        lines = cpuinfo.read_text(errors="replace").splitlines()
+    except OSError:
+        return ""
+    facts = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in reversed(lines))}
+    name = facts.get("model name") or facts.get("Model") or facts.get("Hardware") or ""
+    clock = facts.get("cpu MHz", "")
+    return f"{name}, {float(clock):.0f} MHz" if name and clock.replace(".", "", 1).isdigit() else name
+
+
+class RestingApplication:
+    """Lets the application go on from step to step, and shows pictures when they are due; ``frames`` counts steps.
+
+    ``names`` are those of its services, by which the agent numbers them, and ``note`` takes notes on the test.
+    """
+
+    def __init__(
+        self,
+        answers: SentMessages,
+        agent: TimeAgent,
+        patience: Patience,
+        link: ServiceLink,
+        stopped: IsStopped,
+        response: ResponseTimes,
+        names: Sequence[str] = (),
+        note: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self.answers, self.response = answers, response
+        self.frames = 0
+        self.waited_first, self.waited = 0.0, 0.0
+        """Wall time in s up to the second step, and since."""
+        self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
+        self._names, self._note = names, note
+        self._noted: set[str] = set()
+        self._is_started = False
+        self._shown_at = self._until = 0
+        self._taken_s = 0.0
+        """What it has computed in this step."""
+
+    def facts(self) -> dict[str, Any]:
+        """What the clock reports of the answers at the end."""
+        facts = self.response.facts()
+        return facts and {**facts, "uncopied": self.answers.uncopied}
+
+    def start(self, now: int, cameras: Collection[str]) -> int:
+        """Let it start, or go on for a while from a time (us) on, until it waits for all cameras' pictures; that time.
+
+        Raises ApplicationSilent, ApplicationFloods and ServiceSilent.
+        """
+        if self._is_started:
+            now += START_US
+        else:
+            self._agent.open(self._stopped)
+            self._is_started = True
+        self._run(now)
+        while (deaf := [camera for camera in cameras if not self._is_awaited(camera)]) and not self._stopped():
+            if now - EPOCH >= MOST_START_US:
+                within = f"within {MOST_START_US / 1e6:g} s of the application's own time"
+                raise ApplicationSilent(f"no reader waited for a picture of '{deaf[0]}' {within}", silent=True)
+            now += START_US
+            self._run(now)
+        return now
+
+    def _is_awaited(self, camera: str) -> bool:
+        self._link.send(camera, Show(awaits=False, announces=False))
+        done = self._result(camera)
+        return done is not None and done.awaited
+
+    def expect(self, now: int) -> None:
+        """What it sends counts at its own time, whatever services send."""
+
+    def show(self, shown: Sequence[Done], now: int) -> None:
+        """Let it take what services have sent by ``now`` (us), then show it new pictures, whether it waits or not.
+
+        Raises ApplicationSilent, ApplicationFloods and ServiceSilent.
+        """
+        self.frames += 1
+        self._shown_at, self._taken_s = now, 0.0
+        self._run(now)
+        self.answers.expect(camera.sampled for camera in shown)
+        for camera in shown:
+            self._link.send(camera.service, Show(awaits=False, announces=True))
+        for camera in shown:
+            self._result(camera.service)
+
+    def await_answer(self, until: int) -> None:
+        """Let it go on to ``until`` (us); raises ApplicationSilent, ApplicationFloods and ServiceSilent."""
+        self._until = until
+        self._run(until)
+
+    def collect(self) -> list[Envelope]:
+        """The application's messages since the last time, for the services, in the order in which they were sent."""
+        before = self.answers.answers
+        sent = self.answers.collect(self._shown_at, self._until)
+        if self.answers.answers > before or not self.answers.heard:
+            self.response.add(self.frames, self._taken_s)
+        return sent
+
+    def _result(self, camera: str) -> Done | None:
+        began = time.monotonic()
+        while (done := self._link.result(camera, SLICE_S)) is None and not self._stopped():
+            if time.monotonic() - began > PATIENCE_S:
+                raise ServiceSilent(f"service '{camera}' did not show its picture within {PATIENCE_S:g} s")
+        return done
+
+    def _run(self, until: int) -> None:
+        began = time.monotonic()
+        self._agent.run(until)
+        while not self._stopped():
+            report = self._agent.report(SLICE_S)
+            self._link.drain()
+            if report is not None and self._has_reached(report, until, began):
+                break
+            if time.monotonic() - began > max(PATIENCE_S, WALL_FACTOR * self._limit):
+                raise ApplicationSilent(
+                    f"the application did not come to {(until - self._shown_at) / 1e6:g} s "
+                    f"of its own time within {time.monotonic() - began:.0f} s of wall time"
+                )
+        spent = time.monotonic() - began
+        self.waited_first += spent if self.frames <= 1 else 0.0
+        self.waited += spent if self.frames > 1 else 0.0
+
+    def _has_reached(self, report: Report, until: int, began: float) -> bool:
+        """Whether it rests at this time; raises ApplicationSilent and ServiceSilent."""
+        if report.destroyed:
+            raise ApplicationSilent("the application destroyed the page that gives it the test's time")
+        if report.busy is not None:
+            self._refuse_busy(report.busy)
+        if report.now is None:
+            return False
+        self._tell(report)
+        spent_s = time.monotonic() - began
+        self._taken_s += spent_s if report.has_ended else min(report.ran_s, spent_s)
+        return report.now >= until * _NS
+
+    @property
+    def _limit(self) -> float:
+        return self._patience.first if self.frames <= 1 else self._patience.others
+
+    def _refuse_busy(self, busy: Busy) -> None:
+        """Raises ApplicationSilent where a thread has computed, or not come to wait, for too long."""
+        name, service = _printable(busy.name), self._name(busy.service)
+        whose = f" of service '{service}'" if service else ""
+        way_out = "in lockstep the test goes on only when all threads wait"
+        if busy.processor_s > self._limit:
+            raise ApplicationSilent(f"thread '{name}'{whose} computed for {self._limit:g} s without waiting; {way_out}")
+        if busy.wall_s > WALL_FACTOR * self._limit:
+            state = f" (state {_printable(busy.state)})" if busy.state else ""
+            raise ApplicationSilent(
+                f"thread '{name}'{whose} did not wait within {WALL_FACTOR * self._limit:g} s of wall time{state}; "
+                f"{way_out}"
+            )
+
+    def _name(self, service: int) -> str:
+        return self._names[service] if 0 <= service < len(self._names) else ""
+
+    def _tell(self, report: Report) -> None:
+        """Notes of the application's processes become the test's, each once; raises ServiceSilent."""
+        missing = [name for number, name in enumerate(self._names) if number not in report.services]
+        if missing and not self.frames:
+            raise ServiceSilent(
+                f"service '{missing[0]}' never loaded DoDo's clock, as programs do not that are statically linked or "
+                "of another C library: run the test with --clock realtime"
+            )
+        if not report.repeatable:
+            self._note_once("not all services began at once, so the time before the test may differ from run to run")
+        for note in report.notes:
+            is_starting = note.kind == "spin" and self.frames <= 1  # libraries look at the clock as they are loaded
+            if not is_starting and (sentence := _SENTENCES.get(note.kind)):
+                self._note_once(sentence.format(service=self._name(note.service), name=_printable(note.name)))
+
+    def _note_once(self, text: str) -> None:
+        if text not in self._noted and len(self._noted) < _MOST_NOTES:
+            self._noted.add(text)
+            self._note(text)
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+_SENTENCES = {
+    "static": "service '{service}' started '{name}', a statically linked program, which keeps the machine's time",
+    "setuid": "service '{service}' started '{name}', which changes its user and so keeps the machine's time",
+    "slots": "service '{service}' has more threads than DoDo's clock can serve ('{name}')",
+    "page": "the application wrote into what gives it the test's time; DoDo put right what others read there",
+    "spin": "a thread of service '{service}' asks for the time again and again without waiting ('{name}')",
+}
