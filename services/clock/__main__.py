@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from services.base import Context, RealTimeClock, Service, run
@@ -13,7 +14,7 @@ from services.base.members import SenderTable
 from services.base.service import period_of
 from services.clock.agent import TimeAgent
 from services.clock.answers import Answers, filters
-from services.clock.exchange import Patience, Roles, Timing
+from services.clock.exchange import Patience, Roles, ServiceSilent, Timing
 from services.clock.resting import SentMessages
 from services.clock.service import ClockService, OwnTime
 
@@ -26,6 +27,8 @@ def build(context: Context) -> Service:
     if flags["time-folder"] and not os.environ.get("DODO_ANSWERS"):
         own_time = OwnTime(TimeAgent(Path(flags["time-folder"])), tuple(flags["application"]))
         context.resources.callback(own_time.agent.close)
+        with suppress(ServiceSilent):  # the test's first step says so; the application, which starts later, finds it no more
+            own_time.agent.open(lambda: False)
         answers = SentMessages(answers.filters)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))
     assert context.session is not None, "the program gives its session"

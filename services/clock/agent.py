@@ -71,12 +71,15 @@ class TimeAgent:
         self._poll = select.poll()
 
     def open(self, stopped: IsStopped) -> None:
-        """Wait until it is there; raises ServiceSilent."""
+        """Wait until it is there, and hide the FIFOs from all others; raises ServiceSilent."""
         deadline = time.monotonic() + PATIENCE_S
-        while not (self._is_open() or stopped()):
-            if time.monotonic() > deadline:
+        while self._command < 0 and not stopped():
+            if self._is_open():
+                self._send("mine")
+            elif time.monotonic() > deadline:
                 raise ServiceSilent(f"nothing in {self._folder} lets the application's time go on (dodo-time)")
-            time.sleep(SLICE_S)
+            else:
+                time.sleep(SLICE_S)
 
     def _is_open(self) -> bool:
         try:

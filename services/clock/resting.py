@@ -278,7 +278,9 @@ class RestingApplication:
         whose = f" of service '{service}'" if service else ""
         way_out = "in lockstep the test goes on only when all threads wait"
         if busy.processor_s > self._limit:
-            raise ApplicationSilent(f"thread '{name}'{whose} computed for {self._limit:g} s without waiting; {way_out}")
+            woken = f"went on and waited again and again in {self._limit:g} s of computing, without its time going on"
+            did = woken if busy.state == "W" else f"computed for {self._limit:g} s without waiting"
+            raise ApplicationSilent(f"thread '{name}'{whose} {did}; {way_out}")
         if busy.wall_s > WALL_FACTOR * self._limit:
             state = f" (state {_printable(busy.state)})" if busy.state else ""
             raise ApplicationSilent(

@@ -60,6 +60,7 @@ static int64_t waits_since, listened, reported; /* wall time: for quiet; the las
 static uint32_t notes_told;
 static volatile sig_atomic_t is_over;
 static bool is_repeatable = true, has_ended, is_serving; /* before that, the clock's commands wait */
+static bool is_found; /* the clock has said something */
 
 static int64_t time_of(clockid_t clock)
 {
@@ -366,6 +367,18 @@ static bool next_command(char *line, size_t size)
     }
 }
 
+/* The clock has opened its FIFOs before the application starts, which may write to all files of a container: then nobody finds them.
+ * On the host its sandbox hides them. */
+static void hide_channels(void)
+{
+    struct pollfd commands = {command_file, POLLIN, 0};
+    if (getpid() != 1 || is_found || poll(&commands, 1, 0) <= 0)
+        return;
+    is_found = true;
+    unlinkat(folder_file, "command", 0);
+    unlinkat(folder_file, "reply", 0);
+}
+
 /* What the clock asks while it waits, and reports of who keeps it waiting. */
 static void attend(void)
 {
@@ -450,12 +463,13 @@ static unsigned begun_services(void)
     return count;
 }
 
-/* Until each service has a process; then to the start of the test. */
+/* Until each service has a process; then to the start of the test, or beyond it where a service came late. */
 static void start(void)
 {
     unsigned known = 0;
     int64_t since = wall_ns(), end = since + START_MOST_S * SECOND;
-    while (begun_services() < options.services && wall_ns() < end && !has_ended && !is_over) {
+    for (; begun_services() < options.services && wall_ns() < end && !has_ended && !is_over; usleep(2000)) {
+        hide_channels();
         if (begun_services() != known) {
             known = begun_services();
             since = wall_ns();
@@ -465,8 +479,8 @@ static void start(void)
             is_repeatable = false;
             run(options.start_ns + late);
         }
-        usleep(2000);
     }
+    hide_channels();
     run(options.begin_ns);
     begun_services();
     window_ns = 0;
@@ -482,6 +496,7 @@ static void serve(void)
             run(TIME_NEVER);
             return;
         }
+        hide_channels();
         if (!next_command(line, sizeof line)) {
             poll(&commands, 1, END_MS);
             continue;

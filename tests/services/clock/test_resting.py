@@ -45,7 +45,7 @@ def agent(folder: Path, answer: Answer = lambda until: [reached(until)]) -> Iter
     def serve() -> None:
         with os.fdopen(command, "rb", buffering=0) as lines:
             for line in iter(lines.readline, b"end\n"):
-                for each in answer(int(line.split()[1]) // 1000):
+                for each in answer(int(line.split()[1]) // 1000) if line != b"mine\n" else ():
                     os.write(reply, each if isinstance(each, bytes) else json.dumps(each).encode() + b"\n")
         os.close(reply)
 
@@ -128,6 +128,7 @@ def test_messages_count_when_they_were_sent_and_no_later_than_now(tmp_path: Path
         (1, {"processor_s": 0.5, "wall_s": 0.5}, "thread 'loop' of service 'eye' computed for 0.4 s without waiting; "),
         (1, {"processor_s": 0.3, "wall_s": 0.5}, ""),
         (2, {"processor_s": 0.3, "wall_s": 0.3}, "thread 'loop' of service 'eye' computed for 0.2 s without waiting; "),
+        (2, {"processor_s": 0.3, "state": "W"}, "went on and waited again and again in 0.2 s of computing"),
         (2, {"processor_s": 0.0, "wall_s": 2.5}, "did not wait within 2 s of wall time (state D); in lockstep"),
         (2, {"processor_s": 0.0, "wall_s": 1.5}, ""),
         (2, {"processor_s": "x", "wall_s": 9.0}, ""),
