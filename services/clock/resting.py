@@ -321,5 +321,6 @@ _SENTENCES = {
     "setuid": "service '{service}' started '{name}', which changes its user and so keeps the machine's time",
     "slots": "service '{service}' has more threads than DoDo's clock can serve ('{name}')",
     "page": "the application wrote into what gives it the test's time; DoDo put right what others read there",
+    "clone": "service '{service}' makes threads without the C library ('{name}'), which keep the machine's time",
     "spin": "a thread of service '{service}' asks for the time again and again without waiting ('{name}')",
 }

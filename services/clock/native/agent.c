@@ -305,7 +305,7 @@ static void report_busy(void)
 
 static int add_notes(char *text, size_t size)
 {
-    static const char *const kinds[] = {"", "static", "setuid", "slots", "spin"};
+    static const char *const kinds[] = {"", "static", "setuid", "slots", "spin", "clone"};
     uint32_t written = page->notes, first = notes_told;
     if (written - first > TIME_NOTES)
         first = written - TIME_NOTES;
@@ -317,7 +317,7 @@ static int add_notes(char *text, size_t size)
         char raw[sizeof note->name + 1] = {0}, name[sizeof raw];
         memcpy(raw, note->name, sizeof note->name);
         plain(name, raw, sizeof name);
-        if (kind == TIME_NOTE_NONE || kind > TIME_NOTE_SPIN)
+        if (kind == TIME_NOTE_NONE || kind > TIME_NOTE_CLONE)
             continue;
         length += snprintf(text + length, size - (size_t)length, "%s{\"kind\": \"%s\", \"service\": %u, \"name\": \"%s\"}",
                            length ? ", " : "", kinds[kind], note->service % TIME_SERVICES, name);

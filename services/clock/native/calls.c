@@ -65,7 +65,15 @@ PUBLIC long syscall(long number, ...)
         int error = clock_nanosleep((clockid_t)a[0], (int)a[1], P(2), P(3));
         return error ? fail_with(error) : 0;
     }
+    case SYS_clone:
+    case SYS_clone3:
+#ifdef __x86_64__
+    case SYS_fork:
+    case SYS_vfork:
+#endif
+        return answer(fork_by(number, a));
     case 449: /* futex_waitv: programs then wait for one word each */
+    case SYS_io_uring_setup: /* or for files otherwise */
         return fail_with(ENOSYS);
     case SYS_futex:
         if (is_ours((int)a[1]))

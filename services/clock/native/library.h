@@ -33,7 +33,7 @@ enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900, INT
 
 /* Functions of libc that are wrapped here and called there. */
 #define REAL_FUNCTIONS(X)                                                                                              \
-    X(fopen) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp)               \
+    X(clone) X(fopen) X(fork) X(fexecve) X(execve) X(execvpe) X(pclose) X(posix_spawn) X(posix_spawnp)               \
     X(pthread_barrier_wait) X(pthread_create) X(pthread_join) X(pthread_mutex_lock) X(pthread_mutex_trylock)           \
     X(pthread_mutex_unlock) X(pthread_once) X(pthread_rwlock_tryrdlock) X(pthread_rwlock_trywrlock)                    \
     X(pthread_rwlock_unlock) X(pthread_spin_trylock) X(pthread_tryjoin_np) X(sem_post) X(sem_trywait)                  \
@@ -89,6 +89,7 @@ void release_slot(void);
 uint32_t next_process_number(void);
 void before_fork(void);
 void in_forked_child(void);
+void forget_child(void); /* none was made */
 void block_signals(uint64_t *before);
 void restore_signals(const uint64_t *before);
 /* A lock for a moment, which no signal's handler of its holder can want. */
@@ -139,6 +140,8 @@ bool forget_timer_file(int file);
 
 void processes_start(void);
 void processes_after_fork(void);
+/* A system call that makes a process. */
+long fork_by(long number, const long *arguments);
 void draw(void *bytes, size_t size);
 bool is_random_file(int file);
 

@@ -390,6 +390,12 @@ void before_fork(void)
     child_slot = take_slot(child_process, 0);
 }
 
+void forget_child(void)
+{
+    if (child_slot != TIME_SLOTS)
+        page->slot[child_slot].state = TIME_FREE;
+}
+
 void in_forked_child(void)
 {
     process.number = child_process;

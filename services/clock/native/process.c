@@ -3,6 +3,8 @@
 #include "library.h"
 
 #include <aio.h>
+#include <linux/sched.h>
+#include <stdarg.h>
 #include <string.h>
 #include <sys/msg.h>
 #include <sys/resource.h>
@@ -166,16 +168,81 @@ void processes_after_fork(void)
     memset(children, 0, sizeof children);
 }
 
+static void after_fork(long child)
+{
+    if (child < 0)
+        forget_child();
+    add_child((int)child);
+}
+
 PUBLIC pid_t fork(void)
 {
     is_managed();
     pid_t child = real.fork();
-    add_child(child);
+    after_fork(child);
     return child;
 }
 
 /* The parent of a vfork waits until the child executes a program; that of a fork need not. */
 ALIAS(vfork, fork);
+
+/* Flags of a clone as those of a fork: memory that a waiting parent shares, it need not share. Of threads made so, nothing is known. */
+static uint64_t as_fork(uint64_t flags)
+{
+    if (flags & CLONE_VM && !(flags & CLONE_VFORK))
+        note(TIME_NOTE_CLONE, self.slot->name);
+    return flags & CLONE_VFORK ? flags & ~(uint64_t)(CLONE_VM | CLONE_VFORK) : flags;
+}
+
+struct cloned {
+    int (*routine)(void *);
+    void *argument;
+};
+
+static int begin_cloned(void *given)
+{
+    struct cloned *cloned = given;
+    in_forked_child();
+    _exit(cloned->routine(cloned->argument));
+}
+
+PUBLIC int clone(int (*routine)(void *), void *stack, int given, void *argument, ...)
+{
+    va_list more;
+    va_start(more, argument);
+    void *parent = va_arg(more, void *), *local = va_arg(more, void *), *own = va_arg(more, void *);
+    va_end(more);
+    int flags = is_managed() ? (int)as_fork((uint32_t)given) : given;
+    if (!self.slot || flags & CLONE_VM)
+        return real.clone(routine, stack, flags, argument, parent, local, own);
+    struct cloned cloned = {routine, argument};
+    before_fork();
+    int child = real.clone(begin_cloned, stack, flags, &cloned, parent, local, own);
+    after_fork(child);
+    return child;
+}
+
+long fork_by(long number, const long *given)
+{
+    struct clone_args wanted = {.exit_signal = SIGCHLD};
+    long first = given[0], size = given[1];
+    if (number == SYS_clone)
+        first = (long)as_fork((uint64_t)first);
+    if (number == SYS_clone3 && size >= 64 && size <= (long)sizeof wanted) {
+        memcpy(&wanted, (void *)first, (size_t)size);
+        wanted.flags = as_fork(wanted.flags);
+        first = (long)&wanted;
+    }
+    if ((number == SYS_clone ? (uint64_t)first : wanted.flags) & CLONE_VM)
+        return RAW_6(number, first, size, given[2], given[3], given[4], 0);
+    before_fork();
+    long child = RAW_6(number, first, size, given[2], given[3], given[4], 0);
+    if (!child)
+        in_forked_child();
+    else
+        after_fork(child);
+    return child;
+}
 
 /* Until a child may have ended: 0 or EINTR. In wait4 itself, a thread seems to sleep while it takes the child's status,
  * and the agent would let time go on. */

@@ -23,7 +23,7 @@ enum time_state { TIME_FREE, TIME_RUNNING, TIME_WAITING, TIME_READY, TIME_GRANTE
 /* What it waits for. The kernel wakes those of kind FD and KERNEL, the agent or a waker all others. */
 enum time_kind { TIME_START, TIME_SLEEP, TIME_COND, TIME_LOCK, TIME_FD, TIME_KERNEL };
 
-enum time_note { TIME_NOTE_NONE, TIME_NOTE_STATIC, TIME_NOTE_SETUID, TIME_NOTE_SLOTS, TIME_NOTE_SPIN };
+enum time_note { TIME_NOTE_NONE, TIME_NOTE_STATIC, TIME_NOTE_SETUID, TIME_NOTE_SLOTS, TIME_NOTE_SPIN, TIME_NOTE_CLONE };
 
 struct time_slot {
     _Atomic uint32_t state;
