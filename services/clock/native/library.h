@@ -21,7 +21,6 @@
 #include <stdlib.h>
 #include <sys/syscall.h>
 #include <sys/types.h>
-#include <threads.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -29,7 +28,7 @@
 #define ALIAS(name, of) PUBLIC __typeof__(of) name __attribute__((alias(#of)))
 #define NANOSECONDS INT64_C(1000000000)
 
-enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900, INTERRUPTION = 63 /* a signal of ours */ };
+enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900 };
 
 /* Functions of libc that are wrapped here and called there. */
 #define REAL_FUNCTIONS(X)                                                                                              \
@@ -129,9 +128,6 @@ void files_after_fork(void);
 
 /* -- timers.c ------------------------------------------------------------------------------------------------------- */
 
-/* Interrupts this thread's kernel wait at the deadline, unless `interrupt_end` comes before. */
-int interrupt_at(int64_t deadline_ns);
-void interrupt_end(int timer);
 void timers_after_fork(void);
 /* Before the application closes a descriptor: false if it is ours. */
 bool forget_timer_file(int file);
@@ -194,18 +190,6 @@ static inline int fail_with(int error)
     errno = error;
     return -1;
 }
-
-static inline int in_c11(int error)
-{
-    return error == 0 ? thrd_success : error == ETIMEDOUT ? thrd_timedout : error == EBUSY ? thrd_busy : thrd_error;
-}
-
-/* What C11 calls otherwise. */
-#define IN_C11(name, type, of)                                                                                         \
-    PUBLIC int name(type *object)                                                                                      \
-    {                                                                                                                  \
-        return in_c11(of((void *)object));                                                                             \
-    }
 
 /* What glibc and musl have in different places, and what only one of them has: the library, compiled with glibc, runs in programs of both.
  * musl takes libc.so.6 for itself and looks at no versions, so it is enough to need no function that it lacks. */

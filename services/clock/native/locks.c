@@ -103,15 +103,6 @@ PUBLIC int pthread_mutex_timedlock(pthread_mutex_t *restrict mutex, const struct
     return pthread_mutex_clocklock(mutex, CLOCK_REALTIME, until);
 }
 
-IN_C11(mtx_lock, mtx_t, pthread_mutex_lock)
-IN_C11(mtx_unlock, mtx_t, pthread_mutex_unlock)
-IN_C11(mtx_trylock, mtx_t, pthread_mutex_trylock)
-
-PUBLIC int mtx_timedlock(mtx_t *restrict mutex, const struct timespec *restrict until)
-{
-    return in_c11(pthread_mutex_timedlock((pthread_mutex_t *)mutex, until));
-}
-
 /* -- locks of readers and writers ----------------------------------------------------------------------------------- */
 
 static int try_to_read(void *lock)

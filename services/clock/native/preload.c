@@ -333,8 +333,11 @@ bool is_managed(void)
         return false;
     if (stage == NEW)
         start();
-    else /* not begun by pthread_create */
+    else { /* not begun by pthread_create */
         adopt_slot(take_slot(process.number, process.threads++));
+        if (self.slot)
+            note(TIME_NOTE_CLONE, self.slot->name);
+    }
     return self.slot != NULL;
 }
 

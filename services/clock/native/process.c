@@ -2,11 +2,9 @@
 #define _GNU_SOURCE
 #include "library.h"
 
-#include <aio.h>
 #include <linux/sched.h>
 #include <stdarg.h>
 #include <string.h>
-#include <sys/msg.h>
 #include <sys/resource.h>
 #include <sys/sem.h>
 #include <sys/wait.h>
@@ -87,62 +85,6 @@ PUBLIC int pthread_join(pthread_t thread, void **result)
     int error = real.pthread_join(thread, result);
     leave_kernel();
     return error;
-}
-
-PUBLIC int pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until)
-{
-    if (!until || !is_managed())
-        return pthread_join(thread, result);
-    if (!is_valid(until))
-        return EINVAL;
-    int64_t deadline = deadline_on(clock, until);
-    int error;
-    while ((error = real.pthread_tryjoin_np(thread, result)) == EBUSY) {
-        if (now_ns() >= deadline)
-            return ETIMEDOUT;
-        int64_t again = later(now_ns(), RETRY_NS);
-        sleep_until(again < deadline ? again : deadline);
-    }
-    return error;
-}
-
-PUBLIC int pthread_timedjoin_np(pthread_t thread, void **result, const struct timespec *until)
-{
-    return pthread_clockjoin_np(thread, result, CLOCK_REALTIME, until);
-}
-
-struct c11_beginning {
-    thrd_start_t routine;
-    void *argument;
-};
-
-static void *begin_c11(void *given)
-{
-    struct c11_beginning beginning = *(struct c11_beginning *)given;
-    free(given);
-    return (void *)(intptr_t)beginning.routine(beginning.argument);
-}
-
-PUBLIC int thrd_create(thrd_t *thread, thrd_start_t routine, void *argument)
-{
-    struct c11_beginning *beginning = malloc(sizeof *beginning);
-    if (!beginning)
-        return thrd_nomem;
-    *beginning = (struct c11_beginning){routine, argument};
-    int error = pthread_create(thread, NULL, begin_c11, beginning);
-    if (error)
-        free(beginning);
-    return error == EAGAIN ? thrd_nomem : error ? thrd_error : thrd_success;
-}
-
-PUBLIC int thrd_join(thrd_t thread, int *result)
-{
-    void *value;
-    if (pthread_join(thread, &value))
-        return thrd_error;
-    if (result)
-        *result = (int)(intptr_t)value;
-    return thrd_success;
 }
 
 /* -- processes ------------------------------------------------------------------------------------------------------ */
@@ -335,46 +277,23 @@ PUBLIC int semtimedop(int id, struct sembuf *operations, size_t count, const str
     if (!is_managed())
         return (int)answer(RAW_4(SYS_semtimedop, id, operations, count, timeout));
     int64_t deadline = timeout ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
-    if (now_ns() >= deadline)
-        return count_spin(), fail_with(EAGAIN);
-    int timer = interrupt_at(deadline);
-    enter_kernel();
-    result = RAW_4(SYS_semtimedop, id, operations, count, NULL);
-    leave_kernel();
-    interrupt_end(timer);
-    return (int)answer(result == -EINTR && now_ns() >= deadline ? -EAGAIN : result);
-}
-
-/* Threads of libc read and write meanwhile, unseen. */
-PUBLIC int aio_suspend(const struct aiocb *const list[], int count, const struct timespec *timeout)
-{
-    int64_t deadline = timeout && is_managed() ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
-    for (;;) {
-        for (int at = 0; at < count; at++)
-            if (list[at] && aio_error(list[at]) != EINPROGRESS)
-                return 0;
-        int64_t again = later(now_ns(), RETRY_NS);
-        if (now_ns() >= deadline)
-            return fail_with(EAGAIN);
-        if (sleep_until(again < deadline ? again : deadline) == EINTR)
-            return fail_with(EINTR);
+    if (deadline == TIME_NEVER) {
+        enter_kernel();
+        result = RAW_4(SYS_semtimedop, id, operations, count, NULL);
+        leave_kernel();
     }
+    while (result == -EAGAIN && now_ns() < deadline) {
+        int64_t again = later(now_ns(), RETRY_NS);
+        if (sleep_until(again < deadline ? again : deadline))
+            return fail_with(EINTR);
+        result = RAW_4(SYS_semtimedop, id, at_once, count, NULL);
+    }
+    return (int)answer(result);
 }
 
 PUBLIC int semop(int id, struct sembuf *operations, size_t count)
 {
     return semtimedop(id, operations, count, NULL);
-}
-
-PUBLIC ssize_t msgrcv(int id, void *message, size_t size, long type, int flags)
-{
-    long result = RAW_6(SYS_msgrcv, id, message, size, type, flags | IPC_NOWAIT, 0);
-    if (result != -ENOMSG || flags & IPC_NOWAIT)
-        return answer(result);
-    enter_kernel();
-    result = RAW_6(SYS_msgrcv, id, message, size, type, flags, 0);
-    leave_kernel();
-    return answer(result);
 }
 
 PUBLIC int system(const char *command)

@@ -65,11 +65,7 @@ PUBLIC uint32_t arc4random(void)
 
 PUBLIC uint32_t arc4random_uniform(uint32_t bound)
 {
-    uint32_t lowest = bound < 2 ? 0 : -bound % bound, value; /* below that, some numbers would come more often */
-    do
-        value = arc4random();
-    while (value < lowest);
-    return bound < 2 ? 0 : value % bound;
+    return (uint32_t)((uint64_t)arc4random() * bound >> 32);
 }
 
 /* std::random_device, which may ask the processor instead of the kernel. */

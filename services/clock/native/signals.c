@@ -6,6 +6,7 @@
 #include "library.h"
 
 #include <string.h>
+#include <sys/signalfd.h>
 
 static struct sigaction handlers[NSIG];
 
@@ -63,13 +64,6 @@ PUBLIC sighandler_t signal(int number, sighandler_t handler)
     return sigaction(number, &wanted, &before) ? SIG_ERR : before.sa_handler;
 }
 
-PUBLIC sighandler_t __sysv_signal(int number, sighandler_t handler)
-{
-    struct sigaction wanted = {.sa_handler = handler, .sa_flags = SA_RESETHAND | SA_NODEFER}, before;
-    sigemptyset(&wanted.sa_mask);
-    return sigaction(number, &wanted, &before) ? SIG_ERR : before.sa_handler;
-}
-
 /* -- waits for signals ---------------------------------------------------------------------------------------------- */
 
 PUBLIC int pause(void)
@@ -94,22 +88,15 @@ PUBLIC int sigtimedwait(const sigset_t *restrict wanted, siginfo_t *restrict abo
                         const struct timespec *restrict timeout)
 {
     struct timespec none = {0, 0};
-    long result = RAW_4(SYS_rt_sigtimedwait, wanted, about, &none, 8);
-    if (result != -EAGAIN || !is_managed())
-        return (int)answer(result);
     if (timeout && !is_valid(timeout))
         return fail_with(EINVAL);
-    int64_t deadline = timeout ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
-    if (now_ns() >= deadline)
-        return count_spin(), fail_with(EAGAIN);
-    int timer = interrupt_at(deadline);
-    enter_kernel();
-    result = RAW_4(SYS_rt_sigtimedwait, wanted, about, NULL, 8);
-    leave_kernel();
-    interrupt_end(timer);
-    if (result == -EINTR && now_ns() >= deadline)
-        result = -EAGAIN;
-    return (int)answer(result);
+    int64_t deadline = timeout && is_managed() ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
+    int file = (int)RAW_4(SYS_signalfd4, -1, wanted, 8, SFD_CLOEXEC), error = file < 0 ? -file : 0;
+    long result;
+    while ((result = RAW_4(SYS_rt_sigtimedwait, wanted, about, &none, 8)) == -EAGAIN && !error)
+        error = await_file(file, POLLIN, deadline);
+    RAW_1(SYS_close, file);
+    return (int)answer(result == -EAGAIN && error != ETIMEDOUT ? -error : result);
 }
 
 PUBLIC int sigwaitinfo(const sigset_t *restrict wanted, siginfo_t *restrict about)

@@ -163,19 +163,8 @@ PUBLIC unsigned sleep(unsigned seconds)
     return (unsigned)left.tv_sec + (left.tv_nsec > 0);
 }
 
-PUBLIC int thrd_sleep(const struct timespec *wanted, struct timespec *left)
-{
-    int error = clock_nanosleep(CLOCK_REALTIME, 0, wanted, left);
-    return error == 0 ? 0 : error == EINTR ? -1 : -2;
-}
-
 PUBLIC int sched_yield(void)
 {
     count_spin();
     return is_managed() ? 0 : (int)answer(RAW_1(SYS_sched_yield, 0)); /* no other thread may run meanwhile */
-}
-
-PUBLIC void thrd_yield(void)
-{
-    sched_yield();
 }

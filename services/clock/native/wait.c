@@ -210,19 +210,6 @@ PUBLIC int pthread_cond_broadcast(pthread_cond_t *cond)
     return 0;
 }
 
-PUBLIC int cnd_wait(cnd_t *cond, mtx_t *mutex)
-{
-    return in_c11(pthread_cond_wait((pthread_cond_t *)cond, (pthread_mutex_t *)mutex));
-}
-
-PUBLIC int cnd_timedwait(cnd_t *restrict cond, mtx_t *restrict mutex, const struct timespec *restrict until)
-{
-    return in_c11(pthread_cond_timedwait((pthread_cond_t *)cond, (pthread_mutex_t *)mutex, until));
-}
-
-IN_C11(cnd_signal, cnd_t, pthread_cond_signal)
-IN_C11(cnd_broadcast, cnd_t, pthread_cond_broadcast)
-
 /* -- semaphores ----------------------------------------------------------------------------------------------------- */
 
 static bool is_shared_semaphore(const sem_t *semaphore)

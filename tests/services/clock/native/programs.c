@@ -1,6 +1,5 @@
 /* What tests of the test's time run: each program prints what it did, and when, in ms since it began. */
 #define _GNU_SOURCE
-#include <aio.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/futex.h>
@@ -8,6 +7,7 @@
 #include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
+#include <sched.h>
 #include <semaphore.h>
 #include <signal.h>
 #include <spawn.h>
@@ -304,12 +304,6 @@ static void queues(void)
     say("sent", mq_send(queue, "x", 1, 0));
     until = from_now(CLOCK_REALTIME, 20);
     say("full", mq_timedsend(queue, "x", 1, 0, &until));
-    if (pipe(pair))
-        exit(1);
-    struct aiocb request = {.aio_fildes = pair[0], .aio_buf = &byte, .aio_nbytes = 1};
-    const struct aiocb *requests[] = {&request};
-    aio_read(&request);
-    say("aio", aio_suspend(requests, 1, &timeout));
     struct epoll_event event;
     int epoll = epoll_create1(0);
     say("epoll", syscall(SYS_epoll_pwait2, epoll, &event, 1, &timeout, NULL, 0));
@@ -429,8 +423,15 @@ static void system_v(void)
 
 extern char **environ;
 
+static int nap_too(void *unused)
+{
+    usleep(10000);
+    return unused ? 0 : 7;
+}
+
 static void forks(void)
 {
+    static char stack[1 << 16] __attribute__((aligned(16)));
     int status;
     pid_t child = fork();
     if (!child) {
@@ -451,6 +452,16 @@ static void forks(void)
     waitpid(child, &status, 0);
     say("spawned", WEXITSTATUS(status));
     say("system", WEXITSTATUS(system("sleep 1; exit 4")));
+    if (!syscall(SYS_clone, SIGCHLD, NULL, NULL, NULL, NULL)) {
+        usleep(10000);
+        _exit(6);
+    }
+    wait(&status);
+    say("cloned", WEXITSTATUS(status));
+    clone(nap_too, &stack[sizeof stack], CLONE_VM | CLONE_VFORK | SIGCHLD, NULL);
+    wait(&status);
+    say("cloned", WEXITSTATUS(status));
+    say("uring", syscall(SYS_io_uring_setup, 1, NULL));
     /* what a process killed at any moment leaves stops nobody */
     child = fork();
     if (!child)

@@ -21,7 +21,7 @@ WAITS = {
         "recv -1 at 100, recv 1 at 110, none -1 at 110, pipe 0 at 110, read 1 at 120, nothing 0 at 130"
     ),
     "queues": (
-        "timed -1 at 20, received 1 at 30, sent 0 at 30, full -1 at 50, aio -1 at 70, epoll 0 at 90, select 0 at 110"
+        "timed -1 at 20, received 1 at 30, sent 0 at 30, full -1 at 50, epoll 0 at 70, select 0 at 90"
     ),
     "numbers": "fclose 0 at 0, dup 100000 at 0, dup2 0 at 0, range 0 at 0, timer 1 at 10",
     "datagrams": "sent 1 at 7, got 1 at 7, stamped 0 at 7, then 7 at 7",
@@ -36,7 +36,7 @@ WAITS = {
     "system_v": "timed -1 at 25, taken 0 at 35, waited 1 at 35",
     "forks": (
         "child 0 at 20, ended 3 at 20, nap 0 at 35, executed 5 at 35, nap 0 at 50, spawned 5 at 50, system 4 at 1050, "
-        "killed 9 at 1060, end 0 at 1160"
+        "cloned 6 at 1060, cloned 7 at 1070, uring -1 at 1070, killed 9 at 1080, end 0 at 1180"
     ),
     "shares": "timed -1 at 20, posted 0 at 30",
     "spins": "clock 10008 at 10, yields 1 at 16",
