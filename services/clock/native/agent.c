@@ -45,9 +45,8 @@ static struct options {
     unsigned services;
     int64_t start_ns, begin_ns;
     uint64_t seed;
-    long clock_uid;
     bool nested, by_environment;
-} options = {.services = 1, .clock_uid = -1};
+} options = {.services = 1};
 
 static struct time_page *page;
 static int folder_file = -1, command_file = -1, reply_file = -1, wakers[TIME_SLOTS];
@@ -56,11 +55,10 @@ static bool is_overwritten, has_begun[TIME_SERVICES];
 static uint32_t waits_unseen[TIME_SLOTS]; /* one more than `wake` of a thread that was found to wait elsewhere, or has ended */
 static struct time_slot *last_granted;
 static int64_t window_ns, window_cpu_ns; /* when test time last went on by WINDOW_NS, and the agent's processor time then */
-static int64_t waits_since, listened, reported; /* wall time: for quiet; the last look for a command, and report */
+static int64_t waits_since, reported; /* wall time: for quiet, and since a report */
 static uint32_t notes_told;
 static volatile sig_atomic_t is_over;
-static bool is_repeatable = true, has_ended, is_serving; /* before that, the clock's commands wait */
-static bool is_found; /* the clock has said something */
+static bool is_repeatable = true, is_found; /* the clock has said something */
 
 static int64_t time_of(clockid_t clock)
 {
@@ -379,30 +377,23 @@ static void hide_channels(void)
     unlinkat(folder_file, "reply", 0);
 }
 
-/* What the clock asks while it waits, and reports of who keeps it waiting. */
-static void attend(void)
+/* Who keeps the clock waiting. */
+static void report_at_times(void)
 {
-    char line[64];
     int64_t now = wall_ns();
-    if (now - listened < END_MS * (SECOND / 1000))
-        return;
-    listened = now;
-    bool is_asked = is_serving && next_command(line, sizeof line);
-    has_ended |= is_asked && !strcmp(line, "end");
-    if (now - reported > REPORT_MS * (SECOND / 1000) || (is_asked && !strcmp(line, "who"))) {
+    if (now - reported > REPORT_MS * (SECOND / 1000)) {
         reported = now;
         report_busy();
     }
 }
 
-/* Waits until all threads sleep; false when the agent is to end. */
-static bool await_quiet(void)
+static void await_quiet(void)
 {
     int64_t asleep_since = 0;
     waits_since = wall_ns();
     int64_t nap = SHORTEST_NAP_US;
     processes_begin_wait();
-    for (bool is_new = true; !has_ended;) {
+    for (bool is_new = true;;) {
         uint32_t seen = page->activity;
         int64_t now = wall_ns();
         bool is_granted, runs = one_runs(&is_granted), is_off = true;
@@ -413,24 +404,24 @@ static bool await_quiet(void)
                 note_unseen_waits();
                 free_dead_slots();
                 repair_header();
-                return true;
+                return;
             }
         } else {
             asleep_since = 0;
         }
-        attend();
+        report_at_times();
         struct timespec pause = {0, nap * 1000};
         is_new = !futex(&page->activity, FUTEX_WAIT, seen, &pause) || errno == EAGAIN;
         nap = is_new ? SHORTEST_NAP_US : nap * 3 / 2 < LONGEST_NAP_US ? nap * 3 / 2 : LONGEST_NAP_US;
     }
-    return false;
 }
 
 /* Lets the application run until `limit_ns`: what is due before that, and what is ready. */
 static void run(int64_t limit_ns)
 {
-    listened = reported = wall_ns();
-    for (; await_quiet(); attend()) {
+    reported = wall_ns();
+    for (;; report_at_times()) {
+        await_quiet();
         if (now_ns - window_ns > WINDOW_NS) {
             window_ns = now_ns;
             window_cpu_ns = time_of(CLOCK_PROCESS_CPUTIME_ID);
@@ -468,7 +459,7 @@ static void start(void)
 {
     unsigned known = 0;
     int64_t since = wall_ns(), end = since + START_MOST_S * SECOND;
-    for (; begun_services() < options.services && wall_ns() < end && !has_ended && !is_over; usleep(2000)) {
+    for (; begun_services() < options.services && wall_ns() < end && !is_over; usleep(2000)) {
         hide_channels();
         if (begun_services() != known) {
             known = begun_services();
@@ -484,33 +475,22 @@ static void start(void)
     run(options.begin_ns);
     begun_services();
     window_ns = 0;
-    is_serving = true;
 }
 
 static void serve(void)
 {
-    while (!has_ended) {
-        char line[256];
-        struct pollfd commands = {command_file, POLLIN, 0};
-        if (is_over) {
-            run(TIME_NEVER);
-            return;
-        }
+    char line[256];
+    struct pollfd commands = {command_file, POLLIN, 0};
+    while (!is_over) {
         hide_channels();
         if (!next_command(line, sizeof line)) {
             poll(&commands, 1, END_MS);
-            continue;
-        }
-        if (!strncmp(line, "run ", 4)) {
+        } else if (!strncmp(line, "run ", 4)) {
             run(strtoll(line + 4, NULL, 10));
-            if (!has_ended)
-                report_time();
-        } else if (!strcmp(line, "who")) {
-            report_busy();
-        } else if (!strcmp(line, "end")) {
-            has_ended = true;
+            report_time();
         }
     }
+    run(TIME_NEVER);
 }
 
 /* -- setting up ----------------------------------------------------------------------------------------------------- */
@@ -528,8 +508,6 @@ static int make_channel(const char *name)
     char path[4096];
     make_fifo(name, 0600);
     path_of(path, sizeof path, name);
-    if (options.clock_uid >= 0 && chown(path, (uid_t)options.clock_uid, (gid_t)-1))
-        fail(path);
     int file = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW);
     if (file < 0)
         fail(path);
@@ -586,7 +564,7 @@ static void read_options(int count, char **words)
     static const struct option known[] = {
         {"folder", required_argument, NULL, 'f'}, {"services", required_argument, NULL, 'n'},
         {"start", required_argument, NULL, 's'}, {"begin", required_argument, NULL, 'b'},
-        {"seed", required_argument, NULL, 'r'}, {"clock-uid", required_argument, NULL, 'u'},
+        {"seed", required_argument, NULL, 'r'},
         {"nested", no_argument, NULL, 'p'}, {"version", no_argument, NULL, 'v'}, {"by-environment", no_argument, NULL, 'e'}, {0}};
     for (int option; (option = getopt_long(count, words, "", known, NULL)) != -1;)
         switch (option) {
@@ -595,7 +573,6 @@ static void read_options(int count, char **words)
         case 's': options.start_ns = strtoll(optarg, NULL, 10); break;
         case 'b': options.begin_ns = strtoll(optarg, NULL, 10); break;
         case 'r': options.seed = strtoull(optarg, NULL, 10); break;
-        case 'u': options.clock_uid = strtol(optarg, NULL, 10); break;
         case 'p': options.nested = true; break;
         case 'e': options.by_environment = true; break;
         case 'v': printf("%d\n", TIME_VERSION); exit(0);
@@ -603,7 +580,7 @@ static void read_options(int count, char **words)
         }
     if (!options.folder || options.services < 1 || options.services > TIME_SERVICES || options.begin_ns < options.start_ns) {
         fprintf(stderr, "dodo-time: expected --folder=F --services=1..64 --start=NS --begin=NS [--seed=N] "
-                        "[--clock-uid=UID] [--nested [--by-environment]]\n");
+                        "[--nested [--by-environment]]\n");
         exit(2);
     }
 }

@@ -113,25 +113,28 @@ static int64_t deadline_after(const struct timespec *timeout)
 
 /* -- poll ----------------------------------------------------------------------------------------------------------- */
 
+/* Repeats a call that does not wait until it has something; `wait_for_files` takes `copies`, and may write there. */
+#define UNTIL_READY(call, copies, count, deadline_ns, mask)                                                             \
+    for (bool is_first = true;; is_first = false) {                                                                     \
+        long ready = call;                                                                                              \
+        if (ready)                                                                                                      \
+            return (int)answer(ready);                                                                                  \
+        if (now_ns() >= deadline_ns) {                                                                                  \
+            if (is_first)                                                                                               \
+                count_spin();                                                                                           \
+            return 0;                                                                                                   \
+        }                                                                                                               \
+        if (wait_for_files(copies, count, deadline_ns, mask) == EINTR)                                                  \
+            return fail_with(EINTR);                                                                                    \
+    }
+
 static int poll_until(struct pollfd *files, nfds_t count, int64_t deadline_ns, const sigset_t *mask)
 {
     struct timespec none = {0, 0};
-    struct pollfd copies[count < MOST_FILES ? count + 1 : MOST_FILES + 1];
     unsigned waited = count < MOST_FILES ? (unsigned)count : MOST_FILES;
-    for (bool is_first = true;; is_first = false) {
-        long ready = raw(SYS_ppoll, (long)files, (long)count, (long)&none, (long)mask, SIGNALS_SIZE, 0);
-        if (ready)
-            return (int)answer(ready);
-        if (now_ns() >= deadline_ns) {
-            if (is_first)
-                count_spin();
-            return 0;
-        }
-        if (waited)
-            memcpy(copies, files, waited * sizeof *files);
-        if (wait_for_files(copies, waited, deadline_ns, mask) == EINTR)
-            return fail_with(EINTR);
-    }
+    struct pollfd copies[waited + 1];
+    memcpy(copies, files, waited * sizeof *files);
+    UNTIL_READY(raw(SYS_ppoll, (long)files, (long)count, (long)&none, (long)mask, SIGNALS_SIZE, 0), copies, waited, deadline_ns, mask)
 }
 
 PUBLIC int ppoll(struct pollfd *files, nfds_t count, const struct timespec *timeout, const sigset_t *mask)
@@ -186,37 +189,27 @@ static unsigned files_of(int end, const fd_set *reads, const fd_set *writes, con
     return count;
 }
 
-static long select_now(int end, fd_set *sets[3], const sigset_t *mask)
+/* A call that finds nothing empties the sets, so they are filled before each. */
+static long select_now(int end, fd_set *sets[3], unsigned long *kept[3], size_t size, const sigset_t *mask)
 {
     struct timespec none = {0, 0};
     struct { const sigset_t *mask; size_t size; } signals = {mask, SIGNALS_SIZE};
+    for (int at = 0; at < 3; at++)
+        if (sets[at])
+            memcpy(sets[at], kept[at], size);
     return RAW_6(SYS_pselect6, end, sets[0], sets[1], sets[2], &none, &signals);
 }
 
 static int select_until(int end, fd_set *sets[3], int64_t deadline_ns, const sigset_t *mask)
 {
     size_t size = end > 0 ? ((size_t)end + BITS - 1) / BITS * sizeof(long) : 0;
-    unsigned long kept[3][size / sizeof(long) + 1];
+    unsigned long wanted[3][size / sizeof(long) + 1], *kept[3] = {wanted[0], wanted[1], wanted[2]};
     struct pollfd files[MOST_FILES + 1];
     for (int at = 0; at < 3; at++)
         if (sets[at])
             memcpy(kept[at], sets[at], size);
     unsigned count = files_of(end, sets[0], sets[1], sets[2], files);
-    for (bool is_first = true;; is_first = false) {
-        long ready = select_now(end, sets, mask);
-        if (ready)
-            return (int)answer(ready);
-        if (now_ns() >= deadline_ns) {
-            if (is_first)
-                count_spin();
-            return 0;
-        }
-        if (wait_for_files(files, count, deadline_ns, mask) == EINTR)
-            return fail_with(EINTR);
-        for (int at = 0; at < 3; at++)
-            if (sets[at])
-                memcpy(sets[at], kept[at], size);
-    }
+    UNTIL_READY(select_now(end, sets, kept, size, mask), files, count, deadline_ns, mask)
 }
 
 PUBLIC int pselect(int end, fd_set *restrict reads, fd_set *restrict writes, fd_set *restrict others,
@@ -252,19 +245,8 @@ PUBLIC int select(int end, fd_set *restrict reads, fd_set *restrict writes, fd_s
 
 static int epoll_until(int file, struct epoll_event *events, int most, int64_t deadline_ns, const sigset_t *mask)
 {
-    for (bool is_first = true;; is_first = false) {
-        long ready = RAW_6(SYS_epoll_pwait, file, events, most, 0, mask, SIGNALS_SIZE);
-        if (ready)
-            return (int)answer(ready);
-        if (now_ns() >= deadline_ns) {
-            if (is_first)
-                count_spin();
-            return 0;
-        }
-        struct pollfd files[2] = {{.fd = file, .events = POLLIN}};
-        if (wait_for_files(files, 1, deadline_ns, mask) == EINTR)
-            return fail_with(EINTR);
-    }
+    struct pollfd files[2] = {{.fd = file, .events = POLLIN}};
+    UNTIL_READY(RAW_6(SYS_epoll_pwait, file, events, most, 0, mask, SIGNALS_SIZE), files, 1, deadline_ns, mask)
 }
 
 PUBLIC int epoll_pwait2(int file, struct epoll_event *events, int most, const struct timespec *timeout,

@@ -286,14 +286,6 @@ PUBLIC ssize_t sendmsg(int file, const struct msghdr *message, int flags)
     return error ? fail_with(error) : answer(RAW_3(SYS_sendmsg, file, message, flags));
 }
 
-PUBLIC int sendmmsg(int file, struct mmsghdr *messages, unsigned count, int flags)
-{
-    unsigned sent = 0;
-    for (ssize_t size; sent < count && (size = sendmsg(file, &messages[sent].msg_hdr, flags)) >= 0;)
-        messages[sent++].msg_len = (unsigned)size;
-    return sent || !count ? (int)sent : -1;
-}
-
 /* -- POSIX message queues, descriptors of the kernel's, too ----------------------------------------------------------- */
 
 static long on_queue(long number, mqd_t queue, const char *message, size_t size, uintptr_t priority,

@@ -279,18 +279,6 @@ PUBLIC int setitimer(__itimer_which_t which, const struct itimerval *restrict wa
     return 0;
 }
 
-PUBLIC int getitimer(__itimer_which_t which, struct itimerval *result)
-{
-    if (which != ITIMER_REAL || !is_managed())
-        return (int)answer(RAW_2(SYS_getitimer, which, result));
-    struct itimerspec left = {{0, 0}, {0, 0}};
-    if (timers[ITIMER].use != UNUSED)
-        left = left_of(&timers[ITIMER]);
-    *result = (struct itimerval){{left.it_interval.tv_sec, left.it_interval.tv_nsec / 1000},
-                                 {left.it_value.tv_sec, left.it_value.tv_nsec / 1000}};
-    return 0;
-}
-
 PUBLIC unsigned alarm(unsigned seconds)
 {
     struct itimerval wanted = {{0, 0}, {seconds, 0}}, before = {{0, 0}, {0, 0}};
