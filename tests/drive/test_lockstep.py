@@ -34,10 +34,6 @@ def run(folder: Path, manner: str, code: int, *words: str) -> tuple[dict[str, An
     return results(report)[CURVE], [line for line in log.splitlines() if line.startswith("picture")]
 
 
-def surplus(folder: Path) -> int:
-    return int(results(folder / "report")[CURVE]["response"]["surplus"])
-
-
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], list[str]]:
     """With an application that copies sample times and answers once; it hits a wall."""
@@ -65,19 +61,6 @@ def test_manners_and_the_host_s_bus_change_neither_values_nor_pictures(
     assert (test["reason"], test["checks"]) == (plain[0]["reason"], plain[0]["checks"])
     assert pictures[:known] == plain[1][:known]
     assert known >= len(plain[1]) - 1, "the last picture is shown as the test ends"
-    assert surplus(tmp_path) >= 2 * (known - 2)
-
-
-def own_clock(test: dict[str, Any]) -> list[str]:
-    return [note for note in test["notes"] if note.startswith("the application acts by its own clock: ")]
-
-
-def test_a_timer_of_its_own_is_noted(plain: tuple[dict[str, Any], list[str]], tmp_path: Path) -> None:
-    """And that of a program that only waits for frames is not."""
-    test, _ = run(tmp_path, "timer --period=0.005", 1)
-    assert own_clock(test) and test["response"]["unasked"] == test["response"]["pauses"] > 0
-    assert own_clock(plain[0]) == [] and plain[0]["response"]["pauses"] > 0
-    assert plain[0]["response"]["surplus"] == 0
 
 
 def test_no_answer_is_the_application_s_fault(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import os
 import selectors
-from collections.abc import AsyncIterator, Callable, Collection, Coroutine, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -94,8 +94,6 @@ class ScriptedBackend:
     """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
     printed: tuple[Unmatched, ...] = ()
     by_answers: bool = True
-    deaf: list[list[str]] = field(default_factory=list)
-    """What was announced with each begin."""
 
     def __post_init__(self) -> None:
         self.cid = self.plan.cid + 1
@@ -119,8 +117,7 @@ class ScriptedBackend:
         now = asyncio.get_running_loop().time()
         return None if self.listens is None else {name for name, since in self.listens.items() if since <= now}
 
-    async def begin(self, deaf: Iterable[str] = ()) -> None:
-        self.deaf.append([*deaf])
+    async def begin(self) -> None:
         await self._call("begin")
 
     async def use(self) -> Snapshot | None:

@@ -60,7 +60,8 @@ void count_spin(void)
         self.spin_ns = now;
         self.spins = 0;
     }
-    if (++self.spins <= MOST_SPINS)
+    bool is_starting = now == page->monotonic_base_ns + START_UPTIME_S * NANOSECONDS; /* libraries look at the clock as they are loaded */
+    if (++self.spins <= (is_starting ? MOST_START_SPINS : MOST_SPINS))
         return;
     if (!atomic_exchange(&is_noted, true))
         note(TIME_NOTE_SPIN, self.slot->name);

@@ -6,7 +6,7 @@ import os
 import platform
 import re
 import signal
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from io import StringIO
@@ -228,8 +228,8 @@ def interrupted(dodo: Command, count: int) -> tuple[int, str]:
     """``dodo run`` of one test, several times one after the other, interrupted in the first."""
 
     class Interrupts(ScriptedBackend):
-        async def begin(self, deaf: Iterable[str] = ()) -> None:
-            await super().begin(deaf)
+        async def begin(self) -> None:
+            await super().begin()
             os.kill(os.getpid(), signal.SIGINT)
 
     dodo.stages = stages()
@@ -286,8 +286,8 @@ def test_an_interrupt_waits_for_no_page_of_a_test_before(dodo: Command, monkeypa
         drawn.append(folder.name)
 
     class InterruptsLast(ScriptedBackend):
-        async def begin(self, deaf: Iterable[str] = ()) -> None:
-            await super().begin(deaf)
+        async def begin(self) -> None:
+            await super().begin()
             if self.plan.slug == "test--run-3":
                 async with asyncio.timeout(100):
                     while len(drawn) < 2:

@@ -145,7 +145,7 @@ CLOCKED = {
     response(p95_s="0.1"): None,
     response(uncopied=True): None,
     '{"dodo": "time", "seconds": 1.5}': Time(1.5, False),
-    '{"dodo": "started", "seconds": 0.02}': Started(0.02),
+    '{"dodo": "started"}': Started(),
     '{"dodo": "time", "seconds": 2, "last": true}': Time(2.0, True),
     '{"dodo": "time", "seconds": null}': None,
     '{"dodo": "time"}': None,

@@ -186,13 +186,15 @@ EVERYTHING = [
 
 
 @pytest.mark.thorough
-def test_seed_and_time_since_the_first_alone_decide_what_is_drawn_by_lot(camera):
+def test_seed_and_time_alone_decide_what_is_drawn_by_lot(camera):
     frames = [(0.0, 0.1, 0.0), (0.0, 0.13, 0.05)]
     first = camera(*EVERYTHING).shoot(*frames)
     later = camera(*EVERYTHING)
-    second = later.shoot(*frames, now=START + 7)
+    later.shoot((0.0, 0.9, 0.3), (0.1, 0.95, 0.4), now=START - 10 * STEP)
+    second = later.shoot(*frames)
     for one, other in zip(first[:3], second[:3], strict=True):
         assert np.array_equal(one, other)
+    assert first.outputs == second.outputs
     assert not np.array_equal(first.argb, later.shoot(frames[-1], frames[-1], now=START + STEP).argb)
 
 
