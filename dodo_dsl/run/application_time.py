@@ -26,6 +26,7 @@ from dodo_dsl.template_cache import cache_home
 LIBRARY, AGENT = "libdodo-time.so", "dodo-time"
 PAGE_DESTROYED = 3
 """The exit code of the agent when the application destroyed the page that both share."""
+POSIX_MEMORY = "CLUON_SHAREDMEMORY_POSIX"
 _BUILD_S = 120.0
 _OF_MAKE = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
 """Variables by which a make that has started DoDo would speak to this one."""
@@ -124,6 +125,8 @@ def _head(path: Path, size: int) -> bytes:
 
 def refusal(service: str, name: str, environment: Mapping[str, str], folder: Path) -> str:
     """Why a service whose program has this ``name`` cannot have the test's time; empty where nothing says so."""
+    if environment.get(POSIX_MEMORY) == "1":
+        return f"service '{service}' waits for frames in shared memory of POSIX ({POSIX_MEMORY}=1)"
     found = shutil.which(folder / name if "/" in name else name, path=environment.get("PATH", os.defpath))
     program = Path(found) if found else None
     for _ in range(_LONGEST_CHAIN):
