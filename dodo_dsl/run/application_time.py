@@ -67,7 +67,7 @@ def built() -> ApplicationTime:
             return ApplicationTime((ready / LIBRARY).resolve(), (ready / AGENT).resolve())
     digest = hashlib.sha256(b"\0".join([platform.machine().encode(), *(path.read_bytes() for path in files)]))
     try:
-        folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}")
+        folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}").resolve()
     except (OSError, KeyError) as error:
         raise BackendError(f"DoDo's library needs a cache folder of this user: {error}") from None
     with (folder / "lock").open("w") as lock:
@@ -75,7 +75,7 @@ def built() -> ApplicationTime:
         if not _is_ready(folder):
             _build(sources, folder)
             folder.chmod(0o755)  # programs of other users load it
-    return ApplicationTime((folder / LIBRARY).resolve(), (folder / AGENT).resolve())
+    return ApplicationTime(folder / LIBRARY, folder / AGENT)
 
 
 def _changed(path: Path) -> int:
