@@ -257,8 +257,6 @@ def _found(path: Path, drive: RecordedDrive, field: str) -> str:
         )
     if drive.retimed is not None:
         lines.append("its sample times are of several drives: the test has a copy with the times of receipt instead")
-    if not drive.cameras:
-        lines.append("the test is in real time, because lockstep can only wait for pictures")
     return "".join(f"{line}\n" for line in lines)
 
 

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 from google.protobuf.message import Message
@@ -19,13 +19,10 @@ ALIVE_S = 1.0
 TEST_BEGIN = "dodo.TestBegin"
 
 
-def begin_frame(seed: int, deaf: Iterable[str] = ()) -> bytes:
-    """``dodo.TestBegin`` as a datagram, with the current time as its sample time.
-
-    With ``deaf`` services, which do not listen to the bus yet, the test does not begin yet.
-    """
+def begin_frame(seed: int) -> bytes:
+    """``dodo.TestBegin`` as a datagram, with the current time as its sample time."""
     begin = MessageSet.standard().type(TEST_BEGIN)
-    return frame_of(begin(seed=seed, deaf=",".join(deaf)))
+    return frame_of(begin(seed=seed))
 
 
 def frame_of(

@@ -26,6 +26,7 @@ from dodo_dsl.template_cache import cache_home
 LIBRARY, AGENT = "libdodo-time.so", "dodo-time"
 PAGE_DESTROYED = 3
 """The exit code of the agent when the application destroyed the page that both share."""
+POSIX_MEMORY = "CLUON_SHAREDMEMORY_POSIX"
 _BUILD_S = 120.0
 _OF_MAKE = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
 """Variables by which a make that has started DoDo would speak to this one."""
@@ -66,7 +67,7 @@ def built() -> ApplicationTime:
             return ApplicationTime((ready / LIBRARY).resolve(), (ready / AGENT).resolve())
     digest = hashlib.sha256(b"\0".join([platform.machine().encode(), *(path.read_bytes() for path in files)]))
     try:
-        folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}")
+        folder = secured(secured(cache_home() / "dodo") / f"time-{digest.hexdigest()[:16]}").resolve()
     except (OSError, KeyError) as error:
         raise BackendError(f"DoDo's library needs a cache folder of this user: {error}") from None
     with (folder / "lock").open("w") as lock:
@@ -74,7 +75,7 @@ def built() -> ApplicationTime:
         if not _is_ready(folder):
             _build(sources, folder)
             folder.chmod(0o755)  # programs of other users load it
-    return ApplicationTime((folder / LIBRARY).resolve(), (folder / AGENT).resolve())
+    return ApplicationTime(folder / LIBRARY, folder / AGENT)
 
 
 def _changed(path: Path) -> int:
@@ -124,6 +125,8 @@ def _head(path: Path, size: int) -> bytes:
 
 def refusal(service: str, name: str, environment: Mapping[str, str], folder: Path) -> str:
     """Why a service whose program has this ``name`` cannot have the test's time; empty where nothing says so."""
+    if environment.get(POSIX_MEMORY) == "1":
+        return f"service '{service}' waits for frames in shared memory of POSIX ({POSIX_MEMORY}=1)"
     found = shutil.which(folder / name if "/" in name else name, path=environment.get("PATH", os.defpath))
     program = Path(found) if found else None
     for _ in range(_LONGEST_CHAIN):

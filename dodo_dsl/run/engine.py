@@ -158,22 +158,19 @@ class Engine:
     async def _until_listening(self) -> None:
         """Waits for the application's services that consume messages: what comes before they listen is lost.
 
-        Where the application's time is the test's, it goes on meanwhile only as the clock lets it.
+        Where its time is the test's, it goes on only in the test: then this waits until it rests.
         """
         waits = {s.name for s in self.plan.application.services if s.inputs}
-        begin, is_stepped = self._now(), self.plan.lockstep is not None and not self.backend.by_answers
-        while waits or is_stepped:
-            passed_s = self.state.started_s if is_stepped else self._now() - begin
-            if passed_s is not None:
-                listeners = await self.backend.listeners() if waits else None
-                waits = set() if listeners is None else waits - {*listeners}
-                if waits and passed_s >= LISTEN_PATIENCE_S:
-                    self.state.notes.append(deaf(sorted(waits), LISTEN_PATIENCE_S))
-                if not waits or passed_s >= LISTEN_PATIENCE_S:
-                    return
-                if is_stepped:
-                    self.state.started_s = None
-                    await self.backend.begin(sorted(waits))
+        deadline = self._now() + LISTEN_PATIENCE_S
+        if self.plan.lockstep and not self.backend.by_answers:
+            while not self.state.has_started:
+                if event := await self._next(math.inf):
+                    self.state.take(event)
+            return
+        while waits and (listeners := await self.backend.listeners()) is not None and (waits := waits - {*listeners}):
+            if self._now() >= deadline:
+                self.state.notes.append(deaf(sorted(waits), LISTEN_PATIENCE_S))
+                return
             if event := await self._next(self._now() + LISTEN_PERIOD_S):
                 self.state.take(event)
 

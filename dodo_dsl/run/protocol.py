@@ -1,6 +1,6 @@
 """What a backend is, and the events that it reports to the engine while a test runs."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, Protocol
 
@@ -89,9 +89,7 @@ class Time(Struct, tag_field="dodo", tag="time", frozen=True):
 
 
 class Started(Struct, tag_field="dodo", tag="started", frozen=True):
-    """The application rests in lockstep, ``seconds`` after its start, and waits for pictures where there are any."""
-
-    seconds: float
+    """The application has started in lockstep, and rests."""
 
 
 class Responded(Struct, tag_field="dodo", tag="response", frozen=True):
@@ -248,8 +246,8 @@ class Backend(Running, Protocol):
         """Whether the application keeps the machine's time in lockstep."""
         ...
 
-    async def begin(self, deaf: Iterable[str] = ()) -> None:
-        """Announces that everything is ready, or which services are ``deaf`` yet; may be repeated."""
+    async def begin(self) -> None:
+        """Announces on the test's bus that everything is ready; may be repeated."""
         ...
 
     def tail(self, service: str) -> list[str]:

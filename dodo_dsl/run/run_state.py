@@ -78,8 +78,8 @@ class RunState:
     late: dict[str, Late] = field(default_factory=dict)
     paused: dict[str, float] = field(default_factory=dict)
     load: MachineLoad | None = None
-    started_s: float | None = None
-    """For how long the application has run when it waited at last, in lockstep; None when that is dealt with."""
+    has_started: bool = False
+    """Whether the application rests in lockstep."""
     response: Response | None = None
     notes: list[str] = field(default_factory=list)
     began: float | None = None
@@ -177,8 +177,8 @@ class RunState:
                 self.input_ended = True
             case Time():
                 self.time = event
-            case Started(seconds):
-                self.started_s = seconds
+            case Started():
+                self.has_started = True
             case Responded(answers):
                 self.response = answers
 

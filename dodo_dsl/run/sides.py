@@ -181,9 +181,9 @@ class Sides:
     def by_answers(self) -> bool:
         return self._watched.by_answers
 
-    async def begin(self, deaf: Iterable[str] = ()) -> None:
+    async def begin(self) -> None:
         assert self._send is not None, "the application was started"
-        self._send(begin_frame(self._watched.plan.seed, deaf), hearers(self._watched.plan))
+        self._send(begin_frame(self._watched.plan.seed), hearers(self._watched.plan))
 
     async def use(self) -> Snapshot | None:
         """What all have used; the load of the machine is measured if both sides know it."""

@@ -32,7 +32,7 @@ PEDAL_BLIND = 0.05
 STOP, SLOW = 0.45, 1.0  # m to another car, from below the camera: between the two it slows down
 BESIDE = 0.25  # m to the side, beyond which a car is not in the way
 FRAMES_BLIND = 10  # then stop
-ASKS, LISTENS = 1, 2  # sender stamps of perception's question and of the answer
+ASKS, LISTENS = 1, 2  # sender stamps of perception's question, and that steering listens
 
 HEARD = (
     "opendlv.logic.perception.DetectionProperty",
@@ -132,13 +132,19 @@ class Frames:
         return found["yellow"], found["blue"], found["car"]
 
 
+def say_that_it_listens(session: Session) -> None:
+    """For perception, which may have started before."""
+    status = session.messages.type("opendlv.system.SystemStatusMessage")
+    session.send(status(description="steering listens"), sender_stamp=LISTENS)
+
+
 def handle(session: Session, envelope: Envelope, frames: Frames, driver: Driver, verbose: bool) -> None:
     """Collect a detection, or answer the frame that is complete, or the question whether this program listens."""
     message = session.messages.decode(envelope.data_type, envelope.payload)
     kind = message.DESCRIPTOR.name
     if kind == "SystemStatusMessage":
         if envelope.sender_stamp == ASKS:
-            session.send(type(message)(description="steering listens"), sender_stamp=LISTENS)
+            say_that_it_listens(session)
     elif kind != "ImageReadingShm":
         frames.hear(message)
     else:
@@ -161,6 +167,7 @@ def main() -> int:
     frames, driver = Frames(), Driver(flags.reverse)
     with Session(flags.cid) as session:
         session.hear_only(session.messages.id(name) for name in HEARD)
+        say_that_it_listens(session)
         while True:
             envelope = session.receive(None)
             if envelope:

@@ -104,7 +104,7 @@ class Announcer:
 
 
 EPOCH = 1_700_000_000_000_000
-"""The time at which applications start in lockstep, and tests begin by default, in microseconds since the epoch."""
+"""The time at which every test in lockstep begins, in microseconds since the epoch."""
 
 LONGEST = 2 * 86_400_000_000
 """Longest test, in microseconds."""
@@ -255,7 +255,7 @@ class LockstepClock:
             self._observer.flush(inbox)
 
     def _steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
-        number, begin = 0, 0
+        number, due = 0, EPOCH
         while (command := self._command(inbox, stopped)) is not None:
             if isinstance(command, Show):
                 if not self._show(command, stopped):
@@ -264,9 +264,7 @@ class LockstepClock:
             if inbox.observes:
                 self._observer.deliver(inbox, command.time, command.messages)
             messages = in_order(command.messages)
-            if not begin and command.time >= EPOCH:  # the step before only asks what the service consumes
-                begin = due = command.time
-            while begin and due <= command.time:
+            while due <= command.time:
                 while messages and messages[0][0] <= due:
                     self._hand(messages.popleft()[1], inbox)
                 if stopped():
@@ -274,7 +272,7 @@ class LockstepClock:
                 self._now = due
                 yield due
                 number += 1
-                due = begin + round(number * period)
+                due = EPOCH + round(number * period)
             self._now = command.time
             for _, envelope in messages:
                 self._hand(envelope, inbox)

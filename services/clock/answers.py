@@ -157,10 +157,9 @@ class AnsweringApplication:
         """Nothing is measured: what it waits for a processor is not known."""
         return {}
 
-    def start(self, now: int, cameras: Collection[str]) -> int:
+    def start(self, now: int, cameras: Collection[str]) -> None:
         """It may still be starting: the first picture waits for it."""
         self._has_cameras = bool(cameras)
-        return now
 
     def expect(self, now: int) -> None:
         """Without cameras, it answers what services are about to send in the step of this time (us)."""

@@ -33,7 +33,7 @@ class Application(Protocol):
     waited_first: float
     waited: float
 
-    def start(self, now: int, cameras: Collection[str]) -> int: ...
+    def start(self, now: int, cameras: Collection[str]) -> None: ...
     def expect(self, now: int) -> None: ...
     def show(self, shown: Sequence[Done], now: int) -> None: ...
     def await_answer(self, until: int) -> None: ...
@@ -50,8 +50,6 @@ class Stepper:
     application: Application
     link: ServiceLink
     stopped: IsStopped
-    begin: int = EPOCH
-    """When the test begins (us)."""
     now: int = EPOCH
     reached: int = EPOCH
     """The last step that the evaluators have finished."""
@@ -86,16 +84,12 @@ class Stepper:
         self._consumed = {r.service: frozenset(r.about.consumes) for r in results if r.about and r.about.consumes}
 
     def start(self) -> None:
-        """Let the application start, or go on for a while if it has, as it needs it before the test can begin.
-
-        Raises ApplicationSilent and ServiceSilent.
-        """
-        self.begin = self.now = self.reached = self.application.start(self.begin, self._cameras)
-        self._exact = Fraction(self.begin)
+        """Let the application start, until it rests; raises ApplicationSilent and ServiceSilent."""
+        self.application.start(self.now, self._cameras)
 
     def run(self, begin: Envelope) -> None:
         """Until all evaluators have ended; raises ApplicationSilent, ServiceSilent and TimeOver."""
-        self._deliver([begin._replace(sample_time=self.begin, received=0)], "")
+        self._deliver([begin._replace(sample_time=EPOCH, received=0)], "")
         while not self.stopped():
             self.application.expect(self.now)
             going = self._go_each((*self.roles.advance, *self.roles.sense))
@@ -108,7 +102,7 @@ class Stepper:
                     return
             finally:
                 self._watch()
-            if self.now - self.begin >= self.timeout and not self._is_over():
+            if self.now - EPOCH >= self.timeout and not self._is_over():
                 raise TimeOver
             self._deliver(self.application.collect(), "")
             self._go_on()

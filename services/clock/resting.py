@@ -33,8 +33,8 @@ PATIENCE_S = 60.0
 """Wall time in s for an application that goes on without reaching the time, and for a camera."""
 WALL_FACTOR = 10.0
 """How many times as long as it may compute a thread may take of wall time: others may have the processor."""
-START_US, MOST_START_US = 10_000, 10_000_000
-"""Steps of its own time for an application that does not wait for pictures yet, and the longest that it has."""
+LOOK_US, MOST_UNREAD_US = 10_000, 10_000_000
+"""Test time between looks whether an application waits for its first picture, and the longest that it may not."""
 _NS = 1000
 _MOST_NOTES = 64
 
@@ -167,7 +167,10 @@ class RestingApplication:
         self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
         self._names, self._note = names, note
         self._noted: set[str] = set()
-        self._is_started = False
+        self._unread: set[str] = set()
+        """Cameras whose pictures nobody has waited for yet."""
+        self._held: list[str] = []
+        """Those of them that have a new one."""
         self._shown_at = self._until = 0
         self._taken_s = 0.0
         """What it has computed in this step."""
@@ -177,24 +180,12 @@ class RestingApplication:
         facts = self.response.facts()
         return facts and {**facts, "uncopied": self.answers.uncopied}
 
-    def start(self, now: int, cameras: Collection[str]) -> int:
-        """Let it start, or go on for a while from a time (us) on, until it waits for all cameras' pictures; that time.
-
-        Raises ApplicationSilent, ApplicationFloods and ServiceSilent.
-        """
-        if self._is_started:
-            now += START_US
-        else:
-            self._agent.open(self._stopped)
-            self._is_started = True
+    def start(self, now: int, cameras: Collection[str]) -> None:
+        """Let it start at a time (us), until it rests; raises ApplicationSilent and ServiceSilent."""
+        self._unread = {*cameras}
+        self._agent.open(self._stopped)
+        self._shown_at = now
         self._run(now)
-        while (deaf := [camera for camera in cameras if not self._is_awaited(camera)]) and not self._stopped():
-            if now - EPOCH >= MOST_START_US:
-                within = f"within {MOST_START_US / 1e6:g} s of the application's own time"
-                raise ApplicationSilent(f"no reader waited for a picture of '{deaf[0]}' {within}", silent=True)
-            now += START_US
-            self._run(now)
-        return now
 
     def _is_awaited(self, camera: str) -> bool:
         self._link.send(camera, Show(awaits=False, announces=False))
@@ -207,21 +198,38 @@ class RestingApplication:
     def show(self, shown: Sequence[Done], now: int) -> None:
         """Let it take what services have sent by ``now`` (us), then show it new pictures, whether it waits or not.
 
-        Raises ApplicationSilent, ApplicationFloods and ServiceSilent.
+        The first picture of a camera is shown as soon as it waits for one. Raises ApplicationSilent, ApplicationFloods
+        and ServiceSilent.
         """
         self.frames += 1
         self._shown_at, self._taken_s = now, 0.0
         self._run(now)
         self.answers.expect(camera.sampled for camera in shown)
-        for camera in shown:
-            self._link.send(camera.service, Show(awaits=False, announces=True))
-        for camera in shown:
-            self._result(camera.service)
+        self._held = [camera.service for camera in shown]
+        self._announce()
+
+    def _announce(self) -> None:
+        held, self._held = self._held, []
+        for camera in held:
+            if camera in self._unread and not self._is_awaited(camera):
+                self._held.append(camera)
+            else:
+                self._unread.discard(camera)
+                self._link.send(camera, Show(awaits=False, announces=True))
+        for camera in held:
+            if camera not in self._held:
+                self._result(camera)
 
     def await_answer(self, until: int) -> None:
         """Let it go on to ``until`` (us); raises ApplicationSilent, ApplicationFloods and ServiceSilent."""
-        self._until = until
+        self._until, now = until, self._shown_at
+        while self._held and (now := now + LOOK_US) < until and not self._stopped():
+            self._run(now)
+            self._announce()
         self._run(until)
+        if self._unread and until - EPOCH > MOST_UNREAD_US:
+            within = f"within {MOST_UNREAD_US / 1e6:g} s of the test"
+            raise ApplicationSilent(f"no reader waited for a picture of '{min(self._unread)}' {within}", silent=True)
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services, in the order in which they were sent."""

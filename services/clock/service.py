@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageError
@@ -110,9 +110,7 @@ class ClockService(Service):
         if takers and any(each.matches(envelope) for each in self._answers.filters):
             with suppress(MessageError):  # its takers say so
                 message = self._session.messages.decode(envelope.data_type, envelope.payload)
-                self._senders.check_numbers(
-                    message, envelope.sender_stamp, takers, self._stepper.now - self._stepper.begin
-                )
+                self._senders.check_numbers(message, envelope.sender_stamp, takers, self._stepper.now - EPOCH)
         self._answers.take(envelope)
 
     def _over(self) -> bool:
@@ -126,31 +124,18 @@ class ClockService(Service):
         return self._stopped()
 
     def _await_begin(self) -> Envelope | None:
-        """The start, when the application waits for pictures and the runner says that it listens to the bus.
-
-        Where DODO_RUNNER says that there is no runner, it is one of this clock's own.
-        """
-        begin = self._session.messages.type(BEGIN)()
-        envelope = Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)
-        while not self._stopped():
-            self._stepper.start()
-            if os.environ.get("DODO_RUNNER") == "":
-                return envelope
-            tell("started", seconds=(self._stepper.begin - EPOCH) / 1e6)
-            if (announced := self._receive_begin()) is None:
-                return None
-            message: Any = self._session.messages.decode(announced.data_type, announced.payload)
-            if not message.deaf:
-                self._session.hear_directly(False)
-                return announced
-        return None
-
-    def _receive_begin(self) -> Envelope | None:
+        """The start that the runner announces; one of its own where DODO_RUNNER says that there is none."""
+        self._stepper.start()
+        if os.environ.get("DODO_RUNNER") == "":
+            begin = self._session.messages.type(BEGIN)()
+            return Envelope(self._begin_id, self._session.messages.encode(begin), 0, 0, 0, 0)
+        tell("started")
         while not self._stopped():
             envelope = self._session.receive(_SLICE)
             if envelope is None:
                 continue
             if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope, self._session.source):
+                self._session.hear_directly(False)
                 return envelope
             if not self._session.was_direct:
                 self._exchange.hear(envelope, self._session.source)
@@ -158,7 +143,7 @@ class ClockService(Service):
 
     def _report_time(self, last: bool = False) -> None:
         self._reported, self._reached = time.monotonic(), self._stepper.reached
-        seconds = (self._reached - self._stepper.begin) / 1e6
+        seconds = (self._reached - EPOCH) / 1e6
         tell("time", seconds=seconds, last=last)
 
     def _note(self, text: str) -> None:

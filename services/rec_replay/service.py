@@ -55,7 +55,8 @@ class Replay(Service):
         self._too_large = self._lost = 0
         self._reported = -STATUS_PERIOD
         self._end: int | None = None
-        self._pictures = np.flatnonzero(stream.shown)
+        self._pictures = np.flatnonzero(stream.shown if stream.shown.any() else np.ones_like(stream.shown))
+        """Or messages where there are no pictures: with each of them lockstep goes on."""
         self._expect = expect
 
     def begin(self, now: int) -> None:
@@ -98,7 +99,7 @@ class Replay(Service):
             yield Output(status, 0)
 
     def _next_picture(self, now: int) -> int:
-        """The time of the update that shows the next picture, 0 when there is none or that is unknown."""
+        """The time of the update that shows the next picture or message, 0 when there is none or that is unknown."""
         if not self._player.playing or (due := self._next_due()) is None:
             return 0
         looks = math.ceil((due - now) / self.period)

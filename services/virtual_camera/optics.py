@@ -71,16 +71,13 @@ def load_overlays(entries: tuple[OverlayEntry, ...], width: int, height: int) ->
 
 GAMMA = 2.2
 _POOL = 1 << 19
-_BEGIN = 1_700_000_000_000_000
-"""Of the noise's own time, in us: that of the first picture."""
 
 
 @dataclass(frozen=True)
 class Sensor:
     """``exposure`` and ``gain`` are factors of light, 1 as drawn; ``noise`` is a standard deviation, 1 the full scale.
 
-    The noise is Gaussian, independent in each colour of each pixel; ``seed`` and the time since the first picture
-    decide it.
+    The noise is Gaussian, independent in each colour of each pixel; ``seed`` and the picture's time decide it.
     """
 
     exposure: float = 1.0
@@ -103,7 +100,6 @@ class Development:
         self._exposure = sensor.table(sensor.exposure) if sensor.exposure != 1.0 else None
         self._gain = sensor.table(sensor.gain) if sensor.gain != 1.0 else None
         self._pools = _pools(sensor) if sensor.noise > 0.0 else None
-        self._first = 0
 
     def develop(self, picture: Image, sample_time: int) -> None:
         """Changes a picture (height, width, 4) that was sampled at ``sample_time`` us."""
@@ -119,9 +115,7 @@ class Development:
     def _rows(self, shape: tuple[int, ...], sample_time: int) -> npt.NDArray[np.intp]:
         """For each row of a picture the pixel of the pool where its noise begins, drawn by lot."""
         height, width = shape[:2]
-        self._first = self._first or sample_time
-        time = _BEGIN + sample_time - self._first
-        random = np.random.RandomState([self._sensor.seed, time & 0xFFFFFFFF, time >> 32 & 0xFFFFFFFF])
+        random = np.random.RandomState([self._sensor.seed, sample_time & 0xFFFFFFFF, sample_time >> 32 & 0xFFFFFFFF])
         return random.randint(0, _POOL - width + 1, height)
 
 

@@ -186,7 +186,7 @@ def test_what_starts_before_a_service(root: Path) -> None:
 def test_its_time_is_the_test_s(root: Path) -> None:
     """Also where variables are a list; what the file sets itself stays."""
     own = {"a": car(environment={"A": "1"}), "b": car(environment=["OMP_NUM_THREADS=4", "LD_PRELOAD=/own.so"])}
-    test = compiled(root, {"services": own}, settings=compiler.Settings(clock="virtual"))
+    test = compiled(root, {"services": own}, settings=compiler.Settings(clock="lockstep", isolation="network"))
     for number, service in enumerate(test.services.values()):
         assert service["pid"] == "service:sandbox"
         assert "dodo-time:/opt/dodo/time:ro" in service["volumes"]

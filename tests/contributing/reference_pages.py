@@ -85,6 +85,7 @@ SERVICES = {
     "DODO_CHANNEL": "the folder where services meet, each by a link of its name; no application has it",
     "DODO_CLOCK": "`lockstep`, or `recording` for `dodo judge`; without it real time",
     "DODO_ODVD": "files of further messages, separated by `:`",
+    "DODO_ANSWERS": "not empty where the application keeps the machine's time, so that the clock waits for its answers",
     "DODO_READERS": "processes of the application that wait for each frame",
     "DODO_RECORDING": "the recording that is judged again",
     "DODO_RIG": "the rig on which the test runs",

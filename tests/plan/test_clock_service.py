@@ -28,7 +28,7 @@ def own(readers: int) -> Declared:
 
 
 def flags(example: str, folder: Path) -> dict[str, str]:
-    service = clock(resolved(example, folder), MANIFEST, "dodo/clock:1", ("dodo-recorder",), 140)
+    service = clock(resolved(example, folder), MANIFEST, "dodo/clock:1", ("dodo-recorder",), 140, ("driver", "eye"))
     assert (service.layer, service.name, service.uses, service.judge) == ("environment", CLOCK, "clock", False)
     return {flag.name: flag.value for flag in service.flags}
 
@@ -38,6 +38,7 @@ def test_services_step_after_those_that_they_consume_from(tmp_path: Path) -> Non
     assert (found["advance"], found["sense"], found["judge"]) == ("vehicle,pose", "second,camera", "track")
     assert (found["freq"], found["timeout"], found["cid"], found["watch"]) == ("20", "60", "140", "dodo-recorder")
     assert found["answers"] == "opendlv.proxy.GroundSteeringRequest,opendlv.proxy.PedalPositionRequest"
+    assert (found["application"], found["time-folder"]) == ("driver,eye", "/dev/shm/dodo-time")
     assert "hears" not in found
     assert "done" not in found
 
@@ -61,27 +62,6 @@ services:
         "opendlv.proxy.GroundSteeringRequest",
         "opendlv.proxy.ImageReadingShm",
     )
-
-
-def test_where_the_applications_time_is_the_tests_the_clock_takes_all_that_it_sends(tmp_path: Path) -> None:
-    example = """\
-clock: virtual
-# docker-compose.yml
-services:
-  driver:
-    image: driver
-    command: --cid=1
-    x-dodo:
-      out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]
-      answers: [opendlv.proxy.PedalPositionRequest]
-      done: opendlv.proxy.ImageReadingShm
-"""
-    test = resolved(example, tmp_path)
-    service = clock(test, MANIFEST, "dodo/clock:1", (), 140, ("driver", "eye"))
-    found = {flag.name: flag.value for flag in service.flags}
-    assert found["hears"] == "opendlv.proxy.GroundSteeringRequest,opendlv.proxy.PedalPositionRequest"
-    assert (found["application"], found["time-folder"]) == ("driver,eye", "/dev/shm/dodo-time")
-    assert not {"answers", "done", "max-response"} & found.keys()
 
 
 @pytest.mark.parametrize(

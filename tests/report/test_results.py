@@ -178,7 +178,7 @@ WHOLE = replace(
     verdicts=({"evaluator": "track", "outcome": "failed", "reason": "hit wall", "evidence": {"time": 1.0}},),
     goals=(Goal("time-to-goal", 20.0, 5.0, 2.0),),
     machine=LOAD,
-    response=Response(9, 0.1, 0.01, 0.02, 0.03, None, None, None, 0, None, "a processor"),
+    response=Response(9, 0.1, 0.01, 0.02, 0.03, 0, None, "a processor"),
 )
 NAMES = ("evidence",)
 """Objects whose keys are names."""

@@ -93,6 +93,7 @@ class ScriptedBackend:
     listens: Mapping[str, float] | None = None
     """When services of the application join the bus, by the loop's time; None where that cannot be seen."""
     printed: tuple[Unmatched, ...] = ()
+    by_answers: bool = True
 
     def __post_init__(self) -> None:
         self.cid = self.plan.cid + 1

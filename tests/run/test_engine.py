@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from dodo_dsl.outcome import MachineLoad, Outcome
-from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Plan
+from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Lockstep, Plan
 from dodo_dsl.run import listeners
 from dodo_dsl.run.engine import (
     BEGIN_PATIENCE_S,
@@ -37,6 +37,7 @@ from dodo_dsl.run.protocol import (
     Overrun,
     Paused,
     Ready,
+    Started,
     Stopped,
     Time,
     Unmatched,
@@ -111,7 +112,7 @@ def test_a_failure_on_a_busy_machine_is_an_error_and_a_pass_stays_one() -> None:
     assert (failed.outcome, failed.reason) == (
         "error",
         "the machine was too busy to judge: app waited 1.5 s of 5.0 s for a processor, others took 90 % of it; "
-        "it found: hit wall left; run it with --clock lockstep, or virtual if it has timers, or fewer tests at once "
+        "it found: hit wall left; run it with --clock lockstep, or fewer tests at once "
         "(-j 1)",
     )
     passed = on(BUSY, (5.0, PASSED), (5.0, ENDED))
@@ -569,6 +570,13 @@ def test_who_never_listens_is_waited_for_only_so_long() -> None:
     told = "'driver', which consumes messages, had not joined the bus after 10 s: what others sent before is lost"
     assert (found.outcome, found.notes) == ("passed", (told,))
     assert found.setup_s == pytest.approx(2.0 + LISTEN_PATIENCE_S, abs=LISTEN_PERIOD_S)
+
+
+def test_in_lockstep_it_begins_when_the_application_rests() -> None:
+    backend = consuming({}, {**drives(), "application": [(6.0, Started())]})
+    backend.plan, backend.by_answers = replace(backend.plan, lockstep=Lockstep(1, 60.0)), False
+    found = outcome(backend)
+    assert (found.outcome, found.notes, found.setup_s) == ("passed", (), pytest.approx(8.0))
 
 
 def test_who_ends_instead_of_listening_is_not_waited_for() -> None:

@@ -156,7 +156,7 @@ def test_pictures_stay_unless_the_test_passed(scene: Scene, verdict: VerdictEven
 
 TOO_BUSY = (
     "the machine was too busy to judge: app waited 0.3 s of 1.0 s for a processor, others took 90 % of it; "
-    "it found: hit wall left; run it with --clock lockstep, or virtual if it has timers, or fewer tests at once (-j 1)"
+    "it found: hit wall left; run it with --clock lockstep, or fewer tests at once (-j 1)"
 )
 
 

@@ -29,13 +29,6 @@ def test_hardware_keeps_its_clock(level: str, clock: str) -> None:
     assert applied(spec, Settings(clock="lockstep")).clock == clock
 
 
-@pytest.mark.parametrize(("keeps", "clock"), [(True, "virtual"), (False, "lockstep")])
-def test_searches_leave_tests_that_have_it_the_clock_virtual(keeps: bool, clock: str) -> None:
-    settings = Settings(clock="lockstep", keeps_virtual=keeps)
-    assert applied(Spec(SPEC.location, level="sil", clock="virtual"), settings).clock == clock
-    assert applied(SPEC, settings).clock == "lockstep"
-
-
 def test_a_seed_of_zero_counts() -> None:
     assert applied(SPEC, Settings(seed=0)).seed == 0
 

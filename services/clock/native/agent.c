@@ -248,7 +248,7 @@ static void advance(int64_t to_ns)
 static bool is_header_whole(void)
 {
     return page->magic == TIME_MAGIC && page->version == TIME_VERSION && page->slots == TIME_SLOTS && page->now_ns == now_ns
-           && page->monotonic_base_ns == options.start_ns - 1000 * SECOND && page->seed == options.seed;
+           && page->monotonic_base_ns == options.start_ns - START_UPTIME_S * SECOND && page->seed == options.seed;
 }
 
 static void write_header(void)
@@ -256,7 +256,7 @@ static void write_header(void)
     page->version = TIME_VERSION;
     page->slots = TIME_SLOTS;
     page->now_ns = now_ns;
-    page->monotonic_base_ns = options.start_ns - 1000 * SECOND;
+    page->monotonic_base_ns = options.start_ns - START_UPTIME_S * SECOND;
     page->seed = options.seed;
     page->magic = TIME_MAGIC;
 }

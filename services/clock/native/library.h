@@ -28,7 +28,7 @@
 #define ALIAS(name, of) PUBLIC __typeof__(of) name __attribute__((alias(#of)))
 #define NANOSECONDS INT64_C(1000000000)
 
-enum { MOST_SPINS = 1000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900 };
+enum { MOST_SPINS = 1000, MOST_START_SPINS = 1000000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900 };
 
 /* Functions of libc that are wrapped here and called there. */
 #define REAL_FUNCTIONS(X)                                                                                              \

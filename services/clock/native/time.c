@@ -50,22 +50,27 @@ int64_t deadline_on(clockid_t clock, const struct timespec *given)
     return is_monotonic(clock) && at != TIME_NEVER ? later(at, page->monotonic_base_ns) : at;
 }
 
-void count_spin(void)
+static void spin(unsigned most, int64_t now)
 {
     static _Atomic bool is_noted;
-    if (!is_managed())
-        return;
-    int64_t now = now_ns();
     if (self.spin_ns != now) {
         self.spin_ns = now;
         self.spins = 0;
     }
-    if (++self.spins <= MOST_SPINS)
+    if (++self.spins <= most)
         return;
     if (!atomic_exchange(&is_noted, true))
         note(TIME_NOTE_SPIN, self.slot->name);
     self.spins = 0;
     sleep_until(later(now, SPIN_SLEEP_NS));
+}
+
+void count_spin(void)
+{
+    if (!is_managed())
+        return;
+    int64_t now = now_ns(), start = page->monotonic_base_ns + START_UPTIME_S * NANOSECONDS;
+    spin(now == start ? MOST_START_SPINS : MOST_SPINS, now); /* libraries look at the clock as they are loaded */
 }
 
 int sleep_until(int64_t deadline_ns)
@@ -165,6 +170,8 @@ PUBLIC unsigned sleep(unsigned seconds)
 
 PUBLIC int sched_yield(void)
 {
-    count_spin();
-    return is_managed() ? 0 : (int)answer(RAW_1(SYS_sched_yield, 0)); /* no other thread may run meanwhile */
+    if (!is_managed())
+        return (int)answer(RAW_1(SYS_sched_yield, 0));
+    spin(MOST_SPINS, now_ns()); /* no other thread may run meanwhile */
+    return 0;
 }

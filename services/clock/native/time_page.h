@@ -15,6 +15,7 @@
 #define TIME_SERVICES 64
 #define TIME_NOTES 64
 #define TIME_NEVER INT64_MAX
+#define START_UPTIME_S 1000 /* CLOCK_MONOTONIC as the application starts */
 
 /* What a thread does. Only its own thread writes FREE, RUNNING, WAITING and READY, but for a waker
  * that turns WAITING into READY; only the agent writes GRANTED. Changes from WAITING are made by compare-and-exchange. */

@@ -3,7 +3,6 @@
 import argparse
 import io
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import parser
 from dodo_dsl.cli.run_jobs import prepare
 from dodo_dsl.emit.output_folder import PLAN_FILE
-from dodo_dsl.plan.plan_json import from_json, to_json
+from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.backends import Job
 from dodo_dsl.spec.deployment import Deployment
 from tests.check import examples
@@ -46,16 +45,6 @@ def test_a_changed_clock_replaces_what_was_wrong_in_the_first(folder: Path) -> N
     assert jobs[0].plan.clock == "realtime"
     assert jobs[0].plan.lockstep is None
     assert "dodo-clock" not in {service.name for service in jobs[0].plan.services}
-
-
-def test_a_declared_timer_is_in_the_plan(folder: Path) -> None:
-    application = "services: {driver: {image: driver, command: --cid=111, x-dodo: {timed: true}}}\n"
-    (folder / "docker-compose.yml").write_text(application)
-    (job,), _ = prepared(folder)
-    plan = job.plan
-    assert plan.timed == ("driver",)
-    assert from_json(to_json(plan)).timed == plan.timed
-    assert '"timed"' not in to_json(replace(plan, timed=())), "compiled tests stay as they were"
 
 
 def test_a_changed_isolation_is_checked_and_built(folder: Path) -> None:

@@ -84,7 +84,7 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
         plan = replace(Bench(tmp_path).plan(), isolation=isolation)
         side = ContainerSide(WatchedServices(plan, tmp_path, tmp_path), NOBODY, NOBODY, NOBODY, ())
         side._use = ContainerUse({"app": Changing("c0ffee", 0)}, proc=proc.root)
-        await side.beginning()
+        await side._require_here()
 
     refused = pytest.raises(BackendError, match=r"another machine.*use --isolation network")
     with refused if (isolation, pids) == ("host", [11]) else contextlib.nullcontext():

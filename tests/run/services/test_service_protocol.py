@@ -18,6 +18,7 @@ from dodo_dsl.run.protocol import (
     Paused,
     Ready,
     Responded,
+    Started,
     Stopped,
     Time,
     VerdictEvent,
@@ -125,13 +126,10 @@ RESPONSE = {
     "median_s": 0.01,
     "p95_s": 0.02,
     "worst_s": 0.03,
-    "processor_median_s": None,
-    "processor_p95_s": None,
-    "processor_worst_s": None,
     "slow": 0,
     "over": 1,
     "processor": "",
-    "surplus": 174,
+    "uncopied": 2,
 }
 
 
@@ -145,8 +143,9 @@ CLOCKED = {
     response(slow=-1): None,
     response(median_s=None): None,
     response(p95_s="0.1"): None,
-    response(unasked=True): None,
+    response(uncopied=True): None,
     '{"dodo": "time", "seconds": 1.5}': Time(1.5, False),
+    '{"dodo": "started"}': Started(),
     '{"dodo": "time", "seconds": 2, "last": true}': Time(2.0, True),
     '{"dodo": "time", "seconds": null}': None,
     '{"dodo": "time"}': None,

@@ -238,20 +238,27 @@ class Cameras(Link):
         return SimpleNamespace(awaited=self._asked[service] >= self._awaited[service])
 
 
-def test_the_test_begins_when_the_application_waits_for_all_cameras(tmp_path: Path) -> None:
+def test_the_first_picture_of_a_camera_is_shown_when_the_application_waits_for_it(tmp_path: Path) -> None:
+    times, shown = [], [SimpleNamespace(service=name, sampled=EPOCH) for name in ("left", "right")]
+    with agent(tmp_path, lambda until: [times.append(until), reached(until)][1:]) as time:
+        driven = application(time, link=(link := Cameras(left=1, right=3)))
+        driven.start(EPOCH, ("left", "right"))
+        for step in range(2):
+            driven.show(cast(Any, shown), EPOCH + step * STEP)
+            driven.await_answer(EPOCH + (step + 1) * STEP)
+    after = {EPOCH + resting.LOOK_US, EPOCH + 2 * resting.LOOK_US}
+    assert {*times} == {EPOCH, EPOCH + STEP, EPOCH + 2 * STEP} | after
+    assert [service for service, show in link.sent if show.announces] == ["left", "right", "left", "right"]
+
+
+def test_a_camera_that_nobody_looks_at_is_named(tmp_path: Path) -> None:
+    end = EPOCH + resting.MOST_UNREAD_US
     with agent(tmp_path) as time:
-        driven = application(time, link=Cameras(left=2, right=4))
-        assert driven.start(EPOCH, ()) == EPOCH
-    with agent(tmp_path / "b") as time:
-        driven = application(time, link=Cameras(left=2, right=4))
-        began = driven.start(EPOCH, ("left", "right"))
-        assert began == EPOCH + 3 * resting.START_US
-        assert driven.start(began, ("left", "right")) == began + resting.START_US, "it goes on where that was too early"
-    with (
-        agent(tmp_path / "c") as time,
-        pytest.raises(ApplicationSilent, match="picture of 'left' within 10 s of the app"),
-    ):
-        application(time, link=Cameras(left=5000)).start(EPOCH, ("left",))
+        driven = application(time, link=Cameras(left=5000))
+        driven.start(EPOCH, ("left",))
+        driven.await_answer(end)
+        with pytest.raises(ApplicationSilent, match="no reader waited for a picture of 'left' within 10 s of the test"):
+            driven.await_answer(end + STEP)
 
 
 def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ WAITS = {
         "cloned 6 at 1060, cloned 7 at 1070, uring -1 at 1070, killed 9 at 1080, end 0 at 1180"
     ),
     "shares": "timed -1 at 20, posted 0 at 30",
-    "spins": "clock 10008 at 10, yields 1 at 16",
+    "spins": "clock 1009008 at 10, yields 1 at 16",
     "garbage": "wrote 0 at 50",
 }
 CPP = "condition 1 at 20, until 1 at 40, notified 1 at 50, early 1 at 60, ready 1 at 80, locked 0 at 95"
