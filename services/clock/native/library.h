@@ -28,7 +28,7 @@
 #define ALIAS(name, of) PUBLIC __typeof__(of) name __attribute__((alias(#of)))
 #define NANOSECONDS INT64_C(1000000000)
 
-enum { MOST_SPINS = 1000, MOST_START_SPINS = 1000000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900 };
+enum { MOST_SPINS = 1000, MOST_START_SPINS = 1000000, SPIN_SLEEP_NS = 1000000, LIBRARY_FILES_FROM = 900, INTERRUPTION = 63 /* a signal of ours */ };
 
 /* Functions of libc that are wrapped here and called there. */
 #define REAL_FUNCTIONS(X)                                                                                              \
@@ -128,6 +128,9 @@ void files_after_fork(void);
 
 /* -- timers.c ------------------------------------------------------------------------------------------------------- */
 
+/* Interrupts this thread's kernel wait at the deadline, unless `interrupt_end` comes before. */
+int interrupt_at(int64_t deadline_ns);
+void interrupt_end(int timer);
 void timers_after_fork(void);
 /* Before the application closes a descriptor: false if it is ours. */
 bool forget_timer_file(int file);

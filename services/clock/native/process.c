@@ -277,18 +277,14 @@ PUBLIC int semtimedop(int id, struct sembuf *operations, size_t count, const str
     if (!is_managed())
         return (int)answer(RAW_4(SYS_semtimedop, id, operations, count, timeout));
     int64_t deadline = timeout ? later(now_ns(), nanoseconds(timeout)) : TIME_NEVER;
-    if (deadline == TIME_NEVER) {
-        enter_kernel();
-        result = RAW_4(SYS_semtimedop, id, operations, count, NULL);
-        leave_kernel();
-    }
-    while (result == -EAGAIN && now_ns() < deadline) {
-        int64_t again = later(now_ns(), RETRY_NS);
-        if (sleep_until(again < deadline ? again : deadline))
-            return fail_with(EINTR);
-        result = RAW_4(SYS_semtimedop, id, at_once, count, NULL);
-    }
-    return (int)answer(result);
+    if (now_ns() >= deadline)
+        return count_spin(), fail_with(EAGAIN);
+    int timer = interrupt_at(deadline);
+    enter_kernel();
+    result = RAW_4(SYS_semtimedop, id, operations, count, NULL);
+    leave_kernel();
+    interrupt_end(timer);
+    return (int)answer(result == -EINTR && now_ns() >= deadline ? -EAGAIN : result);
 }
 
 PUBLIC int semop(int id, struct sembuf *operations, size_t count)

@@ -13,7 +13,7 @@
 #include <sys/timerfd.h>
 
 enum { MOST_TIMERS = 256, ITIMER = 0, HANDLE = 0x7d0d0 /* what `timer_create` gives: 16 times this and the index */ };
-enum use { UNUSED, OF_FILE, OF_SIGNAL, OF_THREAD_SIGNAL, OF_FUNCTION, OF_NOTHING };
+enum use { UNUSED, OF_FILE, OF_SIGNAL, OF_THREAD_SIGNAL, OF_FUNCTION, OF_NOTHING, OF_INTERRUPTION };
 
 struct timer {
     enum use use;
@@ -99,6 +99,8 @@ static void fire(const struct timer *timer)
         RAW_3(SYS_write, timer->kept_file, &once, sizeof once);
     else if (timer->use == OF_FUNCTION)
         start_function(timer);
+    else if (timer->use == OF_INTERRUPTION)
+        RAW_3(SYS_tgkill, RAW_1(SYS_getpid, 0), timer->thread, INTERRUPTION);
     else if (timer->use != OF_NOTHING)
         send_signal(timer);
 }
@@ -348,4 +350,32 @@ PUBLIC int timer_delete(timer_t handle)
         return fail_with(EINVAL);
     free_timer(timer);
     return 0;
+}
+
+/* -- the end of a wait in the kernel -------------------------------------------------------------------------------- */
+
+static void do_nothing(int number)
+{
+    (void)number;
+}
+
+int interrupt_at(int64_t deadline_ns)
+{
+    struct sigaction wanted = {.sa_handler = do_nothing};
+    uint64_t own = UINT64_C(1) << (INTERRUPTION - 1);
+    struct timer *timer = deadline_ns == TIME_NEVER || !is_managed() ? NULL : new_timer(OF_INTERRUPTION, CLOCK_REALTIME);
+    if (!timer)
+        return -1;
+    real.sigaction(INTERRUPTION, &wanted, NULL);
+    RAW_4(SYS_rt_sigprocmask, SIG_UNBLOCK, &own, NULL, sizeof own);
+    timer->thread = (int)RAW_1(SYS_gettid, 0);
+    timer->deadline_ns = deadline_ns;
+    look_again();
+    return (int)(timer - timers);
+}
+
+void interrupt_end(int timer)
+{
+    if (timer >= 0)
+        free_timer(&timers[timer]);
 }
