@@ -152,20 +152,10 @@ PUBLIC int poll(struct pollfd *files, nfds_t count, int timeout_ms)
     return ppoll(files, count, timeout_ms < 0 ? NULL : &timeout, NULL);
 }
 
-PUBLIC int __poll_chk(struct pollfd *files, nfds_t count, int timeout_ms, size_t size)
-{
-    if (size / sizeof *files < count)
-        abort();
-    return poll(files, count, timeout_ms);
-}
-
-PUBLIC int __ppoll_chk(struct pollfd *files, nfds_t count, const struct timespec *timeout, const sigset_t *mask,
-                       size_t size)
-{
-    if (size / sizeof *files < count)
-        abort();
-    return ppoll(files, count, timeout, mask);
-}
+CHECKED(int, __poll_chk, size / sizeof *files < count, poll(files, count, timeout_ms), struct pollfd *files, nfds_t count,
+        int timeout_ms, size_t size)
+CHECKED(int, __ppoll_chk, size / sizeof *files < count, ppoll(files, count, timeout, mask), struct pollfd *files,
+        nfds_t count, const struct timespec *timeout, const sigset_t *mask, size_t size)
 
 /* -- select --------------------------------------------------------------------------------------------------------- */
 

@@ -179,6 +179,15 @@ static inline long raw(long number, long a, long b, long c, long d, long e, long
 #define RAW_4(n, a, b, c, d) raw(n, (long)(a), (long)(b), (long)(c), (long)(d), 0, 0)
 #define RAW_6(n, a, b, c, d, e, f) raw(n, (long)(a), (long)(b), (long)(c), (long)(d), (long)(e), (long)(f))
 
+/* A function that _FORTIFY_SOURCE puts in the place of another, with the size of what it writes. */
+#define CHECKED(type, name, is_too_long, call, ...)                                                                    \
+    PUBLIC type name(__VA_ARGS__)                                                                                      \
+    {                                                                                                                  \
+        if (is_too_long)                                                                                               \
+            abort();                                                                                                   \
+        return call;                                                                                                   \
+    }
+
 /* As functions of libc answer: -1 and errno. */
 static inline long answer(long result)
 {

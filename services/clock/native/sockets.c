@@ -112,20 +112,10 @@ PUBLIC ssize_t recv(int file, void *bytes, size_t size, int flags)
     return recvfrom(file, bytes, size, flags, NULL, NULL);
 }
 
-PUBLIC ssize_t __recv_chk(int file, void *bytes, size_t size, size_t room, int flags)
-{
-    if (size > room)
-        abort();
-    return recv(file, bytes, size, flags);
-}
-
-PUBLIC ssize_t __recvfrom_chk(int file, void *restrict bytes, size_t size, size_t room, int flags,
-                              struct sockaddr *restrict from, socklen_t *restrict length)
-{
-    if (size > room)
-        abort();
-    return recvfrom(file, bytes, size, flags, from, length);
-}
+CHECKED(ssize_t, __recv_chk, size > room, recv(file, bytes, size, flags), int file, void *bytes, size_t size, size_t room,
+        int flags)
+CHECKED(ssize_t, __recvfrom_chk, size > room, recvfrom(file, bytes, size, flags, from, length), int file,
+        void *restrict bytes, size_t size, size_t room, int flags, struct sockaddr *restrict from, socklen_t *restrict length)
 
 /* The kernel says when a datagram came by the machine's clock; here, it came now. */
 static void stamp(struct msghdr *message)
@@ -227,12 +217,7 @@ PUBLIC ssize_t read(int file, void *bytes, size_t size)
     return error ? fail_with(error) : answer(RAW_3(SYS_read, file, bytes, size));
 }
 
-PUBLIC ssize_t __read_chk(int file, void *bytes, size_t size, size_t room)
-{
-    if (size > room)
-        abort();
-    return read(file, bytes, size);
-}
+CHECKED(ssize_t, __read_chk, size > room, read(file, bytes, size), int file, void *bytes, size_t size, size_t room)
 
 PUBLIC ssize_t readv(int file, const struct iovec *parts, int count)
 {

@@ -77,11 +77,6 @@ static void sleeps(void)
     say("bad", nanosleep(&(struct timespec){0, -1}, &left));
 }
 
-static void day(void)
-{
-    say("day", (long)sleep(86400));
-}
-
 /* -- conditions, semaphores, locks ---------------------------------------------------------------------------------- */
 
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
@@ -579,7 +574,7 @@ static void reads(void)
 int main(int count, char **words)
 {
     static const struct { const char *name; void (*run)(void); } programs[] = {
-        {"sleeps", sleeps}, {"day", day}, {"conds", conds}, {"semaphores", semaphores}, {"locks", locks}, {"futexes", futexes},
+        {"sleeps", sleeps}, {"conds", conds}, {"semaphores", semaphores}, {"locks", locks}, {"futexes", futexes},
         {"workers", workers}, {"files", files}, {"queues", queues}, {"numbers", numbers}, {"datagrams", datagrams}, {"timers", timers}, {"signals", signals},
         {"system_v", system_v}, {"forks", forks}, {"nap", nap}, {"shares", shares}, {"spins", spins},
         {"randoms", randoms}, {"garbage", garbage}, {"ticks", ticks}, {"reads", reads}};

@@ -72,12 +72,6 @@ def test_waits_end_by_the_time_of_the_test(built: Path, program: str, libc: str)
         assert words_of(application.output()) == WAITS[program]
 
 
-def test_a_day_passes_at_once(built: Path) -> None:
-    with Application(built, [built / "programs", "day"]) as application:
-        application.run(90_000)
-        assert application.output() == "day 0 at 8.64e+07\n"
-
-
 def test_time_goes_no_further_than_it_may(built: Path) -> None:
     with Application(built, [built / "programs", "ticks"]) as application:
         application.run(9.999)
