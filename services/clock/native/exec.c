@@ -226,7 +226,12 @@ PUBLIC int execle(const char *path, const char *first, ...)
             return EAGAIN;                                                                                             \
         look(program);                                                                                                 \
         WITH_OURS(environment, next_process_number(), 0);                                                              \
-        return real.name(pid, program, actions, attributes, words, complete);                                          \
+        pid_t child = 0;                                                                                               \
+        int error = real.name(&child, program, actions, attributes, words, complete);                                  \
+        add_child(child);                                                                                              \
+        if (pid && !error)                                                                                             \
+            *pid = child;                                                                                              \
+        return error;                                                                                                  \
     }
 SPAWN(posix_spawn, inspect)
 SPAWN(posix_spawnp, inspect_in_path)

@@ -139,6 +139,7 @@ bool forget_timer_file(int file);
 
 void processes_start(void);
 void processes_after_fork(void);
+void add_child(int pid);
 /* A system call that makes a process. */
 long fork_by(long number, const long *arguments);
 void draw(void *bytes, size_t size);

@@ -91,7 +91,7 @@ PUBLIC int pthread_join(pthread_t thread, void **result)
 
 static _Atomic int children[MOST_CHILDREN];
 
-static void add_child(int pid)
+void add_child(int pid)
 {
     for (int at = 0, none = 0; pid > 0 && at < MOST_CHILDREN; at++, none = 0)
         if (atomic_compare_exchange_strong(&children[at], &none, pid))

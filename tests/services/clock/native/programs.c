@@ -418,44 +418,37 @@ static void system_v(void)
 
 extern char **environ;
 
-static int nap_too(void *unused)
+static void ended(const char *what)
 {
-    usleep(10000);
-    return unused ? 0 : 7;
+    int status;
+    wait(&status);
+    say(what, WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status));
 }
 
 static void forks(void)
 {
     static char stack[1 << 16] __attribute__((aligned(16)));
-    int status;
+    char *const words[] = {(char *)own, "nap", NULL}, *const nothing[] = {NULL};
     pid_t child = fork();
     if (!child) {
         usleep(20000);
         say("child", 0);
         _exit(3);
     }
-    waitpid(child, &status, 0);
-    say("ended", WEXITSTATUS(status));
-    if (!fork()) {
-        char *const words[] = {(char *)own, "nap", NULL}, *const nothing[] = {NULL};
+    ended("ended");
+    if (!fork())
         execve(own, words, nothing);
-    }
-    wait(&status);
-    say("executed", WEXITSTATUS(status));
-    char *const words[] = {(char *)own, "nap", NULL};
+    ended("executed");
     posix_spawn(&child, own, NULL, NULL, words, environ);
-    waitpid(child, &status, 0);
-    say("spawned", WEXITSTATUS(status));
+    ended("spawned");
     say("system", WEXITSTATUS(system("sleep 1; exit 4")));
     if (!syscall(SYS_clone, SIGCHLD, NULL, NULL, NULL, NULL)) {
         usleep(10000);
         _exit(6);
     }
-    wait(&status);
-    say("cloned", WEXITSTATUS(status));
-    clone(nap_too, &stack[sizeof stack], CLONE_VM | CLONE_VFORK | SIGCHLD, NULL);
-    wait(&status);
-    say("cloned", WEXITSTATUS(status));
+    ended("cloned");
+    clone((int (*)(void *))(void *)usleep, &stack[sizeof stack], CLONE_VM | CLONE_VFORK | SIGCHLD, (void *)10000);
+    ended("cloned");
     say("uring", syscall(SYS_io_uring_setup, 1, NULL));
     /* what a process killed at any moment leaves stops nobody */
     child = fork();
@@ -464,8 +457,7 @@ static void forks(void)
             usleep(1000);
     usleep(10000);
     kill(child, SIGKILL);
-    wait(&status);
-    say("killed", WTERMSIG(status));
+    ended("killed");
     usleep(100000);
     say("end", 0);
 }
