@@ -279,7 +279,7 @@ static void report_busy(void)
 {
     struct busy_thread busy = processes_busy();
     char line[512], name[sizeof busy.name];
-    double waking_s = 2 * (double)(time_of(CLOCK_PROCESS_CPUTIME_ID) - window_cpu_ns) / SECOND; /* the thread takes its part, too */
+    double waking_s = 3 * (double)(time_of(CLOCK_PROCESS_CPUTIME_ID) - window_cpu_ns) / SECOND; /* the kernel and the threads take their part, too */
     if (waking_s > busy.processor_s && last_granted) {
         busy = (struct busy_thread){.tid = last_granted->tid, .inner_tid = last_granted->tid, .state = 'W', .processor_s = waking_s};
         memcpy(busy.name, last_granted->name, sizeof busy.name);

@@ -94,14 +94,14 @@ class Application:
         self._shell.wait(PATIENCE_S)
         self._scratch.cleanup()
 
-    def run(self, seconds: float) -> dict[str, Any]:
-        """Lets time go on to so many seconds after the begin; what the agent says then."""
+    def run(self, seconds: float, key: str = "now") -> dict[str, Any]:
+        """Lets time go on to so many seconds after the begin; what the agent says then, or of this key meanwhile."""
         self._command.write(b"run %d\n" % (BEGIN + round(seconds * SECOND)))
         while True:
             readable, _, _ = select.select([self._reply], [], [], PATIENCE_S)
             assert readable, "the agent does not answer"
             reply: dict[str, Any] = json.loads(self._reply.readline())
-            if "now" in reply:
+            if key in reply:
                 return reply
 
     def output(self, service: int = 0) -> str:

@@ -507,6 +507,12 @@ static void spins(void)
     say("yields", flag);
 }
 
+static void storm(void)
+{
+    for (;;)
+        nanosleep(&(struct timespec){0, 1}, NULL);
+}
+
 static void randoms(void)
 {
     uint32_t values[4] = {0};
@@ -568,7 +574,7 @@ int main(int count, char **words)
     static const struct { const char *name; void (*run)(void); } programs[] = {
         {"sleeps", sleeps}, {"conds", conds}, {"semaphores", semaphores}, {"locks", locks}, {"futexes", futexes},
         {"workers", workers}, {"files", files}, {"queues", queues}, {"numbers", numbers}, {"datagrams", datagrams}, {"timers", timers}, {"signals", signals},
-        {"system_v", system_v}, {"forks", forks}, {"nap", nap}, {"shares", shares}, {"spins", spins},
+        {"system_v", system_v}, {"forks", forks}, {"nap", nap}, {"shares", shares}, {"spins", spins}, {"storm", storm},
         {"randoms", randoms}, {"garbage", garbage}, {"ticks", ticks}, {"reads", reads}};
     own = words[0];
     for (size_t at = 0; count > 1 && at < sizeof programs / sizeof *programs; at++)

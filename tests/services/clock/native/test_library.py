@@ -20,9 +20,7 @@ WAITS = {
         "select 0 at 20, left 0 at 20, poll 0 at 40, epoll 0 at 60, poll 1 at 70, epoll 1 at 70, read 1 at 70, "
         "recv -1 at 100, recv 1 at 110, none -1 at 110, pipe 0 at 110, read 1 at 120, nothing 0 at 130"
     ),
-    "queues": (
-        "timed -1 at 20, received 1 at 30, sent 0 at 30, full -1 at 50, epoll 0 at 70, select 0 at 90"
-    ),
+    "queues": ("timed -1 at 20, received 1 at 30, sent 0 at 30, full -1 at 50, epoll 0 at 70, select 0 at 90"),
     "numbers": "fclose 0 at 0, dup 100000 at 0, dup2 0 at 0, range 0 at 0, timer 1 at 10",
     "datagrams": "sent 1 at 7, got 1 at 7, stamped 0 at 7, then 7 at 7",
     "timers": (
@@ -140,6 +138,12 @@ def test_what_cannot_be_preloaded_is_noted(built: Path) -> None:
 def test_a_spinning_program_is_noted(built: Path) -> None:
     with Application(built, [built / "programs", "spins"]) as application:
         assert application.run(1)["notes"] == [{"kind": "spin", "service": 0, "name": "programs"}]
+
+
+def test_who_wakes_again_and_again_is_named(built: Path) -> None:
+    with Application(built, [built / "programs", "storm"]) as application:
+        busy = application.run(1, "busy")["busy"]
+    assert (busy["service"], busy["name"], busy["state"]) == (0, "programs", "W")
 
 
 @pytest.mark.parametrize("variables", [{}, {"DODO_TIME": "/nowhere"}])
