@@ -136,7 +136,9 @@ def _shown_groups(proc: Path, counter: str = _PIDS, own: Path | None = None) -> 
     """
     try:
         groups = [line.split(":", 2) for line in (proc / "cgroup").read_text().splitlines()]
-        mounts = [line.split() for line in ((own or proc) / "mountinfo").read_text(errors="surrogateescape").splitlines()]
+        mounts = [
+            line.split() for line in ((own or proc) / "mountinfo").read_text(errors="surrogateescape").splitlines()
+        ]
     except OSError:
         return
     for _, controllers, path in (group for group in groups if len(group) == 3):
