@@ -50,7 +50,7 @@ class SentMessages:
     answers: int = 0
     """Steps in which it sent something that matters."""
     uncopied: int = 0
-    """Those of them in which that did not carry the sample time of a frame."""
+    """Those of them but the first in which that did not carry the sample time of a frame."""
     _frames: set[int] = field(default_factory=set)
     _sent: list[Envelope] = field(default_factory=list)
     _counts: Counter[int] = field(default_factory=Counter)
@@ -86,7 +86,7 @@ class SentMessages:
         self._counts.clear()
         own = [envelope for envelope in sent if any(each.matches(envelope) for each in self.heard)]
         self.answers += bool(own)
-        self.uncopied += any(envelope.sample_time not in self._frames for envelope in own)
+        self.uncopied += self.answers > 1 and any(envelope.sample_time not in self._frames for envelope in own)
         return [envelope._replace(received=min(max(envelope.sent, after) + 1, until)) for envelope in sent]
 
 
