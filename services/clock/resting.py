@@ -33,6 +33,8 @@ PATIENCE_S = 60.0
 """Wall time in s for an application that goes on without reaching the time, and for a camera."""
 WALL_FACTOR = 10.0
 """How many times as long as it may compute a thread may take of wall time: others may have the processor."""
+EXPOSED_US = 1
+"""How long after its sample time a picture is shown, so that the time of now is none of a picture."""
 LOOK_US, MOST_UNREAD_US = 10_000, 10_000_000
 """Test time between looks whether an application waits for its first picture, and the longest that it may not."""
 _NS = 1000
@@ -50,7 +52,7 @@ class SentMessages:
     answers: int = 0
     """Steps in which it sent something that matters."""
     uncopied: int = 0
-    """Those of them but the first in which that did not carry the sample time of a frame."""
+    """Those of them but the first in which that did not carry the sample time of the last frame."""
     _frames: set[int] = field(default_factory=set)
     _sent: list[Envelope] = field(default_factory=list)
     _counts: Counter[int] = field(default_factory=Counter)
@@ -61,8 +63,8 @@ class SentMessages:
         return self.heard
 
     def expect(self, sampled: Iterable[int]) -> None:
-        """Frames with these sample times (us) are shown."""
-        self._frames.update(sampled)
+        """Frames with these sample times (us) are shown, and to be answered."""
+        self._frames = {*sampled}
 
     def take(self, envelope: Envelope) -> None:
         """Take a message from the bus; raises ApplicationFloods."""
@@ -203,8 +205,9 @@ class RestingApplication:
         """
         self.frames += 1
         self._shown_at, self._taken_s = now, 0.0
-        self._run(now)
-        self.answers.expect(camera.sampled for camera in shown)
+        self._run(now + EXPOSED_US)
+        if shown:
+            self.answers.expect(camera.sampled for camera in shown)
         self._held = [camera.service for camera in shown]
         self._announce()
 
