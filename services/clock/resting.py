@@ -14,7 +14,6 @@ from typing import Any
 
 from dodo_dsl.opendlv.channel import Done, Show
 from dodo_dsl.opendlv.envelope import Envelope
-from services.base.lockstep_clock import EPOCH
 from services.clock.agent import Busy, Report, TimeAgent
 from services.clock.answers import MessageFilter
 from services.clock.exchange import (
@@ -35,8 +34,8 @@ WALL_FACTOR = 10.0
 """How many times as long as it may compute a thread may take of wall time: others may have the processor."""
 EXPOSED_US = 1
 """How long after its sample time a picture is shown, so that the time of now is none of a picture."""
-LOOK_US, MOST_UNREAD_US = 10_000, 10_000_000
-"""Test time between looks whether an application waits for its first picture, and the longest that it may not."""
+LOOK_US = 10_000
+"""Test time between looks whether an application waits for its first picture."""
 _NS = 1000
 _MOST_NOTES = 64
 
@@ -179,6 +178,8 @@ class RestingApplication:
 
     def facts(self) -> dict[str, Any]:
         """What the clock reports of the answers at the end."""
+        for camera in sorted(self._unread):
+            self._note_once(f"no program of the application waited for a frame of '{camera}'")
         facts = self.response.facts()
         return facts and {**facts, "uncopied": self.answers.uncopied}
 
@@ -230,9 +231,6 @@ class RestingApplication:
             self._run(now)
             self._announce()
         self._run(until)
-        if self._unread and until - EPOCH > MOST_UNREAD_US:
-            within = f"within {MOST_UNREAD_US / 1e6:g} s of the test"
-            raise ApplicationSilent(f"no reader waited for a picture of '{min(self._unread)}' {within}", silent=True)
 
     def collect(self) -> list[Envelope]:
         """The application's messages since the last time, for the services, in the order in which they were sent."""
