@@ -65,10 +65,6 @@ def _own_time(context: RuleContext) -> Iterator[Diagnostic]:
         message = "with clock virtual computing takes no test time, so that no answer is slow"
         hint = "limit answers with clock lockstep, or processor time with 'resources'"
         yield Diagnostic(spec.span("response"), "clock-virtual", message, hint)
-    if printed := context.wiring.printed:
-        message = f"'{printed[0].service}' prints its messages, and lines have no time of the test"
-        hint = "send them on the bus, or use clock lockstep"
-        yield Diagnostic(spec.span("clock"), "clock-virtual", message, hint)
 
 
 def _rates(context: RuleContext) -> Iterator[Diagnostic]:

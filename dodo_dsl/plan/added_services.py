@@ -93,7 +93,7 @@ def clock(
 def _expected(spec: Spec, wiring: Wiring, application: Sequence[str]) -> dict[str, str]:
     """What the clock is to expect of the application: answers to frames, or messages whenever it sends them."""
     if spec.clock == VIRTUAL:
-        own = {TIME_FOLDER: OWN_TIME, "application": ",".join(application)}
+        own = {TIME_FOLDER: OWN_TIME, "application": ",".join(application), "prints": "true" if wiring.printed else ""}
         return {"hears": ",".join(all_inputs(wiring)), **own}
     return {"answers": ",".join(answers(wiring)), "hears": ",".join(other_inputs(wiring)), "done": wiring.done}
 

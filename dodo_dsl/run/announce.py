@@ -33,9 +33,10 @@ def frame_of(
     messages: MessageSet | None = None,
     sampled: int | None = None,
     stamp: int = 0,
+    sent: int | None = None,
 ) -> bytes:
-    """A message as a datagram of now, sampled at a time in us, by default now too."""
-    known, now = messages or MessageSet.standard(), time.time_ns() // 1000
+    """A message as a datagram, sampled and sent at times in us, by default now."""
+    known, now = messages or MessageSet.standard(), time.time_ns() // 1000 if sent is None else sent
     sample_time = now if sampled is None else sampled
     return encode_frame(Envelope(known.id(message), known.encode(message), now, 0, sample_time, stamp))
 

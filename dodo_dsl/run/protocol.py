@@ -88,6 +88,12 @@ class Time(Struct, tag_field="dodo", tag="time", frozen=True):
     last: bool = False
 
 
+class Rested(Struct, tag_field="dodo", tag="rest", frozen=True):
+    """The application rests at a ``time`` of the test in us: the clock waits for what it has printed until then."""
+
+    time: int
+
+
 class Responded(Struct, tag_field="dodo", tag="response", frozen=True):
     """How long the application took for its answers in lockstep."""
 
@@ -131,8 +137,8 @@ class GivenVerdict(Said, tag="verdict", frozen=True):
 
 
 Message = (
-    Ready | InputEnded | Overrun | Late | Paused | Flooded | MemoryTaken | Noted | Foreign | Time | Responded | Stopped
-    | GivenVerdict
+    Ready | InputEnded | Overrun | Late | Paused | Flooded | MemoryTaken | Noted | Foreign | Time | Rested | Responded
+    | Stopped | GivenVerdict
 )  # fmt: skip
 """What services say to the runner; besides ``judged``, which is for the report to read."""
 

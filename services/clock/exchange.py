@@ -83,7 +83,7 @@ class Exchange:
         """Take the next message of the bus, unless one of the ``services`` answers before, within ``timeout`` s."""
         if not self._take_from_bus():
             channels = [self._channels[name].fileno() for name in services if name in self._channels]
-            select.select([self._session.fileno(), *channels], [], [], max(0.0, min(timeout, SLICE_S)))
+            select.select([*self._session.filenos(), *channels], [], [], max(0.0, min(timeout, SLICE_S)))
 
     def repeat_on_bus(self, messages: Iterable[Envelope]) -> None:
         """Send messages of services on the bus again, but for those that are not for the application."""

@@ -22,6 +22,7 @@ from services.clock.answers import Answers
 from services.clock.application import ResponseTimes, SteppedApplication
 from services.clock.exchange import Exchange, Roles, TestEnded, Timing
 from services.clock.model import Stepper
+from services.clock.printed_lines import PrintedLines
 from services.clock.processor_time import ApplicationProcesses
 from services.clock.virtual import SentMessages, TimeAgent, VirtualApplication
 
@@ -57,10 +58,12 @@ class ClockService(Service):
         timing: Timing,
         senders: SenderTable | None = None,
         own_time: OwnTime | None = None,
+        *,
+        prints: bool = False,
     ) -> None:
         """Services connect at ``path``. With ``own_time`` the application's time is the test's.
 
-        Then ``answers`` are SentMessages.
+        Then ``answers`` are SentMessages. ``prints`` is whether the application prints messages.
         """
         self._session = session
         self._begin_id = session.messages.id(BEGIN)
@@ -69,6 +72,7 @@ class ClockService(Service):
         self._heard = frozenset([*answering, *self._senders.ids])
         self._early: list[tuple[Envelope, Address]] = []
         self._answers = answers
+        self._lines = PrintedLines(session, self._over) if prints else None
         self._exchange = exchange = Exchange(session, path, roles.all, self._take, self._senders)
         self._application: SteppedApplication | VirtualApplication
         if isinstance(answers, SentMessages):
@@ -76,6 +80,7 @@ class ClockService(Service):
             self._application = VirtualApplication(
                 answers, own_time.agent, timing.patience, exchange, self._over, own_time.names, self._note
             )
+            self._application.lines = self._lines
         else:
             response = ResponseTimes(float(timing.period) / MICROSECONDS, timing.max_response)
             self._application = SteppedApplication(answers, timing.patience, exchange, self._over, response)
@@ -121,7 +126,9 @@ class ClockService(Service):
         return [whole(word) for word in message.application.split(",") if is_whole(word) and len(word) < 10]
 
     def _take(self, envelope: Envelope) -> None:
-        """Take a message of the application."""
+        """Take a message of the application, or of the runner."""
+        if self._lines and self._lines.take(envelope):
+            return
         takers = self._stepper.takers(envelope.data_type)
         if takers and any(each.matches(envelope) for each in self._answers.filters):
             with suppress(MessageError):  # its takers say so
@@ -148,7 +155,7 @@ class ClockService(Service):
             if envelope is None:
                 continue
             if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope, self._session.source):
-                self._session.hear_directly(False)
+                self._session.hear_directly(self._lines is not None)
                 return envelope
             if self._session.was_direct:
                 continue

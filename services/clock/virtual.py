@@ -28,6 +28,7 @@ from services.clock.exchange import (
     ServiceLink,
     ServiceSilent,
 )
+from services.clock.printed_lines import PrintedLines
 from services.clock.processor_time import ApplicationProcesses
 
 MOST_SENT = 1000
@@ -274,6 +275,8 @@ class VirtualApplication:
         self.processes = ApplicationProcesses(())
         self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
         self._names, self._note = names, note
+        self.lines: PrintedLines | None = None
+        """What it prints as messages, if it does."""
         self._noted: set[str] = set()
         self._has_shown: set[str] = set()
         self._shown_at = self._until = 0
@@ -343,7 +346,9 @@ class VirtualApplication:
             if isinstance(report, Reached):
                 self._tell(report)
                 if report.now_ns >= until * _NS:
-                    break
+                    if self._has_lines(until):
+                        break
+                    self._agent.run(until)
             elif isinstance(report, Destroyed):
                 raise ApplicationSilent("the application destroyed the page that gives it the test's time")
             elif isinstance(report, Busy):
@@ -356,6 +361,11 @@ class VirtualApplication:
         spent = time.monotonic() - began
         self.waited_first += spent if self.frames <= 1 else 0.0
         self.waited += spent if self.frames > 1 else 0.0
+
+    def _has_lines(self, until: int) -> bool:
+        """Whether all that it has printed in this step is taken, and it still rests; raises ServiceSilent."""
+        is_shown_next = until == self._shown_at
+        return is_shown_next or self.lines is None or self.lines.are_complete(self._shown_at or until, self._link)
 
     @property
     def _limit(self) -> float:
