@@ -82,6 +82,7 @@ def clock(
         "judge": ",".join(u.name for u in spec.uses if u.layer == "evaluation"),
         "watch": ",".join(watch),
         **_expected(spec, wiring, application),
+        "prints": "true" if wiring.printed else "",
         "timeout": f"{spec.timeout_s or 0.0:g}",
         "max-response": "" if spec.max_response_s is None else f"{spec.max_response_s:g}",
         "cid": str(cid),
@@ -93,7 +94,7 @@ def clock(
 def _expected(spec: Spec, wiring: Wiring, application: Sequence[str]) -> dict[str, str]:
     """What the clock is to expect of the application: answers to frames, or messages whenever it sends them."""
     if spec.clock == VIRTUAL:
-        own = {TIME_FOLDER: OWN_TIME, "application": ",".join(application), "prints": "true" if wiring.printed else ""}
+        own = {TIME_FOLDER: OWN_TIME, "application": ",".join(application)}
         return {"hears": ",".join(all_inputs(wiring)), **own}
     return {"answers": ",".join(answers(wiring)), "hears": ",".join(other_inputs(wiring)), "done": wiring.done}
 
