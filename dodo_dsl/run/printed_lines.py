@@ -33,7 +33,7 @@ MAX_LINE = 1 << 16
 """Bytes; what is longer is log."""
 MAX_FRAME = 1 << 15
 """Bytes of a message that a line may make."""
-BUDGET_S = 10.0
+BUDGET_S = 5.0
 """Processor time in s of a service's patterns in a test; then the rest is log."""
 LINES_READ = "dodo.LinesRead"
 _MOST_UNMATCHED, _WIDTH = 100, 200

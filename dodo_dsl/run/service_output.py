@@ -24,7 +24,7 @@ _TAIL_LINES = 8
 _TAIL_WIDTH = 300
 _FULL = 1 << 12
 """Bytes that a terminal holds; a program that has printed as many may sleep only because it has to wait."""
-_ENOUGH = 1 << 20
+_ENOUGH = 1 << 14
 _ECHO_S = 10.0
 REPRINT = b"\x12"
 """What a terminal, asked for its unfinished line, answers with ``_REPRINTED``, and gives to no program (termios(3))."""
@@ -99,10 +99,11 @@ class ServiceOutput:
     def close(self) -> None:
         """Reads the rest that is there already, and stops."""
         self._match = None
-        while not self.done.is_set() and self._read():
+        while self._reader >= 0 and self._read():
             pass
-        if not self.done.is_set():
+        if self._reader >= 0:
             self._finish()
+        self.done.set()
         self._log.close()
         self._write_times()
 
@@ -172,7 +173,7 @@ class ServiceOutput:
             self._hand([self._rest])
             if self._take(self._rest):
                 self._write(self._rest)
-        if self._match is None or self._matching.done():
+        if self._matching.done():
             self.done.set()
 
     def _hand(self, lines: Sequence[bytes], is_finished: bool = True) -> None:
@@ -202,16 +203,16 @@ class ServiceOutput:
             await self._hear_echo(self.type_in)
         while await self._is_matched() and self.type_in is None and self._read_bytes < _ENOUGH and self._read():
             pass
-        if await self._is_matched() and self._rest and not self._skipping:
+        is_full, self._read_bytes = self._read_bytes >= _FULL, 0
+        if await self._is_matched() and self._rest and not (is_full or self._skipping):
             self._hand([self._rest], is_finished=False)
             await self._is_matched()
-        read, self._read_bytes = self._read_bytes, 0
-        return read >= _FULL
+        return is_full
 
     async def _is_matched(self) -> bool:
         """Waits for what is matched already; whether more can come."""
         await asyncio.wait([self._matching])
-        return self._match is not None and not self.done.is_set()
+        return self._match is not None and self._reader >= 0
 
     async def _hear_echo(self, type_in: Callable[[bytes], None]) -> None:
         type_in(REPRINT)
