@@ -198,7 +198,7 @@ class ServiceLines:
     def _printed(self, line: bytes, is_finished: bool) -> list[Printed]:
         found = []
         for pattern in self.patterns if len(line) <= MAX_LINE else ():
-            if self.is_over:
+            if self.is_over or self.spent_s > BUDGET_S:
                 break
             before = time.thread_time()
             try:
@@ -213,9 +213,9 @@ class ServiceLines:
                 self.spent_s += time.thread_time() - before
             if printed is not None:
                 found.append(printed)
-            if self.spent_s > BUDGET_S:
-                self.is_over = True
-                self.say_once("over", f"{self._over}: what it prints from then on is log")
+        if self.spent_s > BUDGET_S:
+            self.is_over = True
+            self.say_once("over", f"{self._over}: what it prints from then on is log")
         return found
 
     @property
