@@ -11,7 +11,7 @@ import re
 import struct
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, Protocol
 
 from dodo_dsl.application.printed_lines import SAMPLE_TIME, compiled
 from dodo_dsl.emit.output_folder import FILES
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import INTEGER_BITS, integer_range
 from dodo_dsl.opendlv.relay import BUS
@@ -31,8 +32,10 @@ from dodo_dsl.run.protocol import Say, Unmatched
 
 MAX_LINE = 1 << 16
 """Bytes; what is longer is log."""
-MAX_FRAME = 1 << 15
+MAX_PAYLOAD = 1 << 15
 """Bytes of a message that a line may make."""
+_MOST_WAITING = 50_000
+"""Messages of a service in a step; the clock takes far fewer."""
 BUDGET_S = 5.0
 """Processor time in s of a service's patterns in a test; then the rest is log."""
 LINES_READ = "dodo.LinesRead"
@@ -110,8 +113,9 @@ def sample_time(unit: str, text: bytes) -> int:
 class Printed(NamedTuple):
     """A message that a line makes; ``sample_time`` in us is None if the line has none."""
 
-    message: Any
     line: Line
+    id: int
+    payload: bytes
     sample_time: int | None
 
 
@@ -120,7 +124,7 @@ class LinePattern:
 
     def __init__(self, line: Line, messages: MessageSet) -> None:
         self.line = line
-        self._type = messages.type(line.message)
+        self._messages, self._type = messages, messages.type(line.message)
         types = {each.name: each.type for each in messages.layout(line.message).definition.fields}
         self._regexp = compiled(line.match)
         groups = {name.decode(): number for name, number in self._regexp.groupindex.items()}
@@ -142,7 +146,11 @@ class LinePattern:
             except NoValue as error:
                 raise NoValue(f"{name} '{_shown(text)}' is {error}") from None
         sampled = values.pop(SAMPLE_TIME, None)
-        return Printed(self._type(**values), self.line, sampled)
+        message = self._type(**values)
+        payload = self._messages.encode(message)
+        if len(payload) > MAX_PAYLOAD:
+            raise NoValue(f"it has more than {MAX_PAYLOAD} bytes")
+        return Printed(self.line, self._messages.id(message), payload, sampled)
 
 
 @dataclass
@@ -180,165 +188,12 @@ class ServiceLines:
                 self.unfinished = b""
         return found
 
-    def _taken(self, line: bytes, is_finished: bool) -> list[Printed]:
-        parts, found = [line], list[Printed]()
-        if (b"\x1b" in line or b"\r" in line) and len(line) <= MAX_LINE:
-            parts = _FOR_TERMINALS.sub(b"", line).split(b"\r")
-            for part in parts:
-                found += self._printed(part, is_finished)
-        found = found or self._printed(line, is_finished)
-        if found:
-            self.matched += 1
-            self.last = parts[-1][:_WIDTH]
-            self.unmatched.clear()
-        elif is_finished:
-            self.unmatched.extend(part[:_WIDTH] for part in parts if part.strip())
-        return found
-
-    def _printed(self, line: bytes, is_finished: bool) -> list[Printed]:
-        found = []
-        for pattern in self.patterns if len(line) <= MAX_LINE else ():
-            if self.is_over or self.spent_s > BUDGET_S:
-                break
-            before = time.thread_time()
-            try:
-                printed = pattern.printed(line)
-            except NoValue as error:
-                key, _, _ = str(error).partition(" ")
-                what = f"is not a valid {pattern.line.message}"
-                if is_finished:
-                    self.say_once(f"{what} {key}", f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")
-                continue
-            finally:
-                self.spent_s += time.thread_time() - before
-            if printed is not None:
-                found.append(printed)
-        if self.spent_s > BUDGET_S:
-            self.is_over = True
-            self.say_once("over", f"{self._over}: what it prints from then on is log")
-        return found
-
-    @property
-    def _over(self) -> str:
-        return f"the patterns of '{self.service}' took more than {BUDGET_S:g} s for its lines"
-
-    def say_once(self, key: str, sentence: str) -> None:
-        """What is wrong with a line, unless the same is said already, by its ``key``."""
-        if key not in self.said:
-            self.said.add(key)
-            self.notes.append(sentence)
-
-    def silence(self, unfinished: bytes = b"") -> str:
-        """What it printed instead of a match since the last one, in words."""
-        if self.spent_s > BUDGET_S:
-            return self._over
-        since = "since its last match " if self.matched else ""
-        if unfinished.strip() and unfinished != self.unfinished:
-            return f"{since}'{self.service}' printed a line without its end: '{_shown(unfinished)}'"
-        if not self.unmatched:
-            return f"{since}'{self.service}' printed no line"
-        return f"{since}no line of '{self.service}' matched, the nearest is '{_shown(self._nearest())}'"
-
-    def _nearest(self) -> bytes:
-        """The line that is most like one that matched, or like a pattern; of equal ones the last."""
-        likes = [self.last] if self.last else [_GROUP.sub("", p.line.match).encode() for p in self.patterns]
-
-        def likeness(line: bytes) -> float:
-            return max(difflib.SequenceMatcher(None, line, like, autojunk=False).ratio() for like in likes)
-
-        return max(reversed(list(self.unmatched)), key=likeness)
-
-
-class Send(Protocol):
-    """Sends a datagram to a test's services by their names, or on its bus."""
-
-    def __call__(self, data: bytes, to: Sequence[str] = (BUS,)) -> None: ...
-
-
-class PrintedLines:
-    """The lines of a test's application; ``note`` is called with a sentence about one that makes no message.
-
-    Before the application starts, ``connect`` sets the sender. Messages are sent as they come until the clock of the
-    test asks for them: then they wait for its next question, and are of the time that it names.
-    """
-
-    def __init__(self, plan: Plan, folder: Path, note: Say) -> None:
-        """``folder`` is the compiled test's, with its messages."""
-        declared = {s.name: s.lines for s in plan.application.services if s.lines}
-        own = (folder / FILES / path for path in plan.messages)
-        self._messages = MessageSet.load(*own) if declared else MessageSet.standard()
-        self._note = note
-        self.services = {
-            name: ServiceLines(name, [LinePattern(line, self._messages) for line in lines])
-            for name, lines in declared.items()
-        }
-        self._hearers = {line: _hearers(plan, name, line) for name, lines in declared.items() for line in lines}
-        self._matcher = ThreadPoolExecutor(1, "lines")
-        self._waiting: dict[str, list[Printed]] | None = None
-        self._send: Send = lambda data, to=(BUS,): None
-
-    def __bool__(self) -> bool:
-        return bool(self.services)
-
-    def connect(self, send: Send) -> None:
-        """``send`` sends a frame to the test's services, or on its bus."""
-        self._send = send
-
-    def match(self, service: str, lines: Sequence[bytes], is_finished: bool = True) -> "asyncio.Future[None]":
-        """Takes lines that a service printed, without their ends; done when they are messages."""
-        return asyncio.ensure_future(self._match(service, lines, is_finished))
-
-    async def _match(self, service: str, lines: Sequence[bytes], is_finished: bool) -> None:
-        own = self.services[service]
-        take = partial(own.take, lines, is_finished)
-        found = [] if own.is_over else await asyncio.get_running_loop().run_in_executor(self._matcher, take)
-        while own.notes:
-            self._note(own.notes.pop(0))
-        if self._waiting is None:
-            self._send_all(service, found, None)
-        else:
-            self._waiting.setdefault(service, []).extend(found)
-
-    def rest(self, now: int, goes_on: bool) -> None:
-        """The application rests at a time of the test (us), unless it ``goes_on``: sends what it has printed."""
-        waiting, self._waiting = self._waiting or {}, {}
-        for service in self.services:
-            found = waiting.get(service, [])
-            kept = {"first": {id(p.line): p for p in reversed(found)}, "last": {id(p.line): p for p in found}}
-            self._send_all(
-                service, [p for p in found if p.line.take == "all" or kept[p.line.take][id(p.line)] is p], now
-            )
-        said = self._messages.type(LINES_READ)(goesOn=goes_on)
-        self._send(frame_of(said, self._messages, now, sent=now), [CLOCK])
-
-    def _send_all(self, service: str, found: Sequence[Printed], now: int | None) -> None:
-        for message, line, sampled in found:
-            frame = frame_of(message, self._messages, now if sampled is None else sampled, line.sender, now)
-            if len(frame) > MAX_FRAME:
-                what = f"a line of '{service}' makes a message of more than {MAX_FRAME} bytes, which is not sent"
-                if what not in self.services[service].said:
-                    self.services[service].said.add(what)
-                    self._note(what)
-                continue
-            self._send(frame, self._hearers[line])
-
-    def close(self) -> None:
-        """Matches nothing more."""
-        for each in self.services.values():
-            each.is_over = True
-        self._matcher.shutdown(wait=False, cancel_futures=True)
-
-    def unmatched(self, unfinished: Mapping[str, bytes]) -> tuple[Unmatched, ...]:
-        """Of each service what it printed since its last match; ``unfinished`` are their last lines without an end."""
-        return tuple(
-            Unmatched(name, each.silence(unfinished.get(name, b"")), each.matched == 0)
-            for name, each in self.services.items()
-        )
-
-
-def _shown(text: bytes) -> str:
-    decoded = text[:_WIDTH].decode("utf-8", "replace")
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in decoded)
+    def _taken(found: Sequence[Printed]) -> list[Printed]:
+    """Those that count of a service's messages in a step."""
+    last = {each.line: number for number, each in enumerate(found)}
+    first = {each.line: len(found) - 1 - number for number, each in enumerate(reversed(found))}
+    kept = {"first": first, "last": last}
+    return [each for n, each in enumerate(found) if kept.get(each.line.take, {each.line: n})[each.line] == n]
 
 
 def _hearers(plan: Plan, service: str, line: Line) -> list[str]:

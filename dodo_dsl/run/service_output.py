@@ -10,7 +10,7 @@ import re
 import termios
 import tty
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ REPRINT = b"\x12"
 """What a terminal, asked for its unfinished line, answers with ``_REPRINTED``, and gives to no program (termios(3))."""
 _REPRINTED = re.compile(rb"\^R\r?\n")
 
-Match = Callable[[Sequence[bytes], bool], "asyncio.Future[Any]"]
+Match = Callable[[Sequence[bytes], bool], Coroutine[Any, Any, None]]
 """Takes lines, and whether they are finished; done when their messages are made."""
 
 
@@ -56,7 +56,7 @@ class ServiceOutput:
         self.type_in: Callable[[bytes], None] | None = None
         """Types into another terminal, whose output comes here some time after it was printed."""
         self._match = match
-        self._matching: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._matching: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._matching.set_result(None)
         self._read_bytes, self._echoes = 0, asyncio.Semaphore(0)
         self._log = atomic.appended(log)
@@ -182,7 +182,7 @@ class ServiceOutput:
             return
         if self._reader >= 0:
             asyncio.get_running_loop().remove_reader(self._reader)
-        self._matching = self._match(lines, is_finished)
+        self._matching = asyncio.ensure_future(self._match(lines, is_finished))
         self._matching.add_done_callback(self._read_on)
 
     def _read_on(self, _: object) -> None:

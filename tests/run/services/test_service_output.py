@@ -130,8 +130,7 @@ def test_a_terminal_is_read_empty_where_its_program_rests(tmp_path: Path) -> Non
         matched.append(([*lines], is_finished))
 
     async def scene() -> None:
-        match: service_output.Match = lambda *about: asyncio.ensure_future(take(*about))  # noqa: E731
-        output = ServiceOutput(tmp_path / "app.log", lambda _: False, terminal=True, match=match)
+        output = ServiceOutput(tmp_path / "app.log", lambda _: False, terminal=True, match=take)
         os.write(output.writer, b"a\nb\nunfin")
         assert not await output.read_empty()
         assert matched == [([b"a", b"b"], True), ([b"unfin"], False)]
@@ -156,8 +155,7 @@ def test_another_terminal_says_what_was_printed_until_now(tmp_path: Path) -> Non
         lines.extend(found)
 
     async def scene() -> None:
-        match: service_output.Match = lambda *about: asyncio.ensure_future(take(*about))  # noqa: E731
-        output = ServiceOutput(tmp_path / "app.log", lambda _: False, is_cooked=True, match=match)
+        output = ServiceOutput(tmp_path / "app.log", lambda _: False, is_cooked=True, match=take)
         outer, inner = os.openpty()
         output.type_in = lambda data: os.write(outer, data) and None
 
