@@ -188,7 +188,152 @@ class ServiceLines:
                 self.unfinished = b""
         return found
 
-    def _taken(found: Sequence[Printed]) -> list[Printed]:
+    def _taken(self, line: bytes, is_finished: bool) -> list[Printed]:
+        parts, found = [line], list[Printed]()
+        if (b"\x1b" in line or b"\r" in line) and len(line) <= MAX_LINE:
+            parts = _FOR_TERMINALS.sub(b"", line).split(b"\r")
+            for part in parts:
+                found += self._printed(part, is_finished)
+        found = found or self._printed(line, is_finished)
+        if found:
+            self.matched += 1
+            self.last = parts[-1][:_WIDTH]
+            self.unmatched.clear()
+        elif is_finished:
+            self.unmatched.extend(part[:_WIDTH] for part in parts if part.strip())
+        return found
+
+    def _printed(self, line: bytes, is_finished: bool) -> list[Printed]:
+        found = []
+        for pattern in self.patterns if len(line) <= MAX_LINE else ():
+            if self.is_over or self.spent_s > BUDGET_S:
+                break
+            before = time.thread_time()
+            try:
+                printed = pattern.printed(line)
+            except NoValue as error:
+                key, _, _ = str(error).partition(" ")
+                what = f"is not a valid {pattern.line.message}"
+                if is_finished:
+                    self.say_once(f"{what} {key}", f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")
+                continue
+            finally:
+                self.spent_s += time.thread_time() - before
+            if printed is not None:
+                found.append(printed)
+        if self.spent_s > BUDGET_S:
+            self.is_over = True
+            self.say_once("over", f"{self._over}: what it prints from then on is log")
+        return found
+
+    @property
+    def _over(self) -> str:
+        return f"the patterns of '{self.service}' took more than {BUDGET_S:g} s for its lines"
+
+    def say_once(self, key: str, sentence: str) -> None:
+        """What is wrong with a line, unless the same is said already, by its ``key``."""
+        if key not in self.said:
+            self.said.add(key)
+            self.notes.append(sentence)
+
+    def silence(self, unfinished: bytes = b"") -> str:
+        """What it printed instead of a match since the last one, in words."""
+        if self.spent_s > BUDGET_S:
+            return self._over
+        since = "since its last match " if self.matched else ""
+        if unfinished.strip() and unfinished != self.unfinished:
+            return f"{since}'{self.service}' printed a line without its end: '{_shown(unfinished)}'"
+        if not self.unmatched:
+            return f"{since}'{self.service}' printed no line"
+        return f"{since}no line of '{self.service}' matched, the nearest is '{_shown(self._nearest())}'"
+
+    def _nearest(self) -> bytes:
+        """The line that is most like one that matched, or like a pattern; of equal ones the last."""
+        likes = [self.last] if self.last else [_GROUP.sub("", p.line.match).encode() for p in self.patterns]
+
+        def likeness(line: bytes) -> float:
+            return max(difflib.SequenceMatcher(None, line, like, autojunk=False).ratio() for like in likes)
+
+        return max(reversed(list(self.unmatched)), key=likeness)
+
+
+class Send(Protocol):
+    """Sends a datagram to a test's services by their names, or on its bus."""
+
+    def __call__(self, data: bytes, to: Sequence[str] = (BUS,)) -> None: ...
+
+
+class PrintedLines:
+    """The lines of a test's application; ``note`` is called with a sentence about one that makes no message.
+
+    Before the application starts, ``connect`` sets the sender. Messages are sent as they come until the clock of the
+    test asks for them: then they wait for its next question, and are of the time that it names.
+    """
+
+    def __init__(self, plan: Plan, folder: Path, note: Say) -> None:
+        """``folder`` is the compiled test's, with its messages."""
+        declared = {s.name: s.lines for s in plan.application.services if s.lines}
+        own = (folder / FILES / path for path in plan.messages)
+        self._messages = MessageSet.load(*own) if declared else MessageSet.standard()
+        self._note = note
+        self.services = {
+            name: ServiceLines(name, [LinePattern(line, self._messages) for line in lines])
+            for name, lines in declared.items()
+        }
+        self._hearers = {line: _hearers(plan, name, line) for name, lines in declared.items() for line in lines}
+        self._matcher = ThreadPoolExecutor(1, "lines")
+        self._waiting: dict[str, list[Printed]] | None = None
+        self._send: Send = lambda data, to=(BUS,): None
+
+    def connect(self, send: Send) -> None:
+        """``send`` sends a frame to the test's services, or on its bus."""
+        self._send = send
+
+    async def match(self, service: str, lines: Sequence[bytes], is_finished: bool = True) -> None:
+        """Takes lines that a service printed, without their ends, and makes messages of them."""
+        own = self.services[service]
+        take = partial(own.take, lines, is_finished)
+        found = [] if own.is_over else await asyncio.get_running_loop().run_in_executor(self._matcher, take)
+        while own.notes:
+            self._note(own.notes.pop(0))
+        if self._waiting is None:
+            self._send_all(found, None)
+        elif len(waiting := self._waiting.setdefault(service, [])) < _MOST_WAITING:
+            self._waiting[service] = _counting([*waiting, *found])
+
+    def rest(self, now: int, goes_on: bool) -> None:
+        """The application rests at a time of the test (us), unless it ``goes_on``: sends what it has printed."""
+        if not goes_on and self._waiting:
+            self._send_all([each for name in self.services for each in self._waiting.get(name, ())], now)
+        self._waiting = self._waiting if goes_on and self._waiting else {}
+        self._send(frame_of(MessageSet.standard().type(LINES_READ)(goesOn=goes_on), now), [CLOCK])
+
+    def _send_all(self, found: Iterable[Printed], now: int | None) -> None:
+        sent = time.time_ns() // 1000 if now is None else now
+        for line, id_, payload, sampled in found:
+            envelope = Envelope(id_, payload, sent, 0, sent if sampled is None else sampled, line.sender)
+            self._send(encode_frame(envelope), self._hearers[line])
+
+    def close(self) -> None:
+        """Matches nothing more."""
+        for each in self.services.values():
+            each.is_over = True
+        self._matcher.shutdown(wait=False, cancel_futures=True)
+
+    def unmatched(self, unfinished: Mapping[str, bytes]) -> tuple[Unmatched, ...]:
+        """Of each service what it printed since its last match; ``unfinished`` are their last lines without an end."""
+        return tuple(
+            Unmatched(name, each.silence(unfinished.get(name, b"")), each.matched == 0)
+            for name, each in self.services.items()
+        )
+
+
+def _shown(text: bytes) -> str:
+    decoded = text[:_WIDTH].decode("utf-8", "replace")
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in decoded)
+
+
+def _counting(found: Sequence[Printed]) -> list[Printed]:
     """Those that count of a service's messages in a step."""
     last = {each.line: number for number, each in enumerate(found)}
     first = {each.line: len(found) - 1 - number for number, each in enumerate(reversed(found))}
