@@ -302,10 +302,17 @@ class PrintedLines:
             self._waiting[service] = _counting([*waiting, *found])
 
     def rest(self, now: int, goes_on: bool) -> None:
-        """The application rests at a time of the test (us), unless it ``goes_on``: sends what it has printed."""
-        if not goes_on and self._waiting:
-            self._send_all([each for name in self.services for each in self._waiting.get(name, ())], now)
-        self._waiting = self._waiting if goes_on and self._waiting else {}
+        """The application rests at a time of the test (us), unless it ``goes_on``: sends what it has printed.
+
+        Where its other programs get that, too, it goes on once more.
+        """
+        waiting, self._waiting = self._waiting or {}, {}
+        if goes_on:
+            self._waiting = waiting
+        else:
+            found = [each for name in self.services for each in waiting.get(name, ())]
+            self._send_all(found, now)
+            goes_on = any(BUS in self._hearers[each.line] for each in found)
         self._send(frame_of(MessageSet.standard().type(LINES_READ)(goesOn=goes_on), now), [CLOCK])
 
     def _send_all(self, found: Iterable[Printed], now: int | None) -> None:
@@ -342,13 +349,12 @@ def _counting(found: Sequence[Printed]) -> list[Printed]:
 
 
 def _hearers(plan: Plan, service: str, line: Line) -> list[str]:
-    """Who gets the messages of a line: services of the test, and the bus where another program may take them.
+    """Who gets the messages of a line: services of the test, or all on the bus where another program may take them.
 
-    On the bus the program itself would hear what it printed, unlike one that sends. One that declares nothing may take
-    whatever is there.
+    There the program itself hears what it printed, unlike one that sends. One that declares nothing may take anything.
     """
     names = [CLOCK, RECORDER] if plan.lockstep else [each.name for each in plan.services]
     others = [each for each in plan.application.services if each.name != service]
     taken = {line.message, f"{line.message}/{line.sender}"}
     is_taken = any(not (o.inputs or o.outputs) or not taken.isdisjoint(o.inputs) for o in others)
-    return [*names, BUS] if is_taken else names
+    return [BUS] if is_taken else names

@@ -34,7 +34,8 @@ class PrintedLines:
     def are_complete(self, now: int, link: ServiceLink) -> bool:
         """Take the messages of an application that rests, at a time of the test (us).
 
-        False where it may have waited only for its lines to be read. Raises ServiceSilent and ApplicationFloods.
+        False where it may have waited only for its lines to be read, or gets them itself. Raises ServiceSilent and
+        ApplicationFloods.
         """
         self._turns = self._turns + 1 if self._goes_on else 0
         if self._turns > MOST_TURNS:

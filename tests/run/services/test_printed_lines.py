@@ -18,7 +18,7 @@ from dodo_dsl.opendlv.envelope import Envelope, decode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.plan.model import Line
 from dodo_dsl.run import printed_lines
-from dodo_dsl.run.printed_lines import LINES_READ, MAX_LINE, LinePattern, NoValue, PrintedLines, sample_time, value
+from dodo_dsl.run.printed_lines import MAX_LINE, LinePattern, NoValue, PrintedLines, sample_time, value
 from dodo_dsl.run.service_output import ServiceOutput
 from tests.run.helpers import Bench
 
@@ -63,7 +63,8 @@ class Desk:
         """The same of what waited for a time at which the application rests."""
         del self.sent[:]
         self.lines.rest(now, goes_on=False)
-        assert self.sent.pop().data_type == self.messages.id(LINES_READ)
+        read = self.sent.pop()
+        assert fields(self.messages, read) == {"goesOn": False}
         assert {each.sent for each in self.sent} <= {now}  # so that recordings are equal
         return self.messages_sent()
 
@@ -262,8 +263,7 @@ def test_only_another_program_that_may_take_it_makes_a_message_come_to_the_bus(
         lines, to = PrintedLines(tested, tmp_path, print), list[str]()
         lines.connect(lambda _, names=(): to.extend(names))  # noqa: B023
         asyncio.run(lines.match("app", [b"group_06;1;0.5"]))
-        assert ("*" in to) is expected
-        assert {service.name for service in plan.services} <= {*to}
+        assert to == (["*"] if expected else [service.name for service in plan.services])
 
 
 def test_fields_of_all_types_and_those_of_another_alternative(tmp_path: Path) -> None:
@@ -375,29 +375,6 @@ def test_fuzzed_lines(tmp_path: Path, terminal: bool) -> None:
     valid, grown = fuzz(tmp_path, 10_000, terminal)
     assert valid >= 1_000
     assert grown < 32 << 10
-
-
-@pytest.mark.proof
-def test_a_million_fuzzed_lines_in_bounded_memory(tmp_path: Path) -> None:
-    valid, grown = fuzz(tmp_path, 1_000_000, terminal=True)
-    assert valid >= 100_000
-    assert grown < 32 << 10
-
-
-@pytest.mark.slow
-def test_a_hostile_pattern_takes_time_in_proportion_to_the_line() -> None:
-    """In processor time; by backtracking it would take longer than the sun burns."""
-    pattern = compiled(r"((a|a)*)*b|(x+x+)+y|(?P<groundSteering>(z*)*q)")
-
-    def took(size: int) -> float:
-        line = b"a" * size + b"x" * size + b"z" * size
-        began = time.process_time()
-        for _ in range(20):
-            assert pattern.search(line) is None
-        return time.process_time() - began
-
-    took(1000)
-    assert took(20_000) < 40 * max(took(1000), 0.002)
 
 
 def test_patterns_have_only_the_messages_that_they_name() -> None:
