@@ -103,7 +103,7 @@ def _float(type_: str, text: bytes) -> float:
 def sample_time(unit: str, text: bytes) -> int:
     """A time in microseconds, to which decimals of ``s`` and ``ms`` are rounded; raises NoValue."""
     if not _TIME.fullmatch(text) or (unit == "us" and b"." in text):
-        raise NoValue("no whole number" if unit == "us" else "no number")
+        raise NoValue("no whole number (of us, without sample-time: s)" if unit == "us" else "no number")
     found = round(Fraction(text.decode()) * _UNITS[unit])
     if found >= _END_OF_TIME:
         raise NoValue(f"not a time in {unit}")

@@ -187,7 +187,7 @@ def test_values_of_fields(type_: str, text: bytes, expected: object) -> None:
     ("unit", "text", "expected"),
     [
         ("us", b"1700000000100000", 1700000000100000),
-        ("us", b"1700000000100000.5", "no whole number"),
+        ("us", b"1700000000100000.5", "no whole number (of us, without sample-time: s)"),
         ("ms", b"1700000000100.0009", 1700000000100001),
         ("s", b"1700000000.100000", 1700000000100000),
         ("s", b"1700000000.099999905", 1700000000100000),
