@@ -25,6 +25,7 @@ from services.clock.exchange import (
     ServiceLink,
     ServiceSilent,
 )
+from services.clock.printed_lines import PrintedLines
 
 MOST_SENT = 1000
 """Messages of one kind in a step; more of them are a flood."""
@@ -168,6 +169,8 @@ class RestingApplication:
         self._agent, self._patience, self._link, self._stopped = agent, patience, link, stopped
         self._names, self._note = names, note
         self._noted: set[str] = set()
+        self.lines: PrintedLines | None = None
+        """What it prints as messages, if it does."""
         self._unread: set[str] = set()
         """Cameras whose pictures nobody has waited for yet."""
         self._held: list[str] = []
@@ -275,7 +278,16 @@ class RestingApplication:
         self._tell(report)
         spent_s = time.monotonic() - began
         self._taken_s += spent_s if report.has_ended else min(report.ran_s, spent_s)
-        return report.now >= until * _NS
+        if report.now < until * _NS:
+            return False
+        if not (has_lines := self._has_lines(until)):
+            self._agent.run(until)
+        return has_lines
+
+    def _has_lines(self, until: int) -> bool:
+        """Whether all that it has printed in this step is taken, and it still rests."""
+        is_shown_next = until in (self._shown_at, self._shown_at + EXPOSED_US)
+        return is_shown_next or self.lines is None or self.lines.are_complete(self._shown_at, self._link)
 
     @property
     def _limit(self) -> float:
