@@ -1,4 +1,4 @@
-"""What `clock: virtual` costs a program: a read of the clock beside the kernel's, and how fast its timers go.
+"""What the test's time costs a program: a read of the clock beside the kernel's, and how fast its timers go.
 
     python benchmarks/bench_clock.py
 
@@ -17,7 +17,7 @@ from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, attempt, cost_row, plan, rate_row, report
 from tests.services.clock.native.application import Application, compiled, refusal
 
-READ, TIMER = "clock: virtual, a read of the clock", "clock: virtual, a program with a timer of 100 Hz"
+READ, TIMER = "the test's time, a read of the clock", "the test's time, a program with a timer of 100 Hz"
 READ_GOAL, TIMER_GOAL = Goal(200.0, "value"), Goal(10.0, "value")
 MEASURED_S = 8.0
 ROUNDS = 9

@@ -61,6 +61,8 @@ class PrintedLine:
     message: str
     message_span: Span
     sender: int = 0
+    sample_time: str = "us"
+    take: str = "all"
 
     @property
     def port(self) -> str:
@@ -292,13 +294,18 @@ def declared(service: source.Mapping) -> Declared | None:
     return Declared(inputs, (*outputs, *printed.values()), answers, done[0] if done else None, count, entry.key, lines)
 
 
+_LINE_KEYS = ("sample-time", "take")
+
+
 def printed_lines(node: Node | None) -> Iterator[PrintedLine]:
     """The ``lines`` of a service, as far as they fit the schema; ``$$`` is a dollar sign, as everywhere in compose."""
     for item in node.items if isinstance(node, source.Sequence) else ():
         match, message, sender = (source.part(item, key) for key in ("match", "message", "sender"))
         if isinstance(match, Scalar) and isinstance(message, Scalar):
             stamp = sender.value if isinstance(sender, Scalar) and isinstance(sender.value, int) else 0
-            yield PrintedLine(match.text.replace("$$", "$"), match.span, message.text, message.span, stamp)
+            unit, take = (each.text if isinstance(each := source.part(item, key), Scalar) else "" for key in _LINE_KEYS)
+            pattern = match.text.replace("$$", "$")
+            yield PrintedLine(pattern, match.span, message.text, message.span, stamp, unit or "us", take or "all")
 
 
 def scalars(node: Node | None) -> list[Scalar]:

@@ -13,7 +13,7 @@ from dodo_dsl.opendlv.odvd import SCALARS, Definition
 
 LINES_RULE = "application-lines"
 SAMPLE_TIME = "sample_time"
-"""The group that is a message's sample time in microseconds, and no field."""
+"""The group that is a message's sample time, and no field."""
 _SYNTAX = "patterns are those of RE2, https://github.com/google/re2/wiki/Syntax"
 _MAX_MEMORY = 8 << 20
 _MAX_SIZE = 1000

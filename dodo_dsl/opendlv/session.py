@@ -215,6 +215,10 @@ class Session:
         """The file descriptor to select on for reading."""
         return self._receiver.fileno()
 
+    def filenos(self) -> tuple[int, ...]:
+        """As ``fileno``, with that of its own address if it ``hears_directly``."""
+        return (self._receiver.fileno(), *([self._sender.fileno()] if self.hears_directly else []))
+
     def hear_only(
         self, ids: Iterable[int], of_others: Iterable[int] = (), than: Iterable[Address] = frozenset()
     ) -> None:

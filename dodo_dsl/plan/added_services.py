@@ -85,6 +85,7 @@ def clock(
         "done": wiring.done,
         TIME_FOLDER: OWN_TIME,
         "application": ",".join(application),
+        "prints": "true" if wiring.printed else "",
         "timeout": f"{spec.timeout_s or 0.0:g}",
         "max-response": "" if spec.max_response_s is None else f"{spec.max_response_s:g}",
         "cid": str(cid),

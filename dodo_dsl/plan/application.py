@@ -50,6 +50,7 @@ def _container(construction: Construction, name: str, made: dict[str, Any]) -> d
     service, setting = construction.application.services[name], construction.setting
     if service.declared and service.declared.lines:
         made["tty"] = True  # programs print each line at once to a terminal
+        made["stdin_open"] = True  # the runner asks that terminal what was printed
     if setting.time_seed is not None and setting.own_network:
         given = {variable: value or "" for variable, value in made.get("environment", {}).items()}
         number = list(construction.application.services).index(name)
@@ -107,7 +108,7 @@ def _process(
         outputs=_names(own.outputs) if own else (),
         after={**dict.fromkeys(needed, STARTED), **{n: how.get("condition", STARTED) for n, how in waits.items()}},
         optional=tuple(n for n, how in waits.items() if how.get("required") is False),
-        lines=tuple(Line(line.match, line.message, line.sender) for line in own.lines) if own else (),
+        lines=tuple(Line(n.match, n.message, n.sender, n.sample_time, n.take) for n in own.lines) if own else (),
     )
 
 

@@ -55,11 +55,16 @@ class PlannedService:
 
 @dataclass(frozen=True)
 class Line:
-    """What a service prints: a line in which RE2 finds ``match`` is a message, whose fields are the named groups."""
+    """What a service prints: a line in which RE2 finds ``match`` is a message, whose fields are the named groups.
+
+    ``sample_time`` is the unit of that, ``take`` says which of several lines in a step count.
+    """
 
     match: str
     message: str
     sender: int = 0
+    sample_time: str = "us"
+    take: str = "all"
 
 
 @dataclass(frozen=True)

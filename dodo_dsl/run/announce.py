@@ -25,16 +25,12 @@ def begin_frame(seed: int) -> bytes:
     return frame_of(begin(seed=seed))
 
 
-def frame_of(
-    message: Message,
-    messages: MessageSet | None = None,
-    sampled: int | None = None,
-    stamp: int = 0,
-) -> bytes:
-    """A message as a datagram of now, sampled at a time in us, by default now too."""
-    known, now = messages or MessageSet.standard(), time.time_ns() // 1000
-    sample_time = now if sampled is None else sampled
-    return encode_frame(Envelope(known.id(message), known.encode(message), now, 0, sample_time, stamp))
+def frame_of(message: Message, sampled: int | None = None) -> bytes:
+    """A message of DoDo's as a datagram of now, sampled at a time in us, by default now too."""
+    known, now = MessageSet.standard(), time.time_ns() // 1000
+    return encode_frame(
+        Envelope(known.id(message), known.encode(message), now, 0, now if sampled is None else sampled, 0)
+    )
 
 
 def hearers(plan: Plan) -> list[str]:

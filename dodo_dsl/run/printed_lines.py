@@ -1,36 +1,49 @@
 """What an application prints and declares as messages: lines become envelopes, which the runner sends for it.
 
 They come from the runner's address in the test: the application can send none of them itself. What matches nothing is
-log.
+log. Lines are matched in a thread of the test's own: RE2 lets the runner go on meanwhile.
 """
 
+import asyncio
 import difflib
 import math
 import re
 import struct
+import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from dodo_dsl.application.printed_lines import SAMPLE_TIME, compiled
 from dodo_dsl.emit.output_folder import FILES
+from dodo_dsl.opendlv.envelope import Envelope, encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import INTEGER_BITS, integer_range
+from dodo_dsl.opendlv.relay import BUS
+from dodo_dsl.plan.added_services import CLOCK, RECORDER
 from dodo_dsl.plan.model import Line, Plan
 from dodo_dsl.run.announce import frame_of
-from dodo_dsl.run.protocol import Unmatched
+from dodo_dsl.run.protocol import Say, Unmatched
 
 MAX_LINE = 1 << 16
 """Bytes; what is longer is log."""
-MAX_FRAME = 1 << 15
+MAX_PAYLOAD = 1 << 15
 """Bytes of a message that a line may make."""
+_MOST_WAITING = 50_000
+"""Messages of a service in a step; the clock takes far fewer."""
+BUDGET_S = 5.0
+"""Processor time in s of a service's patterns in a test; then the rest is log."""
+LINES_READ = "dodo.LinesRead"
 _MOST_UNMATCHED, _WIDTH = 100, 200
-_AGAIN_S = 0.5
-"""How often the runner's address is said again, while lines come: a datagram may be lost."""
 _INTEGER = re.compile(rb"[-+]?[0-9]{1,20}")
 _NUMBER = re.compile(rb"[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?|nan|inf(inity)?)", re.IGNORECASE)
+_UNITS = {"us": 1, "ms": 1000, "s": 1_000_000}
+_TIME = re.compile(rb"[0-9]{1,20}(\.[0-9]{1,20})?")
 _BOOLEANS = {b"1": True, b"true": True, b"0": False, b"false": False}
 _END_OF_TIME = 1_000_000 << 31
 """Microseconds; an envelope's seconds have 32 bits with a sign."""
@@ -87,11 +100,22 @@ def _float(type_: str, text: bytes) -> float:
     return found
 
 
+def sample_time(unit: str, text: bytes) -> int:
+    """A time in microseconds, to which decimals of ``s`` and ``ms`` are rounded; raises NoValue."""
+    if not _TIME.fullmatch(text) or (unit == "us" and b"." in text):
+        raise NoValue("no whole number (of us, without sample-time: s)" if unit == "us" else "no number")
+    found = round(Fraction(text.decode()) * _UNITS[unit])
+    if found >= _END_OF_TIME:
+        raise NoValue(f"not a time in {unit}")
+    return found
+
+
 class Printed(NamedTuple):
     """A message that a line makes; ``sample_time`` in us is None if the line has none."""
 
-    message: Any
-    sender: int
+    line: Line
+    id: int
+    payload: bytes
     sample_time: int | None
 
 
@@ -100,7 +124,7 @@ class LinePattern:
 
     def __init__(self, line: Line, messages: MessageSet) -> None:
         self.line = line
-        self._type = messages.type(line.message)
+        self._messages, self._type = messages, messages.type(line.message)
         types = {each.name: each.type for each in messages.layout(line.message).definition.fields}
         self._regexp = compiled(line.match)
         groups = {name.decode(): number for name, number in self._regexp.groupindex.items()}
@@ -111,25 +135,30 @@ class LinePattern:
         match = self._regexp.search(line)
         if match is None:
             return None
-        values, sampled = {}, None
+        values: dict[str, Any] = {}
         for name, number, type_ in self._groups:
             text = match.group(number)
             if text is None:
                 continue  # of another alternative
             try:
-                values[name] = value(type_, text)
+                own = name == SAMPLE_TIME
+                values[name] = sample_time(self.line.sample_time, text) if own else value(type_, text)
             except NoValue as error:
                 raise NoValue(f"{name} '{_shown(text)}' is {error}") from None
-        if SAMPLE_TIME in values:
-            sampled = values.pop(SAMPLE_TIME)
-            if sampled >= _END_OF_TIME:
-                raise NoValue(f"{SAMPLE_TIME} '{sampled}' is not a time in microseconds")
-        return Printed(self._type(**values), self.line.sender, sampled)
+        sampled = values.pop(SAMPLE_TIME, None)
+        message = self._type(**values)
+        payload = self._messages.encode(message)
+        if len(payload) > MAX_PAYLOAD:
+            raise NoValue(f"it has more than {MAX_PAYLOAD} bytes")
+        return Printed(self.line, self._messages.id(message), payload, sampled)
 
 
 @dataclass
 class ServiceLines:
-    """The lines of one service so far: the last one that matched, and those that did not since."""
+    """The lines of one service so far: the last one that matched, and those that did not since.
+
+    ``notes`` are sentences about lines that make no message, ``spent_s`` is what the patterns have taken.
+    """
 
     service: str
     patterns: Sequence[LinePattern]
@@ -137,52 +166,82 @@ class ServiceLines:
     last: bytes = b""
     unmatched: deque[bytes] = field(default_factory=lambda: deque(maxlen=_MOST_UNMATCHED))
     said: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    spent_s: float = 0.0
+    is_over: bool = False
+    """Whether nothing more is to be matched."""
+    unfinished: bytes = b""
+    """A line without its end that has matched: it does not count once more when that comes."""
 
-    def take(self, line: bytes, note: Callable[[str], None]) -> list[Printed]:
-        """The messages of a line, as many as patterns match; what cannot be converted is said once.
+    def take(self, lines: Sequence[bytes], is_finished: bool = True) -> list[Printed]:
+        """The messages of lines, as many as patterns match; a line without its end only counts if one matches.
 
         Where the terminal made a program colour it, or write over it, it is matched as without, then as it is.
         """
+        found = list[Printed]()
+        for line in (each.rstrip(b"\r") for each in lines):
+            if not line or line != self.unfinished:
+                made = self._taken(line, is_finished)
+                self.unfinished = b"" if is_finished or not made else line
+                found += made
+            elif is_finished:
+                self.unfinished = b""
+        return found
+
+    def _taken(self, line: bytes, is_finished: bool) -> list[Printed]:
         parts, found = [line], list[Printed]()
         if (b"\x1b" in line or b"\r" in line) and len(line) <= MAX_LINE:
             parts = _FOR_TERMINALS.sub(b"", line).split(b"\r")
             for part in parts:
-                found += self._printed(part, note)
-        found = found or self._printed(line, note)
+                found += self._printed(part, is_finished)
+        found = found or self._printed(line, is_finished)
         if found:
             self.matched += 1
             self.last = parts[-1][:_WIDTH]
             self.unmatched.clear()
-            return found
-        for part in parts:
-            if part.strip():
-                self.unmatched.append(part[:_WIDTH])
+        elif is_finished:
+            self.unmatched.extend(part[:_WIDTH] for part in parts if part.strip())
         return found
 
-    def _printed(self, line: bytes, note: Callable[[str], None]) -> list[Printed]:
+    def _printed(self, line: bytes, is_finished: bool) -> list[Printed]:
         found = []
         for pattern in self.patterns if len(line) <= MAX_LINE else ():
+            if self.is_over or self.spent_s > BUDGET_S:
+                break
+            before = time.thread_time()
             try:
                 printed = pattern.printed(line)
             except NoValue as error:
                 key, _, _ = str(error).partition(" ")
                 what = f"is not a valid {pattern.line.message}"
-                self.say_once(f"{what} {key}", f"{what}: {error}: '{_shown(line)}'", note)
+                if is_finished:
+                    self.say_once(f"{what} {key}", f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")
                 continue
+            finally:
+                self.spent_s += time.thread_time() - before
             if printed is not None:
                 found.append(printed)
+        if self.spent_s > BUDGET_S:
+            self.is_over = True
+            self.say_once("over", f"{self._over}: what it prints from then on is log")
         return found
 
-    def say_once(self, key: str, what: str, note: Callable[[str], None]) -> None:
+    @property
+    def _over(self) -> str:
+        return f"the patterns of '{self.service}' took more than {BUDGET_S:g} s for its lines"
+
+    def say_once(self, key: str, sentence: str) -> None:
         """What is wrong with a line, unless the same is said already, by its ``key``."""
         if key not in self.said:
             self.said.add(key)
-            note(f"a line of '{self.service}' {what}")
+            self.notes.append(sentence)
 
     def silence(self, unfinished: bytes = b"") -> str:
         """What it printed instead of a match since the last one, in words."""
+        if self.spent_s > BUDGET_S:
+            return self._over
         since = "since its last match " if self.matched else ""
-        if unfinished.strip():
+        if unfinished.strip() and unfinished != self.unfinished:
             return f"{since}'{self.service}' printed a line without its end: '{_shown(unfinished)}'"
         if not self.unmatched:
             return f"{since}'{self.service}' printed no line"
@@ -195,16 +254,23 @@ class ServiceLines:
         def likeness(line: bytes) -> float:
             return max(difflib.SequenceMatcher(None, line, like, autojunk=False).ratio() for like in likes)
 
-        return max(reversed(self.unmatched), key=likeness)
+        return max(reversed(list(self.unmatched)), key=likeness)
+
+
+class Send(Protocol):
+    """Sends a datagram to a test's services by their names, or on its bus."""
+
+    def __call__(self, data: bytes, to: Sequence[str] = (BUS,)) -> None: ...
 
 
 class PrintedLines:
     """The lines of a test's application; ``note`` is called with a sentence about one that makes no message.
 
-    Before the application starts, ``connect`` sets the sender.
+    Before the application starts, ``connect`` sets the sender. Messages are sent as they come until the clock of the
+    test asks for them: then they wait for its next question, and are of the time that it names.
     """
 
-    def __init__(self, plan: Plan, folder: Path, note: Callable[[str], None]) -> None:
+    def __init__(self, plan: Plan, folder: Path, note: Say) -> None:
         """``folder`` is the compiled test's, with its messages."""
         declared = {s.name: s.lines for s in plan.application.services if s.lines}
         own = (folder / FILES / path for path in plan.messages)
@@ -214,24 +280,52 @@ class PrintedLines:
             name: ServiceLines(name, [LinePattern(line, self._messages) for line in lines])
             for name, lines in declared.items()
         }
-        self._send: Callable[[bytes], None] = lambda _: None
+        self._hearers = {line: _hearers(plan, name, line) for name, lines in declared.items() for line in lines}
+        self._matcher = ThreadPoolExecutor(1, "lines")
+        self._waiting: dict[str, list[Printed]] | None = None
+        self._send: Send = lambda data, to=(BUS,): None
 
-    def __bool__(self) -> bool:
-        return bool(self.services)
-
-    def connect(self, send: Callable[[bytes], None]) -> None:
-        """``send`` sends a frame on the test's bus."""
+    def connect(self, send: Send) -> None:
+        """``send`` sends a frame to the test's services, or on its bus."""
         self._send = send
 
-    def take(self, service: str, line: bytes) -> None:
-        """A line that a service printed, without its end."""
-        for printed in self.services[service].take(line.rstrip(b"\r"), self._note):
-            frame = frame_of(printed.message, self._messages, printed.sample_time, printed.sender)
-            if len(frame) > MAX_FRAME:
-                what = f"makes a message of more than {MAX_FRAME} bytes, which is not sent"
-                self.services[service].say_once(what, what, self._note)
-                continue
-            self._send(frame)
+    async def match(self, service: str, lines: Sequence[bytes], is_finished: bool = True) -> None:
+        """Takes lines that a service printed, without their ends, and makes messages of them."""
+        own = self.services[service]
+        take = partial(own.take, lines, is_finished)
+        found = [] if own.is_over else await asyncio.get_running_loop().run_in_executor(self._matcher, take)
+        while own.notes:
+            self._note(own.notes.pop(0))
+        if self._waiting is None:
+            self._send_all(found, None)
+        elif len(waiting := self._waiting.setdefault(service, [])) < _MOST_WAITING:
+            self._waiting[service] = _counting([*waiting, *found])
+
+    def rest(self, now: int, goes_on: bool) -> None:
+        """The application rests at a time of the test (us), unless it ``goes_on``: sends what it has printed.
+
+        Where its other programs get that, too, it goes on once more.
+        """
+        waiting, self._waiting = self._waiting or {}, {}
+        if goes_on:
+            self._waiting = waiting
+        else:
+            found = [each for name in self.services for each in waiting.get(name, ())]
+            self._send_all(found, now)
+            goes_on = any(BUS in self._hearers[each.line] for each in found)
+        self._send(frame_of(MessageSet.standard().type(LINES_READ)(goesOn=goes_on), now), [CLOCK])
+
+    def _send_all(self, found: Iterable[Printed], now: int | None) -> None:
+        sent = time.time_ns() // 1000 if now is None else now
+        for line, id_, payload, sampled in found:
+            envelope = Envelope(id_, payload, sent, 0, sent if sampled is None else sampled, line.sender)
+            self._send(encode_frame(envelope), self._hearers[line])
+
+    def close(self) -> None:
+        """Matches nothing more."""
+        for each in self.services.values():
+            each.is_over = True
+        self._matcher.shutdown(wait=False, cancel_futures=True)
 
     def unmatched(self, unfinished: Mapping[str, bytes]) -> tuple[Unmatched, ...]:
         """Of each service what it printed since its last match; ``unfinished`` are their last lines without an end."""
@@ -244,3 +338,23 @@ class PrintedLines:
 def _shown(text: bytes) -> str:
     decoded = text[:_WIDTH].decode("utf-8", "replace")
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in decoded)
+
+
+def _counting(found: Sequence[Printed]) -> list[Printed]:
+    """Those that count of a service's messages in a step."""
+    last = {each.line: number for number, each in enumerate(found)}
+    first = {each.line: len(found) - 1 - number for number, each in enumerate(reversed(found))}
+    kept = {"first": first, "last": last}
+    return [each for n, each in enumerate(found) if kept.get(each.line.take, {each.line: n})[each.line] == n]
+
+
+def _hearers(plan: Plan, service: str, line: Line) -> list[str]:
+    """Who gets the messages of a line: services of the test, or all on the bus where another program may take them.
+
+    There the program itself hears what it printed, unlike one that sends. One that declares nothing may take anything.
+    """
+    names = [CLOCK, RECORDER] if plan.lockstep else [each.name for each in plan.services]
+    others = [each for each in plan.application.services if each.name != service]
+    taken = {line.message, f"{line.message}/{line.sender}"}
+    is_taken = any(not (o.inputs or o.outputs) or not taken.isdisjoint(o.inputs) for o in others)
+    return [BUS] if is_taken else names

@@ -92,6 +92,12 @@ class Started(Struct, tag_field="dodo", tag="started", frozen=True):
     """The application has started in lockstep, and rests."""
 
 
+class Rested(Struct, tag_field="dodo", tag="rest", frozen=True):
+    """The application rests at a ``time`` of the test in us: the clock waits for what it has printed until then."""
+
+    time: int
+
+
 class Responded(Struct, tag_field="dodo", tag="response", frozen=True):
     """How long the application took for its answers in lockstep."""
 
@@ -135,9 +141,8 @@ class GivenVerdict(Said, tag="verdict", frozen=True):
 
 
 Message = (
-    Ready | InputEnded | Overrun | Late | Paused | Flooded | MemoryTaken | Noted | Foreign | Time | Started | Responded
-    | Stopped
-    | GivenVerdict
+    Ready | InputEnded | Overrun | Late | Paused | Flooded | MemoryTaken | Noted | Foreign | Time | Started | Rested
+    | Responded | Stopped | GivenVerdict
 )  # fmt: skip
 """What services say to the runner; besides ``judged``, which is for the report to read."""
 

@@ -1,13 +1,18 @@
-"""A service's output: raw into its log with times, the last lines in memory, and each line to a callback."""
+"""A service's output: raw into its log with times, the last lines in memory, and each line to a callback.
+
+Where lines are messages, they go to another thread instead, and nothing more is read until it has them all behind it.
+"""
 
 import asyncio
 import contextlib
 import os
+import re
 import termios
 import tty
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl import atomic
 from dodo_dsl.log_times import LogTimes
@@ -17,6 +22,16 @@ _MAX_LOG = 64 << 20
 _MAX_LOG_LINES = 500_000
 _TAIL_LINES = 8
 _TAIL_WIDTH = 300
+_FULL = 1 << 12
+"""Bytes that a terminal holds; a program that has printed as many may sleep only because it has to wait."""
+_ENOUGH = 1 << 14
+_ECHO_S = 10.0
+REPRINT = b"\x12"
+"""What a terminal, asked for its unfinished line, answers with ``_REPRINTED``, and gives to no program (termios(3))."""
+_REPRINTED = re.compile(rb"\^R\r?\n")
+
+Match = Callable[[Sequence[bytes], bool], Coroutine[Any, Any, None]]
+"""Takes lines, and whether they are finished; done when their messages are made."""
 
 
 class ServiceOutput:
@@ -27,12 +42,23 @@ class ServiceOutput:
     """
 
     def __init__(
-        self, log: Path, on_line: Callable[[bytes], bool], terminal: bool = False, is_cooked: bool = False
+        self,
+        log: Path,
+        on_line: Callable[[bytes], bool],
+        terminal: bool = False,
+        is_cooked: bool = False,
+        match: Match | None = None,
     ) -> None:
         """With ``terminal`` it is that of a terminal, to which programs write each line at once; raises OSError.
 
         ``is_cooked`` means that another terminal has put a carriage return to the end of each line.
         """
+        self.type_in: Callable[[bytes], None] | None = None
+        """Types into another terminal, whose output comes here some time after it was printed."""
+        self._match = match
+        self._matching: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._matching.set_result(None)
+        self._read_bytes, self._echoes = 0, asyncio.Semaphore(0)
         self._log = atomic.appended(log)
         self._times, self._begin = LogTimes(log), os.fstat(self._log.fileno()).st_size
         self._on_line = on_line
@@ -60,6 +86,7 @@ class ServiceOutput:
 
     def hand_over(self) -> tuple[int, int]:
         """Stops reading; returns the descriptors of pipe and log for the process that goes on."""
+        self._match = None
         asyncio.get_running_loop().remove_reader(self._reader)
         self._write(self._rest)
         self._write_times()
@@ -71,10 +98,12 @@ class ServiceOutput:
 
     def close(self) -> None:
         """Reads the rest that is there already, and stops."""
-        while not self.done.is_set() and self._read():
+        self._match = None
+        while self._reader >= 0 and self._read():
             pass
-        if not self.done.is_set():
+        if self._reader >= 0:
             self._finish()
+        self.done.set()
         self._log.close()
         self._write_times()
 
@@ -89,9 +118,16 @@ class ServiceOutput:
         if not data:
             self._finish()
             return False
-        *lines, self._rest = (self._rest + data).split(b"\n")
+        self._read_bytes += len(data)
+        data = self._rest + data
+        if self.type_in is not None:
+            data, echoes = _REPRINTED.subn(b"", data)
+            for _ in range(echoes):
+                self._echoes.release()
+        *lines, self._rest = data.split(b"\n")
         if self._is_cooked:
             lines = [line.removesuffix(b"\r") for line in lines]
+        self._hand(lines)
         self._write(b"".join(line + b"\n" for line in lines if self._take(line)))
         if len(self._rest) > _MAX_LINE:
             if not self._skipping:
@@ -132,9 +168,60 @@ class ServiceOutput:
     def _finish(self) -> None:
         asyncio.get_running_loop().remove_reader(self._reader)
         os.close(self._reader)
-        if self._rest and self._take(self._rest):
-            self._write(self._rest)
-        self.done.set()
+        self._reader = -1
+        if self._rest:
+            self._hand([self._rest])
+            if self._take(self._rest):
+                self._write(self._rest)
+        if self._matching.done():
+            self.done.set()
+
+    def _hand(self, lines: Sequence[bytes], is_finished: bool = True) -> None:
+        """Has lines matched; until then, nothing is read."""
+        if self._match is None or not lines:
+            return
+        if self._reader >= 0:
+            asyncio.get_running_loop().remove_reader(self._reader)
+        self._matching = asyncio.ensure_future(self._match(lines, is_finished))
+        self._matching.add_done_callback(self._read_on)
+
+    def _read_on(self, _: object) -> None:
+        if self._match is None or self.done.is_set():
+            return
+        if self._reader < 0:
+            self.done.set()
+        else:
+            asyncio.get_running_loop().add_reader(self._reader, self._read)
+
+    async def read_empty(self) -> bool:
+        """Has all matched that was printed until now, and a line without its end, as its program rests.
+
+        Whether so much came that the program may only wait for room in the terminal. Raises TimeoutError where another
+        terminal says nothing.
+        """
+        if self.type_in is not None:
+            await self._hear_echo(self.type_in)
+        while await self._is_matched() and self.type_in is None and self._read_bytes < _ENOUGH and self._read():
+            pass
+        is_full, self._read_bytes = self._read_bytes >= _FULL, 0
+        if await self._is_matched() and self._rest and not (is_full or self._skipping):
+            self._hand([self._rest], is_finished=False)
+            await self._is_matched()
+        return is_full
+
+    async def _is_matched(self) -> bool:
+        """Waits for what is matched already; whether more can come."""
+        await asyncio.wait([self._matching])
+        return self._match is not None and self._reader >= 0
+
+    async def _hear_echo(self, type_in: Callable[[bytes], None]) -> None:
+        type_in(REPRINT)
+        waits = [asyncio.ensure_future(each) for each in (self._echoes.acquire(), self.done.wait())]
+        done, _ = await asyncio.wait(waits, timeout=_ECHO_S, return_when=asyncio.FIRST_COMPLETED)
+        for each in waits:
+            each.cancel()
+        if not done:
+            raise TimeoutError
 
     def _write_times(self) -> None:
         with contextlib.suppress(OSError):  # the log counts without them, too

@@ -5,18 +5,17 @@ Services report to one queue, whichever side has them; all of them start in the 
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.machine_load.service_use import Snapshot
-from dodo_dsl.run.printed_lines import PrintedLines
-from dodo_dsl.run.protocol import Event, Exited, Noted, Running, Unmatched, Unstartable
+from dodo_dsl.run.printed_lines import PrintedLines, Send
+from dodo_dsl.run.protocol import Event, Exited, Noted, Rested, Running, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
@@ -47,7 +46,25 @@ class WatchedServices:
         return self.plan.application.services if layer == APPLICATION else self.plan.layer(layer)
 
     def tell(self, event: Event) -> None:
-        self.events.put_nowait(event)
+        if isinstance(event, Rested):
+            self._reading = asyncio.ensure_future(self._read_lines(event.time))
+        else:
+            self.events.put_nowait(event)
+
+    async def _read_lines(self, now: int) -> None:
+        """Reads what services have printed that rest now (us), and answers the clock."""
+        names = [name for name in self.lines.services if name in self.outputs]
+        goes_on = await asyncio.gather(*(self._read_empty(name) for name in names))
+        self.lines.rest(now, any(goes_on))
+
+    async def _read_empty(self, name: str) -> bool:
+        try:
+            return await self.outputs[name].read_empty()
+        except TimeoutError:
+            self.outputs[name].type_in = None
+            why = "its terminal does not say what was printed until when, as it repeats nothing"
+            self.note(f"a line of '{name}' may count for a later step than the one in which it was printed: {why}")
+            return False
 
     def note(self, text: str) -> None:
         self.tell(Noted(text))
@@ -100,14 +117,13 @@ class WatchedServices:
         """
 
         def on_line(line: bytes) -> bool:
-            if self.prints(name):
-                self.lines.take(name, line)
             return layer != APPLICATION and self.reports.take_line(name, line)
 
         if name in self.outputs:  # it is started once more
             self.outputs[name].close()
         log = self.report / "logs" / f"{layer}.{name}.log"
-        self.outputs[name] = ServiceOutput(log, take or on_line, **kind)
+        match = partial(self.lines.match, name) if self.prints(name) else None
+        self.outputs[name] = ServiceOutput(log, take or on_line, match=match, **kind)
         return self.outputs[name]
 
     async def last_output(self, name: str, patience_s: float) -> None:
@@ -123,14 +139,9 @@ class WatchedServices:
     def close(self) -> None:
         """Reads what is there of what services said and wrote, and no more."""
         self.reports.close()
+        self.lines.close()
         for output in self.outputs.values():
             output.close()
-
-
-class Send(Protocol):
-    """Sends a datagram to a test's services by their names, or on its bus."""
-
-    def __call__(self, data: bytes, to: Sequence[str] = (BUS,)) -> None: ...
 
 
 class Side(Running, Protocol):

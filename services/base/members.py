@@ -28,7 +28,7 @@ VARIABLE = "DODO_SENDERS"
 ``my-pose?`` is a service that may not say from where it sends. Without a sender stamp all of them are meant.
 """
 END_OF_INPUT, NOT_SHOWN = "dodo.EndOfInput", "dodo.NotShown"
-RUNNER_ONLY = {"dodo.TestBegin": RUNNER, "dodo.Alive": HEARTBEAT}
+RUNNER_ONLY = {"dodo.TestBegin": RUNNER, "dodo.LinesRead": RUNNER, "dodo.Alive": HEARTBEAT}
 """Messages of the runner, with the name of the address from which they come."""
 _MOST_NAMED = 3
 

@@ -193,7 +193,7 @@ def _serve(
             on_rig = bool(os.environ.get("DODO_RIG"))
             service = build(Context(manifest["name"], flags, session.messages, resources, clock, session, on_rig))
             code = BROKEN
-            if place and (service.drive or not os.environ.get("DODO_CLOCK")):
+            if place and (service.drive or service.observe or not os.environ.get("DODO_CLOCK")):
                 session.hear_directly()
             members = _membership(session, role, world)
             stamp = flags["id"] if isinstance(flags["id"], int) else 0  # its own list gives each message one

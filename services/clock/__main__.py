@@ -40,7 +40,9 @@ def build(context: Context) -> Service:
     timeout = round(flags["timeout"] * MICROSECONDS)
     patience = Patience(flags["first-patience"], flags["patience"])
     timing = Timing(period_of(flags["freq"]), timeout, patience, flags["max-response"])
-    return ClockService(context.session, socket_path(), roles, answers, timing, senders, own_time)
+    return ClockService(
+        context.session, socket_path(), roles, answers, timing, senders, own_time, prints=flags["prints"]
+    )
 
 
 def _answers(flags: Flags, ids: Mapping[str, int]) -> Answers:

@@ -82,7 +82,7 @@ class Exchange:
         """Take the next message of the bus, unless one of the ``services`` answers before, within ``timeout`` s."""
         if not self._take_from_bus():
             channels = [self._channels[name].fileno() for name in services if name in self._channels]
-            select.select([self._session.fileno(), *channels], [], [], max(0.0, min(timeout, SLICE_S)))
+            select.select([*self._session.filenos(), *channels], [], [], max(0.0, min(timeout, SLICE_S)))
 
     def drain(self) -> None:
         """Take everything that is on the bus already."""
@@ -93,7 +93,7 @@ class Exchange:
         envelope = self._session.receive(0.0)
         if envelope is None:
             return False
-        if not self._session.was_direct:
+        if not self._session.was_direct or self._session.source == self._runner():
             self.hear(envelope, self._session.source)
         return True
 

@@ -20,6 +20,7 @@ from services.clock.agent import TimeAgent
 from services.clock.answers import AnsweringApplication, Answers
 from services.clock.exchange import Exchange, Roles, TestEnded, Timing
 from services.clock.model import Stepper
+from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 
 _FIRST_REPORT_S, _REPORT_S, _REPORT_SHARE = 0.05, 1.0, 0.02
@@ -53,14 +54,20 @@ class ClockService(Service):
         timing: Timing,
         senders: SenderTable | None = None,
         own_time: OwnTime | None = None,
+        *,
+        prints: bool = False,
     ) -> None:
-        """Services connect at ``path``. With ``own_time``, which SentMessages have, the application rests."""
+        """Services connect at ``path``. With ``own_time``, which SentMessages have, the application rests.
+
+        ``prints`` is whether it prints messages.
+        """
         self._session = session
         self._begin_id = session.messages.id(BEGIN)
         self._senders = senders or SenderTable(session.messages)
         answering = (each.data_type for each in answers.filters)
         self._heard = frozenset([*answering, *self._senders.ids])
         self._answers = answers
+        self._lines = PrintedLines(session, self._over) if prints else None
         self._exchange = exchange = Exchange(session, path, roles.all, self._take, self._senders)
         self._application: AnsweringApplication | RestingApplication
         if isinstance(answers, SentMessages):
@@ -69,6 +76,7 @@ class ClockService(Service):
             self._application = RestingApplication(
                 answers, own_time.agent, timing.patience, exchange, self._over, response, own_time.names, self._note
             )
+            self._application.lines = self._lines
         else:
             self._application = AnsweringApplication(answers, timing.patience, exchange, self._over)
         self._stepper = Stepper(roles, timing.period, timing.timeout, self._application, exchange, self._over)
@@ -105,7 +113,9 @@ class ClockService(Service):
             tell("stopped", how=ended.kind, reason=str(ended), silent=ended.silent)
 
     def _take(self, envelope: Envelope) -> None:
-        """Take a message of the application."""
+        """Take a message of the application, or of the runner."""
+        if self._lines and self._lines.take(envelope):
+            return
         takers = self._stepper.takers(envelope.data_type)
         if takers and any(each.matches(envelope) for each in self._answers.filters):
             with suppress(MessageError):  # its takers say so
@@ -135,7 +145,7 @@ class ClockService(Service):
             if envelope is None:
                 continue
             if envelope.data_type == self._begin_id and self._senders.is_of_runner(envelope, self._session.source):
-                self._session.hear_directly(False)
+                self._session.hear_directly(self._lines is not None)
                 return envelope
             if not self._session.was_direct:
                 self._exchange.hear(envelope, self._session.source)

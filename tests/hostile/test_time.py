@@ -1,4 +1,4 @@
-"""An application with the test's time (`clock: virtual`) attacks what gives it that time."""
+"""An application with the test's time (lockstep) attacks what gives it that time."""
 
 import json
 import os

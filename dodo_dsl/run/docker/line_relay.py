@@ -17,7 +17,13 @@ _HEADER_BYTES = 8
 
 def attached(container: Any) -> Any:
     """What a container prints from its start on, to be closed; raises DockerException and OSError."""
-    return container.attach_socket(params={"stdout": 1, "stderr": 1, "stream": 1})
+    return container.attach_socket(params={"stdin": 1, "stdout": 1, "stderr": 1, "stream": 1})
+
+
+def type_into(answer: Any, data: bytes) -> None:
+    """Types into an attached container's terminal, if it has one and its standard input is open."""
+    with contextlib.suppress(OSError):
+        _socket(answer).sendall(data)
 
 
 def copy_into(answer: Any, is_terminal: bool, writer: int) -> None:

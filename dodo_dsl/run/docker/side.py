@@ -5,6 +5,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,12 @@ from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch
-from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into
+from dodo_dsl.run.docker.line_relay import ContainerRelay, attached, close, copy_into, type_into
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.machine_load.service_use import Snapshot
+from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.protocol import BackendError, Exited, Lost, Ready, Unstartable
-from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
+from dodo_dsl.run.sides import APPLICATION, WatchedServices
 from dodo_dsl.run.start_order import LONGEST_S
 
 _KILLED = 128 + signal.SIGKILL
@@ -236,6 +238,8 @@ class ContainerSide:
             self._watched.not_started(name, engine_error(error))
             return
         self._watched.conditions.started(name)
+        if has_terminal and self._watched.prints(name):
+            output.type_in = partial(type_into, printed)
         arguments = printed, has_terminal, output.writer
         threading.Thread(target=copy_into, args=arguments, daemon=True).start()
         if not self._watched.conditions.of(name):

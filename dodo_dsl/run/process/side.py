@@ -20,6 +20,7 @@ from dodo_dsl.run import application_time
 from dodo_dsl.run.application_files import application_paths
 from dodo_dsl.run.hidden_paths import hidden_paths, own_data
 from dodo_dsl.run.machine_load.service_use import Snapshot
+from dodo_dsl.run.printed_lines import Send
 from dodo_dsl.run.process.commands import Command, Commands, needed_paths
 from dodo_dsl.run.process.confinement import MOST_TRIES, MOUNT_GONE, confinement
 from dodo_dsl.run.process.fork_server_client import ForkServer
@@ -27,7 +28,7 @@ from dodo_dsl.run.process.sandbox_client import SandboxClient
 from dodo_dsl.run.process.slot import Entered, Slot
 from dodo_dsl.run.protocol import BackendError, Lost, Ready
 from dodo_dsl.run.service_output import ServiceOutput
-from dodo_dsl.run.sides import APPLICATION, Send, WatchedServices
+from dodo_dsl.run.sides import APPLICATION, WatchedServices
 
 LOG = "sandbox.log"
 _TIME_READY = b'{"dodo": "ready"}'

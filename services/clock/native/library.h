@@ -170,7 +170,7 @@ static inline long raw(long number, long a, long b, long c, long d, long e, long
     __asm__ volatile("svc 0" : "+r"(x0) : "r"(x8), "r"(x1), "r"(x2), "r"(x3), "r"(x4), "r"(x5) : "memory", "cc");
     return x0;
 #else
-#error "clock: virtual works on amd64 and arm64"
+#error "the test's time works on amd64 and arm64"
 #endif
 }
 

@@ -44,7 +44,7 @@ uint32_t next_process_number(void)
 
 static void fail(const char *why)
 {
-    static const char begin[] = "DoDo's clock: ", end[] = ": this program of a test with `clock: virtual` cannot run\n";
+    static const char begin[] = "DoDo's clock: ", end[] = ": this program of a test in lockstep cannot run\n";
     RAW_3(SYS_write, 2, begin, sizeof begin - 1);
     RAW_3(SYS_write, 2, why, strlen(why));
     RAW_3(SYS_write, 2, end, sizeof end - 1);

@@ -50,9 +50,12 @@ int64_t deadline_on(clockid_t clock, const struct timespec *given)
     return is_monotonic(clock) && at != TIME_NEVER ? later(at, page->monotonic_base_ns) : at;
 }
 
-static void spin(unsigned most, int64_t now)
+/* While libraries are loaded, they look at the clock often. Who yields to another thread has to let that go on. */
+static void spin(bool yields)
 {
     static _Atomic bool is_noted;
+    int64_t now = now_ns(), start = page->monotonic_base_ns + START_UPTIME_S * NANOSECONDS;
+    unsigned most = now == start && !(yields && process.threads > 1) ? MOST_START_SPINS : MOST_SPINS;
     if (self.spin_ns != now) {
         self.spin_ns = now;
         self.spins = 0;
@@ -67,10 +70,8 @@ static void spin(unsigned most, int64_t now)
 
 void count_spin(void)
 {
-    if (!is_managed())
-        return;
-    int64_t now = now_ns(), start = page->monotonic_base_ns + START_UPTIME_S * NANOSECONDS;
-    spin(now == start ? MOST_START_SPINS : MOST_SPINS, now); /* libraries look at the clock as they are loaded */
+    if (is_managed())
+        spin(false);
 }
 
 int sleep_until(int64_t deadline_ns)
@@ -172,6 +173,6 @@ PUBLIC int sched_yield(void)
 {
     if (!is_managed())
         return (int)answer(RAW_1(SYS_sched_yield, 0));
-    spin(MOST_SPINS, now_ns()); /* no other thread may run meanwhile */
+    spin(true); /* no other thread may run meanwhile */
     return 0;
 }

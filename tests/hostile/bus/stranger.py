@@ -102,8 +102,8 @@ def end(app: Application, number: int) -> None:
 
 
 def begin(app: Application, number: int) -> None:
-    """The test begins with another process as the application, which computes nothing."""
-    app.send("dodo.TestBegin", application="1")
+    """The test begins."""
+    app.send("dodo.TestBegin")
 
 
 def seek(app: Application, number: int) -> None:

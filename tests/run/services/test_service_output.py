@@ -4,6 +4,9 @@ import asyncio
 import contextlib
 import os
 import tempfile
+import threading
+import time
+import tty
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -116,6 +119,76 @@ def test_a_log_that_cannot_be_written_is_said_in_the_tail(small_disk: Path) -> N
 
     assert asyncio.run(scene())[-1] == "... dodo: the log cannot be written: No space left on device"
     assert lines == [b"a", b"b"]
+
+
+def test_a_terminal_is_read_empty_where_its_program_rests(tmp_path: Path) -> None:
+    """And says whether so much came that the program may only have waited for room."""
+    matched: list[tuple[list[bytes], bool]] = []
+
+    async def take(lines: Sequence[bytes], is_finished: bool) -> None:
+        await asyncio.sleep(0.01)
+        matched.append(([*lines], is_finished))
+
+    async def scene() -> None:
+        output = ServiceOutput(tmp_path / "app.log", lambda _: False, terminal=True, match=take)
+        os.write(output.writer, b"a\nb\nunfin")
+        assert not await output.read_empty()
+        assert matched == [([b"a", b"b"], True), ([b"unfin"], False)]
+        os.write(output.writer, b"ished\n" + b"x" * 4000 + b"\n")
+        await asyncio.sleep(0.05)
+        os.write(output.writer, b"y" * 100 + b"\n")
+        assert await output.read_empty()
+        assert [len(line) for lines, _ in matched[2:] for line in lines] == [10, 4000, 100]
+        output.release_writer()
+        await asyncio.wait_for(output.done.wait(), 10)
+        assert not await output.read_empty()
+        output.close()
+
+    asyncio.run(scene())
+
+
+def test_another_terminal_says_what_was_printed_until_now(tmp_path: Path) -> None:
+    """By what it echoes, which its program never gets; one that echoes nothing is given up."""
+    lines: list[bytes] = []
+
+    async def take(found: Sequence[bytes], _: bool) -> None:
+        lines.extend(found)
+
+    async def scene() -> None:
+        output = ServiceOutput(tmp_path / "app.log", lambda _: False, is_cooked=True, match=take)
+        outer, inner = os.openpty()
+        output.type_in = lambda data: os.write(outer, data) and None
+
+        def carry() -> None:
+            with contextlib.suppress(OSError):
+                while data := os.read(outer, 7):
+                    time.sleep(0.001)
+                    os.write(output.writer, data)
+
+        thread = threading.Thread(target=carry, daemon=True)
+        thread.start()
+        for number in range(20):
+            os.write(inner, b"line %d\nnot " % number)
+            await output.read_empty()
+            assert lines[-2:] == [b"line %d" % number if number == 0 else b"not line %d" % number, b"not "]
+        os.set_blocking(inner, False)
+        with pytest.raises(BlockingIOError):
+            os.read(inner, 1)
+        tty.setraw(inner)
+        with pytest.raises(TimeoutError):
+            await output.read_empty()
+        os.close(inner)
+        thread.join()
+        output.release_writer()
+        await asyncio.wait_for(output.done.wait(), 10)
+        output.close()
+
+    service_output._ECHO_S, before = 0.5, service_output._ECHO_S
+    try:
+        asyncio.run(scene())
+    finally:
+        service_output._ECHO_S = before
+    assert b"^R" not in (tmp_path / "app.log").read_bytes()
 
 
 def test_handing_over_stops_reading_and_keeps_pipe_and_log(tmp_path: Path) -> None:

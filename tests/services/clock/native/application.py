@@ -1,4 +1,4 @@
-"""Programs under the library and the agent of `clock: virtual`, alone in PID and network namespaces of their own."""
+"""Programs under the library and its agent, alone in PID and network namespaces of their own."""
 
 import json
 import os

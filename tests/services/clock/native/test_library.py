@@ -1,4 +1,4 @@
-"""The library of `clock: virtual`: waits end by the test's time, in one order, as fast as the programs compute."""
+"""The library that gives programs the test's time: waits end by it, in one order, as fast as the programs compute."""
 
 import subprocess
 import sys

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from dodo_dsl import __version__
-from tests.drive.test_virtual import HERE, OUT, drive
+from tests.drive.test_timers import HERE, OUT, drive
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 HEALTH = ["CMD", "python3", "-c", "import time; time.sleep(0.1)"]
