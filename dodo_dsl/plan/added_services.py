@@ -65,6 +65,13 @@ def time_variables(
     return {**dict.fromkeys(_POOLS, "1"), "PYTHONHASHSEED": str(seed), **given, **own}
 
 
+def without_time(variables: Mapping[str, str]) -> dict[str, str]:
+    """Variables of a container without those by which it would load the library."""
+    own = variables.get("LD_PRELOAD", "").partition(":")[2]
+    kept = {name: value for name, value in variables.items() if name not in ("LD_PRELOAD", "DODO_TIME")}
+    return {**kept, "LD_PRELOAD": own} if own else kept
+
+
 def clock(
     test: ResolvedTest, manifest: Manifest, image: str, watch: Sequence[str], cid: int, application: Sequence[str] = ()
 ) -> PlannedService:

@@ -10,9 +10,10 @@ import hashlib
 import os
 import platform
 import shutil
+import stat
 import struct
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,8 +85,8 @@ def _changed(path: Path) -> int:
 
 def _is_ready(folder: Path) -> bool:
     """Whether both are there, for this machine's processor."""
-    own = _machine(Path("/proc/self/exe"))
-    return all((folder / name).is_file() and _machine(folder / name) == own for name in (AGENT, LIBRARY))
+    own, *others = (_machine(_head(path, 20)) for path in (Path("/proc/self/exe"), folder / AGENT, folder / LIBRARY))
+    return all(other == own for other in others)
 
 
 def _build(sources: Path, folder: Path) -> None:
@@ -107,11 +108,11 @@ def _build(sources: Path, folder: Path) -> None:
 _INTERPRETER = 3
 """The type of a program header that names the dynamic linker (elf(5), PT_INTERP)."""
 _LONGEST_CHAIN = 4
+HEAD_SIZE = 1 << 16
 
 
-def _machine(program: Path) -> bytes:
+def _machine(head: bytes) -> bytes:
     """Class, byte order and processor by an ELF header; empty for anything else."""
-    head = _head(program, 20)
     return head[4:6] + head[18:20] if head[:4] == b"\x7fELF" else b""
 
 
@@ -123,35 +124,42 @@ def _head(path: Path, size: int) -> bytes:
         return b""
 
 
-def refusal(service: str, name: str, environment: Mapping[str, str], folder: Path) -> str:
+Look = Callable[[Path], tuple[int, bytes] | None]
+"""The mode and the first bytes of a program, None where there is none at a path."""
+
+
+def on_this_machine(path: Path) -> tuple[int, bytes] | None:
+    """As Look, for a program that is started as a process."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return None
+    return (mode, _head(path, HEAD_SIZE)) if stat.S_ISREG(mode) and os.access(path, os.X_OK) else None
+
+
+def refusal(service: str, name: str, environment: Mapping[str, str], folder: Path, look: Look = on_this_machine) -> str:
     """Why a service whose program has this ``name`` cannot have the test's time; empty where nothing says so."""
     if environment.get(POSIX_MEMORY) == "1":
         return f"service '{service}' waits for frames in shared memory of POSIX ({POSIX_MEMORY}=1)"
-    found = shutil.which(folder / name if "/" in name else name, path=environment.get("PATH", os.defpath))
-    program = Path(found) if found else None
+    folders = [folder] if "/" in name else map(Path, environment.get("PATH", os.defpath).split(os.pathsep))
+    places = [each / name for each in folders]
     for _ in range(_LONGEST_CHAIN):
-        if program is None:
+        program, found = next(((place, found) for place in places if (found := look(place))), (None, None))
+        if found is None:
             return ""
-        if why := _unreachable(program):
+        if why := _unreachable(*found):
             return f"service '{service}' starts '{program}', {why}"
-        head = _head(program, 256)
-        if head[:2] != b"#!":
-            return ""
-        words = head[2:].partition(b"\n")[0].decode(errors="replace").split()
-        program = Path(words[0]) if words else None
+        words = found[1][2:256].partition(b"\n")[0].decode(errors="replace").split()
+        places = [Path(words[0])] if found[1][:2] == b"#!" and words else []
     return ""
 
 
-def _unreachable(program: Path) -> str:
-    try:
-        if program.stat().st_mode & 0o6000:
-            return "which changes its user"
-    except OSError:
-        return ""
-    head = _head(program, 1 << 16)
+def _unreachable(mode: int, head: bytes) -> str:
+    if mode & 0o6000:
+        return "which changes its user"
     if head[:4] != b"\x7fELF":
         return ""
-    if _machine(program) != _machine(Path("/proc/self/exe")):
+    if _machine(head) != _machine(_head(Path("/proc/self/exe"), HEAD_SIZE)):
         return "a program for another processor than DoDo's own"
     return "" if _has_linker(head) else "a statically linked program"
 

@@ -3,13 +3,19 @@
 import contextlib
 import os
 import re
+import tarfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from dodo_dsl import advice
+from dodo_dsl.run import application_time
 from dodo_dsl.run.protocol import BackendError
 
 _CONNECTIONS = 200
+_MOST_LINKS, _HEAD_SIZE = 10, 1 << 13
+_IS_FOLDER, _CHANGES_USER = 1 << 31, 1 << 23 | 1 << 22
+"""Modes as Go has them (fs.FileMode), in which the engine says them."""
 TOO_SLOW = re.compile("failed to create shim.*context deadline exceeded")
 """In the error of an engine that was too busy to start a container, whatever that is; it may try again."""
 
@@ -69,6 +75,41 @@ def _reason(error: Exception) -> str:
             return below.strerror
         below = below.__cause__ or below.__context__
     return str(error)
+
+
+def refusal(client: Any, service: str, image: str, entrypoint: Sequence[str], command: Sequence[str]) -> str:
+    """Why a container's first program cannot have the test's time, as ``application_time.refusal``."""
+    from docker.errors import NotFound
+
+    config = client.images.get(image).attrs["Config"]
+    words = [
+        *(entrypoint or config.get("Entrypoint") or ()),
+        *(command or (not entrypoint and config.get("Cmd")) or ()),
+    ]
+    environment = dict(each.partition("=")[::2] for each in config.get("Env") or ())
+    container = client.api.create_container(image, ["-"], entrypoint=["-"])["Id"]
+
+    def look(path: Path) -> tuple[int, bytes] | None:
+        for _ in range(_MOST_LINKS):
+            try:
+                stream, about = client.api.get_archive(container, str(path))
+            except NotFound:
+                return None
+            with contextlib.closing(stream):
+                if not about["linkTarget"]:
+                    mode, head = about["mode"], b""
+                    while len(head) < _HEAD_SIZE and (more := next(stream, b"")):
+                        head += more
+                    bits = mode & 0o777 | 0o6000 * bool(mode & _CHANGES_USER)
+                    return None if mode & _IS_FOLDER else (bits, head[tarfile.BLOCKSIZE :])
+            path = Path(about["linkTarget"])
+        return None
+
+    try:
+        folder = Path(config.get("WorkingDir") or "/")
+        return application_time.refusal(service, words[0], environment, folder, look) if words else ""
+    finally:
+        client.api.remove_container(container, force=True)
 
 
 def engine_error(error: Exception) -> str:

@@ -23,7 +23,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem, escaped, inte
 from dodo_dsl.application.model import FILES
 from dodo_dsl.emit.containers import CHANNEL
 from dodo_dsl.emit.output_folder import PLAN_FILE
-from dodo_dsl.plan.added_services import RUNNER_VARIABLE
+from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, RUNNER_VARIABLE, without_time
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of
 from dodo_dsl.run.docker.beside_processes import without_own
@@ -80,6 +80,8 @@ class Compose:
     say: Say
     channel: str = ""
     is_whole: bool = True
+    by_answers: bool = False
+    """Whether the application keeps the machine's time in lockstep."""
     services: dict[str, Any] = field(init=False)
     _binds: dict[str, list[Bind]] = field(init=False)
     _outside: dict[str, str] = field(default_factory=dict)
@@ -224,6 +226,8 @@ class Compose:
             services[name] = service | ({"volumes": volumes} if volumes else {})
             if name in self.services:
                 services[name]["image"] = escaped(service["image"])
+                if self.by_answers:
+                    services[name]["environment"] = without_time(service.get("environment") or {})
         made = {**self._application, "services": services}
         if self.is_whole:
             return made
@@ -235,6 +239,8 @@ class Compose:
     ) -> tuple[int, str]:
         """Exit code and the last line of standard error of a compose command."""
         own = {"COMPOSE_PROGRESS": "plain", "COMPOSE_PROJECT_NAME": project or self.project, RUNNER_VARIABLE: "dodo"}
+        if self.by_answers:
+            own[ANSWERS_VARIABLE] = "1"
         environment = {**secret_variables.of_client(os.environ), **self._outside, **own}
         for name in ("COMPOSE_FILE", "COMPOSE_PROFILES", "COMPOSE_ENV_FILES"):
             environment.pop(name, None)

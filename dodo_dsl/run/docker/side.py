@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import signal
 import threading
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -9,13 +10,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import HEALTHY, READY_S
 from dodo_dsl.run.application_time import PAGE_DESTROYED
 from dodo_dsl.run.docker import beside_processes, shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
-from dodo_dsl.run.docker.client import TOO_SLOW, engine_error
+from dodo_dsl.run.docker.client import TOO_SLOW, engine_error, refusal
 from dodo_dsl.run.docker.compose import Compose
 from dodo_dsl.run.docker.container_use import ELSEWHERE, ContainerUse
 from dodo_dsl.run.docker.events import EventWatch
@@ -74,6 +76,7 @@ class ContainerSide:
         await self._require_files()
         await self._open_channel()
         await self._compose.provide_images(self._pulls)
+        await self._look_at_programs()
         await self._compose.create(self._subnets)
         await self._start_watching()
         if self._compose.is_whole:
@@ -105,6 +108,27 @@ class ContainerSide:
         missing = await asyncio.to_thread(shared_files.unseen, self._client, paths, self._compose.project)
         if missing:
             raise BackendError(": ".join(shared_files.problem(missing)))
+
+    async def _look_at_programs(self) -> None:
+        """In lockstep by answers, where a program of the application cannot have the test's time."""
+        if self._plan.lockstep is None or self._watched.by_answers:
+            return
+        for name, service in self._compose.services.items():
+            given = (service.get("entrypoint"), service.get("command"))
+            words = [opendlv_flags.split(w) if isinstance(w, str) else tuple(map(str, w or ())) for w in given]
+            look = functools.partial(self._refusal, name, service["image"], *words)
+            why = await self._pulls.once(f"program {service['image']} {words}", look)
+            if why and not self._watched.by_answers:
+                self._watched.await_answers(why)
+        self._compose.by_answers = self._watched.by_answers
+
+    async def _refusal(self, name: str, image: str, entrypoint: Sequence[str], command: Sequence[str]) -> str:
+        from docker.errors import DockerException
+
+        try:
+            return await asyncio.to_thread(refusal, self._client, name, image, entrypoint, command)
+        except (DockerException, OSError):  # what is wrong is said when it is started
+            return ""
 
     async def _start_watching(self) -> None:
         from docker.errors import DockerException
