@@ -7,8 +7,7 @@ import pytest
 
 from dodo_dsl.run import capabilities
 from tests.docker.compose import Crate
-from tests.docker.engine_port import engine_port
-from tests.docker.engine_proxy import engine_socket
+from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.run.docker.engine_stub import make_certificates
 from tests.run.faults import FAULTS
 
@@ -22,11 +21,11 @@ def test_both_sides_of_a_verdict(tls: bool, crate: Crate, tmp_path: Path, monkey
     certificates = make_certificates(tmp_path / "certs") if tls else None
     names = ("neighbour", "killed")
     jobs = [crate.job(name, f.judge, f.application, f.environment) for name in names for f in [FAULTS[name]]]
-    with engine_port(engine, certificates) as variables, monkeypatch.context() as patch:
-        for name, value in variables.items():
+    with EngineProxy(engine, certificates=certificates) as proxy, monkeypatch.context() as patch:
+        for name, value in proxy.variables.items():
             patch.setenv(name, value)
         (found, *rest) = capabilities.docker_engine()
-        assert (found.text.endswith(" with TLS"), variables["DOCKER_HOST"] in found.text) == (tls, True)
+        assert (found.text.endswith(" with TLS"), proxy.variables["DOCKER_HOST"] in found.text) == (tls, True)
         assert [finding.state for finding in rest] == ["ok"], "the engine is on this machine"
         outcomes = crate.run(*jobs)
         assert crate.left() == []
