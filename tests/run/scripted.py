@@ -174,7 +174,7 @@ BUSY = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))
 
 @dataclass
 class ScriptedBackends:
-    """Makes backends by ``make(plan, attempt)``, attempts counted from 1, and counts how many are open at once."""
+    """Makes backends by ``make(plan, attempt)``, attempts counted from 1, and counts how many are open."""
 
     make: Callable[[Plan, int], ScriptedBackend] = lambda plan, _: ScriptedBackend(plan, drives())
     open_problem: BackendError | OSError | None = None
@@ -182,7 +182,6 @@ class ScriptedBackends:
     name: str = "process"
     began: list[str] = field(default_factory=list)
     now: int = 0
-    most: int = 0
     closed: int = 0
 
     async def prepare(self, plans: Sequence[Plan], note: Callable[[str], None]) -> None:
@@ -197,7 +196,6 @@ class ScriptedBackends:
             raise self.open_problem
         self.began.append(job.plan.slug)
         self.now += 1
-        self.most = max(self.most, self.now)
         yield self.make(job.plan, self.began.count(job.plan.slug))
         self.now -= 1
         if self.leave_problem:

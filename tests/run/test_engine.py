@@ -21,7 +21,6 @@ from dodo_dsl.run.engine import (
 )
 from dodo_dsl.run.machine_load import shortage
 from dodo_dsl.run.machine_load.judgement import UNSEEN_USE
-from dodo_dsl.run.machine_load.meter import Meter
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from dodo_dsl.run.machine_load.shortage import Shortage
 from dodo_dsl.run.protocol import (
@@ -198,14 +197,6 @@ def test_limits_of_what_the_application_uses_are_judged_before_it_has_passed() -
     assert [(check["name"], check["ok"]) for check in found.checks] == [("peak-memory-app", False)]
 
 
-def test_a_crash_has_figures_too() -> None:
-    backend = using(leaking, resources=ResourceLimits(max_memory_mb=200.0))
-    backend = replace(backend, stages={**READY, "begin": [(2.0, Exited("app", 3))]})
-    found = outcome(backend)
-    assert found.reason == "application service 'app' ended with exit code 3 after 2.0 s, before the test was decided"
-    assert found.resources[0].peak_memory_bytes > 200e6
-
-
 def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
     def broken(now: float) -> None:
         raise OSError("gone")
@@ -214,15 +205,6 @@ def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
     assert (found.outcome, found.resources) == ("passed", ())
     assert found.notes == (UNSEEN_USE, "load and use of the machine were not measured to the end: OSError: gone")[::-1]
     assert outcome(using(lambda _: None)).notes == ()
-
-
-def test_the_last_figures_are_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def end(_: Meter) -> None:
-        raise OSError("gone")
-
-    monkeypatch.setattr(Meter, "end", end)
-    notes = outcome(using(leaking)).notes
-    assert notes.count("load and use of the machine were not measured to the end: OSError: gone") == 1
 
 
 EARLY = "after 2.0 s, before the test was decided"

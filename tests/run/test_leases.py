@@ -109,12 +109,6 @@ def wait(names: list[str], *releases: tuple[float, Lease], patience_s: float = 6
     return *run(scene()), said
 
 
-def test_the_first_free_lease_is_taken_at_once(folder: Path) -> None:
-    held = take("cid-121")
-    assert wait(["cid-121", "cid-122"]) == ("cid-122", 0.0, [])
-    held.release()
-
-
 def test_a_busy_lease_is_waited_for_and_its_holder_named_once(folder: Path) -> None:
     name, when, said = wait(["cid-121", "cid-122"], (30.0, take("cid-121")), (20.0, take("cid-122")))
     assert (name, said) == ("cid-122", [f"waiting for test mine of process {os.getpid()}"])
@@ -264,15 +258,6 @@ def test_a_lease_that_cannot_be_written_is_not_held(folder: Path, monkeypatch: p
         with pytest.raises(OSError, match="No space left"):
             leases.try_lease("cid-121", {})
     take("cid-121").release()
-
-
-def test_all_that_is_waited_for_within_a_turn_keeps_its_place(folder: Path) -> None:
-    """A test that has waited for one lease is not the last again for the next."""
-    with leases.arrived():
-        since = leases.arrival_time()
-        with leases.ticket(["cid-121"], since):
-            (asyncio.run(leases.lease_any(["cid-121"], {}, print))).release()
-    assert leases.arrival_time() > since
 
 
 def test_waiting_has_a_limit(folder: Path) -> None:

@@ -25,7 +25,7 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.report.viewer import page
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready, Time
+from dodo_dsl.run.protocol import Event, Exited, Ready, Time
 from dodo_dsl.run.runner import Runner
 from tests.cli.terminal import Terminal
 from tests.run.scripted import FAILED, PASSED, Events, ScriptedBackend, ScriptedBackends, plan
@@ -120,14 +120,6 @@ def test_the_report_of_a_test_that_failed(dodo: Command) -> None:
     assert [service["name"] for service in dodo.result()["services"]] == ["camera", "track", "app"]
 
 
-def test_losses_of_messages_are_noted_below_the_test(dodo: Command) -> None:
-    dodo.stages = stages(Overrun("track", 5), PASSED, Exited("track", 0))
-    code, out, _ = dodo.run()
-    note = "service 'track' lost 5 messages, because its receive buffer was full: its verdict does not consider them"
-    assert (code, f"        note: {note}\n" in out) == (0, True), out
-    assert dodo.result()["notes"] == [note]
-
-
 def test_times_of_all_runs_are_kept_and_drawn(dodo: Command) -> None:
     """A second run forecasts what the first one took, and the report shows both."""
     assert "; at most " in dodo.run()[1]
@@ -189,6 +181,7 @@ USAGE = [
     (("a/b.dodo.yml",), "there is no test at"),
     (("--seed", "-1"), "'-1' is "),
     (("-j", "0"), "'0' is "),
+    (("-q", "-v"), "not allowed with argument"),
 ]
 
 
@@ -210,11 +203,6 @@ def test_quiet_says_only_the_counts_of_a_run_that_passed(dodo: Command) -> None:
     assert dodo.run("-q")[1] == "1 passed, 0 failed, 0 in error\n"
     dodo.stages = ENDINGS["failed"]
     assert [line.split()[0] for line in dodo.run("--quiet")[1].splitlines()] == ["FAILED", "in", "open", "0"]
-
-
-def test_quiet_and_verbose_do_not_go_together(dodo: Command, capsys: pytest.CaptureFixture[str]) -> None:
-    assert dodo.run("-q", "-v")[0] == 2
-    assert "not allowed with argument" in capsys.readouterr().err
 
 
 def test_verbose_shows_lines_on_a_terminal_too(dodo: Command) -> None:

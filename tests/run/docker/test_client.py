@@ -23,12 +23,6 @@ def version() -> str:
         return str(client.version()["Version"])
 
 
-def test_an_engine_on_a_port(monkeypatch: pytest.MonkeyPatch) -> None:
-    with engine_stub() as host:
-        monkeypatch.setenv("DOCKER_HOST", host)
-        assert version() == VERSION["Version"]
-
-
 @needs_openssl
 def test_an_engine_with_tls_is_trusted_by_its_own_authority(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Whatever authorities the runner names for the web."""

@@ -55,13 +55,3 @@ def test_a_quarantine_that_cannot_be_written_is_an_error_with_its_reason(
     monkeypatch.setenv("DODO_RIGS", str(tmp_path / "file" / "rigs"))
     with pytest.raises(RigProblem, match=r"cannot be written to '.*kiwi\.json': Not a directory \(it has lost steps\)"):
         quarantine("kiwi", "it has lost steps")
-
-
-def test_a_user_without_a_home_folder_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("HOME", "XDG_STATE_HOME", "DODO_RIGS"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("os.getuid", lambda: 3_999_999_999)
-    with pytest.raises(
-        RigProblem, match="quarantines cannot be kept: user 3999999999 has no home folder: set DODO_RIGS"
-    ):
-        quarantined("kiwi")
