@@ -1,8 +1,12 @@
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.envelope import Envelope
-from services.base.loop import HeardStamps, with_strangers
+from dodo_dsl.opendlv.session import Session
+from services.base.clock import RealTimeClock
+from services.base.loop import HeardStamps, Loop, with_strangers
+from services.base.service import Service
 
 STEER, PEDAL = 1090, 1086
 INPUTS = {(STEER, 0): "opendlv.proxy.GroundSteeringRequest", (STEER, 9): "opendlv.proxy.GroundSteeringRequest"}
@@ -35,3 +39,19 @@ def test_the_reason_goes_on_with_them() -> None:
         "no sample came; no X/0 came, but 1 with sender stamp 2"
     )
     assert with_strangers("no sample came", []) == "no sample came"
+
+
+class Losing(Session):
+    """A session that loses messages as the last ones are read."""
+
+    def receive(self, timeout: float | None = 0.0) -> Envelope | None:
+        self.lost += 7
+        return None
+
+
+def test_losses_are_told_to_the_last_one(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
+    service = Service()
+    service.observe = lambda _: None
+    with Losing(cid) as session:
+        Loop("recorder", service, session, RealTimeClock(), 0).run(lambda: True)
+        assert f'{{"dodo": "lost", "messages": {session.lost}}}' in capsys.readouterr().out
