@@ -1,21 +1,27 @@
-"""An engine with a network and files of its own, as in Docker-in-Docker: a test says what the engine does not see."""
+"""An engine with files of its own, as in Docker-in-Docker: a test says what the engine does not see."""
+
+import os
+import subprocess
+import sys
 
 import pytest
 
 from tests.docker.compose import Crate
-from tests.docker.own_engine import own_engine
+from tests.run.desk import ROOT
 
-pytestmark = [pytest.mark.slow, pytest.mark.proof]
+pytestmark = [pytest.mark.engine, pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")]
+MOUNT = 'mount -t tmpfs none "$0"; cp -a "$1" "$0/far"; shift; exec "$@"'
 
 
-@pytest.mark.parametrize("tls", [False, True], ids=["plain", "tls"])
-def test_a_test_ends_before_anything_is_pulled(tls: bool, crate: Crate, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = crate.bench.folder
-    job = crate.job("far")
-    with own_engine([folder.parent], tls) as variables, monkeypatch.context() as patch:
-        for name, value in variables.items():
-            patch.setenv(name, value)
-        outcome = crate.run(job)["far"]
-        assert crate.left() == []
-        told = f"the Docker engine at {variables['DOCKER_HOST']} does not see '{folder}"
-        assert (outcome.outcome, outcome.reason[: len(told)]) == ("error", told)
+def test_a_test_ends_before_anything_is_pulled(crate: Crate) -> None:
+    """What the application mounts is itself on a mount that only DoDo has."""
+    folder = crate.bench.folder / "own"
+    job = crate.job("far", image="127.0.0.1:9/dodo-no-such-image:1", volumes=[f"{folder}/far:/own:ro"])
+    folder.mkdir()
+    mounted = ["unshare", "--mount", "--propagation", "private", "sh", "-ec", MOUNT, str(folder), str(job.folder)]
+    run = ["-m", "dodo_dsl", "run", "--backend", "docker", "--report", str(job.report), "--compiled", str(job.folder)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [*mounted, sys.executable, *run], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 3 and f"does not see '{folder}/far'" in done.stdout, done.stdout + done.stderr
