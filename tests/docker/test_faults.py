@@ -35,7 +35,7 @@ def test_pull_whose_connection_breaks(crate: Crate, book: Book) -> None:
         outcomes = crate.run(crate.job("pull", image=registry.image))
     said = [text for _, text in crate.progress.phases]
     assert f"pulling {registry.image}: the connection broke, the engine retries" in said
-    broken = Fault("The connection breaks in the middle of a pull", "error", f"image {registry.image} cannot", {})
+    broken = Fault("The connection breaks in the middle of a pull", "error", f"image {registry.image} cannot", ())
     as_told({"pull": broken}, outcomes, "docker", book)
 
 

@@ -59,20 +59,6 @@ def test_steps_are_even_and_stamped_with_test_time(start: Start, cid: int) -> No
     assert all(envelope.sample_time <= envelope.sent for envelope in pedals)
 
 
-@pytest.mark.thorough
-def test_what_it_emulates_stood_still(start: Start, cid: int) -> None:
-    with Session(cid) as session:
-        service = start("--role=echo", "--freq=20")
-        assert service.line() == READY
-        for distance in (-0.0625, 1.0, -0.0625):
-            session.send(DISTANCE(distance=distance), sender_stamp=2)
-        assert service.line() == {"dodo": "paused", "seconds": 0.062}
-        session.send(DISTANCE(distance=-0.5), sender_stamp=2)
-        assert service.line() == {"dodo": "paused", "seconds": 0.5}
-        service.stop()
-        assert service.end() == (0, "", "")
-
-
 def test_messages_come_with_their_sample_time_and_from_the_right_sender(start: Start, cid: int) -> None:
     with Session(cid) as session:
         assert start("--role=echo", "--freq=20").line() == READY
@@ -108,15 +94,8 @@ def test_a_message_decides(start: Start, cid: int) -> None:
 
 def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, cid: int, tmp_path: Path) -> None:
     """In a test, whose folder the service has; else, as above, nobody reads it."""
-    about = {
-        "series": "Distance",
-        "unit": "m",
-        "exclusive": False,
-        "low": None,
-        "high": 1,
-        "distance": None,
-        "band": None,
-    }
+    about = {"series": "Distance", "unit": "m", "exclusive": False, "high": 1}
+    about |= dict.fromkeys(("low", "distance", "band"))
     with Session(cid) as session:
         service = start("--role=judge", DODO_CHANNEL=str(tmp_path))
         assert service.line() == READY

@@ -49,9 +49,11 @@ class Losing(Session):
         return None
 
 
-def test_losses_are_told_to_the_last_one(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_losses_and_pauses_are_told_to_the_last_one(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
     service = Service()
+    service.paused = 0.0625
     service.observe = lambda _: None
     with Losing(cid) as session:
         Loop("recorder", service, session, RealTimeClock(), 0).run(lambda: True)
-        assert f'{{"dodo": "lost", "messages": {session.lost}}}' in capsys.readouterr().out
+        lost = f'{{"dodo": "lost", "messages": {session.lost}}}'
+    assert capsys.readouterr().out.splitlines() == [lost, '{"dodo": "paused", "seconds": 0.062}']
