@@ -33,9 +33,8 @@ from dodo_dsl.opendlv.video import VideoDecoder
 from dodo_dsl.rec import truth
 from dodo_dsl.rec.frames import IMAGE, MOST_DECODERS, decoded
 from dodo_dsl.rec.truth import TruthError
-from dodo_dsl.run.outcomes import Finding
-from dodo_dsl.run.protocol import Flooded, MemoryTaken, Noted
-from dodo_dsl.run.run_state import MOST_NOTES, Ended, RunState
+from dodo_dsl.run.protocol import Flooded, Noted
+from dodo_dsl.run.run_state import MOST_NOTES, RunState
 from dodo_dsl.run.service_protocol import read
 from dodo_dsl.spec import registry
 from dodo_dsl.spec.registry import RegistryError, locate
@@ -48,7 +47,7 @@ from services.scene.textures import load_picture
 from services.virtual_camera.optics import load_with_alpha
 from tests.drive.applications import program, results
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
-from tests.run.helpers import Bench
+from tests.run.scripted import plan
 
 __all__ = ["record"]
 SIDE = 20_000
@@ -277,32 +276,8 @@ def test_senders_without_end_take_no_memory() -> None:
     assert len(counter._bytes) <= 1001
 
 
-def state(tmp_path: Path) -> RunState:
-    return RunState(Bench(tmp_path).plan(), time.monotonic)
-
-
-def decided(found: RunState, event: Flooded | MemoryTaken) -> Finding:
-    with pytest.raises(Ended):
-        found.take(event)
-    (finding,) = found.facts.findings
-    return finding
-
-
-def test_a_flood_is_named_and_the_application_s_only_where_no_service_sends_it(tmp_path: Path) -> None:
-    flood = Flooded("dodo-recorder", "more than 20000 messages came within a second", "a.M", 3, 0.981, True)
-    finding = decided(state(tmp_path), flood)
-    words = "more than 20000 messages came within a second: 98% of it is a.M/3, which service 'camera' sends"
-    assert (finding.result, finding.reason) == ("error", words), "what an unknown service sends is not known"
-    known = state(tmp_path)
-    known.plan = Bench(tmp_path).plan()
-    services = tuple(type(s)(**{**vars(s), "uses": "collision"}) for s in known.plan.services)
-    known.plan = type(known.plan)(**{**vars(known.plan), "services": services})
-    finding = decided(known, flood)
-    assert (finding.result, finding.reason.partition("which ")[2]) == ("failed", "only the application can have sent")
-
-
-def test_notes_do_not_grow_without_end(tmp_path: Path) -> None:
-    found = state(tmp_path)
+def test_notes_do_not_grow_without_end() -> None:
+    found = RunState(plan(), time.monotonic)
     for number in range(1000):
         found.take(Noted(str(number)))
     assert len(found.notes) == MOST_NOTES + 1
@@ -372,15 +347,3 @@ def test_a_lock_that_a_reader_keeps_is_not_the_creator_s_fault(posix: bool) -> N
         with ours.lock(), pytest.raises(SharedMemoryError) as caught, theirs.lock(0.05):
             raise AssertionError("it is locked")
         assert not isinstance(caught.value, MemoryTakenError)
-
-
-def test_a_kept_lock_fails_the_application(tmp_path: Path) -> None:
-    line = b'{"dodo": "taken", "text": "shared memory \'video0.argb\' was locked by another for 5 s"}'
-    event = read("camera", False, line)
-    assert isinstance(event, MemoryTaken)
-    finding = decided(state(tmp_path), event)
-    assert (finding.result, finding.cause) == ("failed", "")
-    assert finding.reason == (
-        "the application keeps service 'camera' from its shared memory: "
-        "shared memory 'video0.argb' was locked by another for 5 s"
-    )

@@ -181,19 +181,6 @@ def true_pose(app: Application, number: int) -> None:
         app.steering = 1.8 * pose.x + 1.2 * (math.pi / 2 - 2 * math.atan2(pose.qz, pose.qw))
 
 
-def true_pose_curve(app: Application, number: int) -> None:
-    """The same along the left curve: 1 m ahead, a quarter of a circle of 1.5 m, and straight on."""
-    for _, pose in app.of(FRAME):
-        right, ahead = pose.x + 1.5, pose.y - 1
-        wanted, away, bend = math.pi / 2, pose.x, 0.0
-        if right <= 0:
-            wanted, away = math.pi, pose.y - 2.5
-        elif ahead > 0:
-            wanted, away, bend = math.atan2(ahead, right) + math.pi / 2, math.hypot(right, ahead) - 1.5, 0.25
-        turn = math.remainder(wanted - 2 * math.atan2(pose.qz, pose.qw), 2 * math.pi)
-        app.steering = 3.0 * away + 1.5 * turn + bend
-
-
 def ports() -> list[int]:
     """All local ports of UDP."""
     lines = Path("/proc/net/udp").read_text().splitlines()[1:]
@@ -247,7 +234,7 @@ def easy(app: Application, number: int) -> None:
 ATTACKS = {name.replace("_", "-"): function for name, function in list(globals().items()) if name in (
     "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "nan_once", "unrecorded", "join",
     "disguise", "channel",
-    "echo", "boxes", "easy", "directly", "true_pose", "true_pose_curve",
+    "echo", "boxes", "easy", "directly", "true_pose",
 )}  # fmt: skip
 
 

@@ -3,21 +3,17 @@
 from typing import NamedTuple
 
 STRAIGHT, SIGNAL, PERCEPTION = "sil-closed-straight", "sil-open-straight", "sil-perception--light-1--clutter-0"
-REPLAY, CURVE = "dil-kiwi-track", "sil-closed-left-curve"
+REPLAY = "dil-kiwi-track"
 
 
 class BusAttack(NamedTuple):
-    """An attack of ``stranger.py`` in a test that fails by it; ``reason`` is a pattern of the test's.
-
-    What is ``long`` repeats another one with another clock or place: for ``make proof``.
-    """
+    """An attack of ``stranger.py`` in a test that fails by it; ``reason`` is a pattern of the test's."""
 
     name: str
     test: str
     clock: str
     reason: str
     isolation: str = "network"
-    long: bool = False
 
 
 def only(message: str, *services: str) -> str:
@@ -44,38 +40,26 @@ ATTACKS = (
     BusAttack("finish", STRAIGHT, "lockstep", only(FRAME, "pose")),
     BusAttack("finish", STRAIGHT, "realtime", only(FRAME, "pose")),
     BusAttack("finish-at-once", STRAIGHT, "lockstep", only(FRAME, "pose")),
-    BusAttack("finish-at-once", STRAIGHT, "realtime", only(FRAME, "pose"), long=True),
     BusAttack("motion", STRAIGHT, "lockstep", only(STATE, "vehicle")),
-    BusAttack("motion", STRAIGHT, "realtime", only(STATE, "vehicle"), long=True),
     BusAttack("reset", STRAIGHT, "lockstep", nobody("opendlv.sim.Command")),
-    BusAttack("reset", STRAIGHT, "realtime", nobody("opendlv.sim.Command"), long=True),
     BusAttack("end", SIGNAL, "lockstep", only("dodo.EndOfInput", "camera", "pose")),
-    BusAttack("end", SIGNAL, "realtime", only("dodo.EndOfInput", "camera", "pose"), long=True),
     BusAttack("end", STRAIGHT, "realtime", only("dodo.EndOfInput", "camera", "pose", "vehicle")),
     BusAttack("begin", STRAIGHT, "lockstep", RUNNER),
     BusAttack("begin", STRAIGHT, "realtime", RUNNER),
     BusAttack("seek", REPLAY, "lockstep", nobody("cluon.data.PlayerCommand")),
-    BusAttack("seek", REPLAY, "realtime", nobody("cluon.data.PlayerCommand"), long=True),
     BusAttack("nan-once", STRAIGHT, "lockstep", NAN),
     BusAttack("nan-once", STRAIGHT, "realtime", NAN),
     BusAttack("unrecorded", STRAIGHT, "lockstep", WALL),
     BusAttack("join", STRAIGHT, "realtime", only(FRAME, "pose")),
-    BusAttack("join", STRAIGHT, "lockstep", only(FRAME, "pose"), long=True),
     BusAttack("disguise", STRAIGHT, "realtime", WALL),
     BusAttack("channel", STRAIGHT, "lockstep", WALL),
     BusAttack("echo", PERCEPTION, "lockstep", "nothing was detected|no detection|left|recall"),
-    BusAttack("echo", PERCEPTION, "realtime", "nothing was detected|no detection|left|recall", long=True),
     BusAttack("boxes", PERCEPTION, "lockstep", only(BOX, "camera")),
-    BusAttack("boxes", PERCEPTION, "realtime", only(BOX, "camera"), long=True),
     BusAttack("directly", STRAIGHT, "realtime", only(FRAME, "pose")),
     BusAttack("true-pose", STRAIGHT, "lockstep", WALL),
     BusAttack("true-pose", STRAIGHT, "realtime", WALL),
-    BusAttack("true-pose-curve", CURVE, "lockstep", WALL, long=True),
     BusAttack("true-pose", STRAIGHT, "realtime", WALL, "host"),
     BusAttack("easy", SIGNAL, "lockstep", ""),
-    BusAttack("easy", SIGNAL, "realtime", "", long=True),
-    BusAttack("finish", STRAIGHT, "lockstep", only(FRAME, "pose"), "host", long=True),
-    BusAttack("finish", STRAIGHT, "realtime", only(FRAME, "pose"), "host", long=True),
     BusAttack("channel", STRAIGHT, "lockstep", WALL, "host"),
     BusAttack("join", STRAIGHT, "realtime", only(FRAME, "pose"), "host"),
 )

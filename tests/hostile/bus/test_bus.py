@@ -24,18 +24,9 @@ def named(attack: BusAttack) -> str:
     return f"{attack.name}-{attack.test.partition('--')[0]}"
 
 
-def chosen(clock: str, isolation: str, long: bool | None = None) -> list[BusAttack]:
-    """Attacks of both forms, or of the ``long`` or the short one, by their names."""
-    found = (each for each in ATTACKS if (each.clock, each.isolation) == (clock, isolation))
-    return sorted((each for each in found if long in (None, each.long)), key=named)
-
-
-def parameters(clock: str, isolation: str) -> list[Any]:
-    """Attacks, of which the long form is for ``make proof``."""
-    return [
-        pytest.param(each, id=f"{named(each)}-{clock}", marks=[pytest.mark.proof] if each.long else [])
-        for each in chosen(clock, isolation)
-    ]
+def chosen(clock: str, isolation: str = "network") -> list[BusAttack]:
+    """Attacks, by their names."""
+    return sorted((each for each in ATTACKS if (each.clock, each.isolation) == (clock, isolation)), key=named)
 
 
 def attacked(
@@ -82,28 +73,27 @@ Found = Callable[[BusAttack], dict[str, Any]]
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
-    """What became of an attack, in one run with all others of its clock and form."""
+    """What became of an attack, in one run with all others of its clock."""
 
     @cache
-    def run(clock: str, long: bool) -> dict[str, dict[str, Any]]:
-        return attacked(tmp_path_factory.mktemp(clock), chosen(clock, "network", long))
+    def run(clock: str) -> dict[str, dict[str, Any]]:
+        return attacked(tmp_path_factory.mktemp(clock), chosen(clock))
 
-    return lambda attack: run(attack.clock, attack.long)[named(attack)]
+    return lambda attack: run(attack.clock)[named(attack)]
 
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("bus-lockstep")
-@pytest.mark.parametrize("attack", parameters("lockstep", "network"))
+@pytest.mark.parametrize("attack", chosen("lockstep"), ids=named)
 def test_it_does_not_get_through(found: Found, attack: BusAttack) -> None:
     """An application that sends what only services may send does not decide its test."""
     check(found(attack), attack)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["true-pose", pytest.param("true-pose-curve", marks=pytest.mark.proof)])
-def test_with_its_true_pose_it_would(name: str, tmp_path: Path) -> None:
+def test_with_its_true_pose_it_would(tmp_path: Path) -> None:
     """So what keeps it from passing is that it is not told; where it declares that, the verdict says so."""
-    (attack,) = (each for each in chosen("lockstep", "network") if each.name == name)
+    (attack,) = (each for each in chosen("lockstep") if each.name == "true-pose")
     test = attacked(tmp_path, [attack], told=True)[named(attack)]
     assert test["outcome"] == "passed", test["reason"]
     assert test["reason"].endswith("; the application gets its true pose (opendlv.sim.Frame)")
@@ -111,21 +101,21 @@ def test_with_its_true_pose_it_would(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.realtime
 @pytest.mark.xdist_group("bus-realtime")
-@pytest.mark.parametrize("attack", parameters("realtime", "network"))
+@pytest.mark.parametrize("attack", chosen("realtime"), ids=named)
 def test_nor_in_real_time(found: Found, attack: BusAttack) -> None:
     """The same in real time, where the attack races what the services send."""
     check(found(attack), attack)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("attack", parameters("lockstep", "host"))
+@pytest.mark.parametrize("attack", chosen("lockstep", "host"), ids=named)
 def test_nor_on_the_host(tmp_path: Path, attack: BusAttack) -> None:
     """The same on the host, with the leases of this user, which keep it apart from other tests there."""
     check(attacked(tmp_path, [attack], "host")[named(attack)], attack)
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("attack", parameters("realtime", "host"))
+@pytest.mark.parametrize("attack", chosen("realtime", "host"), ids=named)
 def test_nor_on_the_host_in_real_time(tmp_path: Path, attack: BusAttack) -> None:
     """The same on the host in real time."""
     check(attacked(tmp_path, [attack], "host")[named(attack)], attack)
