@@ -4,7 +4,6 @@ import contextlib
 import json
 import math
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +18,7 @@ import yaml
 
 from services.gantry.emulator import START
 from tests.drive.applications import KIWI, ROOT
+from tests.drive.variants import registry, variant
 from tests.realtime import hurry, wait_for_nobody
 
 BUILT = ROOT / "build" / "firmware"
@@ -139,18 +139,9 @@ class Run:
 @contextlib.contextmanager
 def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
     """hil-dynamic, as test `unplugged`, on a rig as if it were the emulated one, which needs no check."""
-    for name in ("maps", "vehicles", "sil-closed-straight", "hil-dynamic"):
-        shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)
-    spec = {
-        "dodo": 1,
-        "name": "unplugged",
-        "extends": "../hil-dynamic/hil-dynamic.dodo.yml",
-        "isolation": isolation,
-        "environment": {"camera": {"with": {"frame-id": 0}}},
-        "action": {"pose": {"with": {"serial": str(rig.path), "calibrate": True, "truth-id": None}}},
-    }
-    (folder / "tests" / "unplugged").mkdir()
-    (folder / "tests" / "unplugged" / "unplugged.dodo.yml").write_text(yaml.safe_dump(spec))
+    camera = {"camera": {"with": {"frame-id": 0}}}
+    pose = {"pose": {"with": {"serial": str(rig.path), "calibrate": True, "truth-id": None}}}
+    variant(registry(folder), "hil-dynamic", "unplugged", isolation=isolation, environment=camera, action=pose)
     (folder / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"]}))
     words = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_RIGS": str(folder / "state")}

@@ -16,6 +16,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import yaml
 from numpy.typing import NDArray
 
 from dodo_dsl.cli.main import main
@@ -27,9 +28,6 @@ from tests.drive.variants import registry, variant
 from tests.realtime import hurry
 
 LABELLED = """
-dodo: 1
-name: hil-labelled
-extends: ../hil-camera/hil-camera.dodo.yml
 record: {frames: 2 Hz}
 environment:
   camera: {uses: camera, with: {scene.truth-sender: 9, scene.truth-classes: [cone_yellow=yellow, cone_blue=blue]}}
@@ -78,16 +76,6 @@ def poses(recording: Path, sender: int) -> NDArray[np.float64]:
 def same_at_rest(measured: NDArray[np.float64], true: NDArray[np.float64]) -> None:
     """A pose is measured to within one microstep."""
     assert all(abs(m - t) <= step for m, t, step in zip(measured[1:], true[1:], MICROSTEPS, strict=True))
-
-
-def registry_with(folder: Path, name: str, spec: str, *beside: str) -> Path:
-    """The place of a spec of its own beside folders of the shipped registry."""
-    for each in beside:
-        shutil.copytree(ROOT / "tests_registry" / each, folder / "tests" / each)
-    path = folder / "tests" / name / f"{name}.dodo.yml"
-    path.parent.mkdir()
-    path.write_text(spec)
-    return path
 
 
 def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> None:
@@ -212,7 +200,7 @@ def shows_its_board(report: Path) -> None:
 
 
 def test_the_static_rig_sees_its_board_and_its_recording_is_a_labelled_data_set(tmp_path: Path) -> None:
-    spec = registry_with(tmp_path, "hil-labelled", LABELLED, "maps", "truths", "hil-camera")
+    spec = variant(registry(tmp_path), "hil-camera", "hil-labelled", **yaml.safe_load(LABELLED))
     run(tmp_path / "report", str(spec), "--application", str(KIWI / "docker-compose.yml"), code=0)
     shows_its_board(tmp_path / "report")
     recording = tmp_path / "report" / "hil-labelled" / "test.rec"

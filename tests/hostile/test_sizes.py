@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import struct
 import subprocess
 import sys
@@ -10,14 +9,12 @@ import time
 import zlib
 from collections.abc import Callable
 from contextlib import closing
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv import video as opendlv_video
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.opendlv.assets.json_file import MapError
@@ -45,7 +42,9 @@ from services.scene import scene
 from services.scene.meshes import load_obj
 from services.scene.textures import load_picture
 from services.virtual_camera.optics import load_with_alpha
-from tests.drive.applications import program, results
+from tests.drive.applications import dodo, program, results
+from tests.drive.variants import registry as registry_of_dodo
+from tests.drive.variants import variant
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
 from tests.run.scripted import plan
 
@@ -317,21 +316,14 @@ def test_whole_applications(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kin
     """Applications that fill the recording, or keep a camera's lock, end their own test."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    shipped = Path(__file__).parents[2] / "tests_registry"
-    for name in ("maps", "sil-closed-straight"):
-        shutil.copytree(shipped / name, tmp_path / "tests" / name)
-    about = {"dodo": 1, "name": "sil-small", "extends": "../sil-closed-straight/sil-closed-straight.dodo.yml"}
-    about |= {"description": "Drive.", "clock": "realtime", "record": {"limit": "5 MB"}}
-    (tmp_path / "tests" / "sil-small").mkdir()
-    (tmp_path / "tests" / "sil-small" / "sil-small.dodo.yml").write_text(json.dumps(about))
+    keys = {"clock": "realtime", "record": {"limit": "5 MB"}}
+    spec = variant(registry_of_dodo(tmp_path), "sil-closed-straight", "sil-small", **keys)
     (tmp_path / "app.py").write_text(BEGIN_OF_ALL + APPLICATIONS[kind][0])
-    program(tmp_path, "python", "app.py")
-    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
-    output = StringIO()
-    main(["run", "sil-small", "--backend", "process"], output, output)
-    (test,) = results(tmp_path / "dodo-report").values()
+    application = program(tmp_path, "python", "app.py")
+    dodo("run", str(spec), "--application", str(application), "--report", str(tmp_path / "report"), code=(1, 3))
+    (test,) = results(tmp_path / "report").values()
     result, reason = APPLICATIONS[kind][1]
-    assert (test["outcome"], test["reason"][: len(reason)]) == (result, reason), output.getvalue()
+    assert (test["outcome"], test["reason"][: len(reason)]) == (result, reason), test
 
 
 @pytest.mark.parametrize("posix", [False, True])

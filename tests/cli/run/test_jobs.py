@@ -63,13 +63,17 @@ def test_a_changed_isolation_is_checked_and_built(folder: Path) -> None:
     assert (jobs[0].plan.isolation, jobs[0].plan.subnet) == ("host", "")
 
 
+def on_pool(folder: Path, more: str = "") -> None:
+    """The test runs on any of two rigs."""
+    examples.write(f"level: hil\nrig: static\n{more}", folder)
+    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
+    path = folder / "dodo.yml"
+    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+
+
 def test_any_rig_of_a_pool_is_one_job(folder: Path) -> None:
     """The compiled folders are those of the instances; name, report and history are the test's."""
-    text = "level: hil\nrig: static\n"
-    examples.write(text, folder)
-    path = folder / "dodo.yml"
-    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
-    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+    on_pool(folder)
     jobs, _ = prepared(folder, "--repeat", "2")
     assert [(job.plan.slug, job.report.name, job.test, job.plan.rig) for job in jobs] == [
         ("example", "example", "example", "a"),
@@ -84,10 +88,7 @@ def test_any_rig_of_a_pool_is_one_job(folder: Path) -> None:
 def test_samples_on_any_rig_of_a_pool_are_a_job_each(folder: Path) -> None:
     vary = "vary: {wait: {from: 40 s, to: 50 s, nominal: 40 s}}\n"
     track = "evaluation:\n  track: {uses: collision, with: {goal: finish, max-time: '${vary.wait}'}}\n"
-    examples.write(f"level: hil\nrig: static\n{vary}{track}", folder)
-    path = folder / "dodo.yml"
-    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
-    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+    on_pool(folder, vary + track)
     jobs, _ = prepared(folder, "--samples", "2")
     assert [(job.plan.slug, job.test, job.plan.rig, [other.plan.rig for other in job.others]) for job in jobs] == [
         ("example--sample-1", "example", "a", ["b"]),

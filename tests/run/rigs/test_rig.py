@@ -70,17 +70,21 @@ def on_the_rig(place: Place) -> list[str]:
     return found
 
 
+def stopped_and_left(place: Place) -> bool:
+    """Whether the rig has been told to stop, and no process has it any more."""
+    end = time.monotonic() + 10
+    while on_the_rig(place) and time.monotonic() < end:
+        time.sleep(0.02)
+    return not on_the_rig(place) and place.rig.last() == "STOP"
+
+
 def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place) -> None:
     """Sandbox and runner at once; each alone, tests/drive/test_unplugged kills."""
     run = drive(place)
     os.kill(sandbox(run), signal.SIGKILL)
     run.kill()
     assert run.wait(20) == -signal.SIGKILL
-    end = time.monotonic() + 10
-    while on_the_rig(place) and time.monotonic() < end:
-        time.sleep(0.05)
-    assert not on_the_rig(place)
-    assert place.rig.last() == "STOP" and not any(place.rig.velocity)
+    assert stopped_and_left(place) and not any(place.rig.velocity)
     assert "fake: the rig is idle" in place.dodo("rig", "status", "--wait", "10", code=0)
 
 
@@ -117,11 +121,7 @@ def test_a_check_whose_runner_is_killed_stops_the_rig(place: Place) -> None:
         time.sleep(0.02)
     run.kill()
     run.wait()
-    end = time.monotonic() + 10
-    while on_the_rig(place) and time.monotonic() < end:
-        time.sleep(0.02)
-    assert not on_the_rig(place)
-    assert place.rig.last() == "STOP"
+    assert stopped_and_left(place)
     assert "the rig is " in place.dodo("rig", "status", "--wait", "60", code=0)
 
 
