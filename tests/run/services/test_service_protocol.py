@@ -1,14 +1,21 @@
 """What services tell the runner is taken only when it is well-formed and a report can show it."""
 
+import asyncio
 import json
+import socket
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection
 from dodo_dsl.outcome import Response, with_margin
 from dodo_dsl.run.protocol import (
+    Event,
     Foreign,
     InputEnded,
     Late,
@@ -22,7 +29,8 @@ from dodo_dsl.run.protocol import (
     Time,
     VerdictEvent,
 )
-from dodo_dsl.run.service_protocol import read
+from dodo_dsl.run.service_protocol import Reports, read
+from tests.run.scripted import plan
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
 JUDGED = {**CHECK, "margin": 0.5, "margin_share": 0.2}
@@ -213,3 +221,35 @@ KINDS = st.sampled_from(["verdict", "ready", "lost", "time", "stopped"]) | VALUE
 @pytest.mark.thorough
 def test_any_message_is_read(message: dict[str, Any]) -> None:
     read("dodo-clock", True, json.dumps(message).encode())
+
+
+NOTE = b'{"dodo": "note", "text": "so"}'
+VERDICT = b'{"dodo": "verdict", "outcome": "passed", "reason": "so", "checks": []}'
+
+
+def test_what_was_said_counts_and_nobody_waits(tmp_path: Path) -> None:
+    """Of those, too, who end at once, whose name comes late, or whose message comes in parts."""
+    one, events, path = plan(), list[Event](), tmp_path / RUNNER_SOCKET
+    (judge, *_) = (service for service in one.services if service.judge)
+    brief = [replace(judge, name=f"brief{n}", judge=False) for n in range(4)]
+
+    async def scene() -> None:
+        reports = Reports(replace(one, services=(judge, *brief)), tmp_path, events.append, {})
+        reports.listen(tmp_path)
+        for service in brief:
+            with closing(Connection.open(path, service.name)) as connection:
+                connection.send(NOTE)
+        await reports.ended(brief[-1].name)
+        assert events == [Noted(f"service '{service.name}': so") for service in brief]
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as late:
+            late.connect(str(path))
+            await asyncio.sleep(0.01)
+            for packet in (b"\0" + judge.name.encode(), b"\1" + VERDICT[:9], b"\0" + VERDICT[9:]):
+                late.send(packet)
+                await asyncio.sleep(0.01)
+            assert not reports.take_line(judge.name, VERDICT), "it has connected"
+        await reports.ended(judge.name)
+        assert events[4:] == [VerdictEvent(judge.name, True, "so", ())] and not path.exists()
+        reports.close()
+
+    asyncio.run(scene())
