@@ -1,4 +1,4 @@
-"""What a run builds replaces no image of the engine, and an application that mounts its repository finds no test in it."""
+"""What a run builds replaces no image of the engine; who mounts the repository finds no test in it."""
 
 import contextlib
 import json

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import capabilities, work_folder
-from tests.docker.broken_registry import BrokenRegistry
+from tests.docker.broken_registry import broken_registry
 from tests.docker.compose import IMAGE, Crate
 from tests.docker.engine_proxy import EngineProxy, engine_socket
 from tests.faults import Book
@@ -31,7 +31,7 @@ def told(process: "subprocess.Popen[str]", result: str) -> str:
 
 
 def test_pull_whose_connection_breaks(crate: Crate, book: Book) -> None:
-    with BrokenRegistry(is_forgetful=True) as registry:
+    with broken_registry(is_forgetful=True) as registry:
         outcomes = crate.run(crate.job("pull", image=registry.image))
     said = [text for _, text in crate.progress.phases]
     assert f"pulling {registry.image}: the connection broke, the engine retries" in said
@@ -90,7 +90,7 @@ def test_runners_without_engine_killed_and_unharmed(crate: Crate, book: Book) ->
 
 def test_interrupts(crate: Crate) -> None:
     """One does not wait for a pull, and one takes down what has been started."""
-    with BrokenRegistry() as registry:
+    with broken_registry() as registry:
         pulls = crate.start(crate.job("pulls", image=registry.image))
         starts = crate.start(crate.job("starts", environment=WAIT), "-v")
         wait_for(pulls, "the connection broke")
