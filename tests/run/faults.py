@@ -140,13 +140,6 @@ FAULTS = {
         judge=READY + LONG_LINE + BEGUN + PASS,
         application=LONG_LINE + 'print("after")\n' + WAIT,
     ),
-    "ends-early": Fault(
-        "",
-        "failed",
-        "application service 'app' ended with exit code 7",
-        ("process",),
-        application="sys.exit(7)\n",
-    ),
     "no-program": Fault(
         "",
         "error",

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import capabilities, leases
-from dodo_dsl.run.process import leftovers
+from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal, runs_alone
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
@@ -73,27 +73,18 @@ def test_foreign_traffic_is_an_error_that_names_its_sender(cid: int, traffic: in
 
 
 @pytest.mark.slow
-def test_a_cid_is_held_against_other_lease_folders(
-    cid: int, tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cid_is_held_against_other_lease_folders(cid: int) -> None:
     """As those of two users of one machine, who share its bus."""
     said: list[str] = []
 
-    async def wait() -> int:
+    async def scene() -> None:
+        claim = host_isolation._claimed(f"cid-{cid}")
+        assert claim is not None
+        asyncio.get_running_loop().call_later(0.2, claim.close)
         async with host_slot(plan(cid=cid), (cid,), said.append, alone=False) as slot:
-            return slot.cid
+            assert (slot.cid, host_isolation._claimed(f"cid-{cid}")) == (cid, None)
 
-    async def scene() -> int:
-        async with host_slot(plan(cid=cid), (cid,), print, alone=False):
-            monkeypatch.setenv("DODO_LEASES", str(tmp_path / "other"))
-            second = asyncio.create_task(wait())
-            while not said:
-                await asyncio.sleep(0)
-            monkeypatch.setenv("DODO_LEASES", str(folder))
-        monkeypatch.setenv("DODO_LEASES", str(tmp_path / "other"))
-        return await second
-
-    assert asyncio.run(scene()) == cid
+    asyncio.run(scene())
     assert said == ["waiting for another process"]
 
 

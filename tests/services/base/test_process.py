@@ -1,7 +1,6 @@
 """The tiny service as a process on a real bus."""
 
 import re
-import shlex
 import subprocess
 import sys
 import uuid
@@ -19,7 +18,7 @@ from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Check
 from services.base.process import sentence, short_traceback
-from tests.services.base.conftest import ROOT, Process, Start
+from tests.services.base.conftest import ROOT, Start
 
 MESSAGES = MessageSet.standard()
 READY = {"dodo": "ready"}
@@ -214,20 +213,6 @@ def test_memory_that_another_process_has(start: Start) -> None:
         assert (code, out) == (2, "")
         assert f"shared memory '{name}' cannot be made: process" in err
         assert Path("/tmp", name).exists()
-
-
-@pytest.mark.thorough
-def test_the_example_of_the_help_runs(start: Start) -> None:
-    text = start("--help").end()
-    assert text[0] == 0
-    title, *_, example = text[1].rstrip("\n").split("\n")
-    assert title == "tiny-service: Does a little of everything that services do."
-    assert "  --freq  (number Hz, 1 to 1000, default 50)" in text[1]
-    command = shlex.split(example.removeprefix("example: "))
-    service = Process([sys.executable, *command[1:]])
-    assert service.line() == READY
-    service.stop()
-    assert service.end()[0] == 0
 
 
 def test_starting_up_is_light() -> None:
