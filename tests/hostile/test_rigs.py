@@ -35,7 +35,6 @@ from tests.run.helpers import Bench
 from tests.run.rigs.place import Place, place
 
 __all__ = ["place"]
-ROOT = Path(__file__).parents[2]
 NUMBERS = ("1_0", "1e1_0", "١", "１", "0x10", "1 0", "ten", "1-", "1,5", "nan", "inf", "1e999", "²")
 """Python's ``float`` or ``int`` takes some of these; no person writes them."""
 

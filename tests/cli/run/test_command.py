@@ -163,15 +163,10 @@ def test_report_among_tests_is_refused_and_harms_nothing(dodo: Command) -> None:
     assert Path("generated/test/test.json").is_file()
 
 
-@pytest.mark.parametrize(
-    "change",
-    [{"slug": "../../x"}, {"timeout_s": "1"}, {"cid": 999}, {"seed": -1}, {"services": 3}, {"application": {}}],
-    ids=str,
-)
-def test_tampered_compiled_tests_are_refused(dodo: Command, change: dict[str, object]) -> None:
+def test_tampered_compiled_tests_are_refused(dodo: Command) -> None:
     folder = dodo.compiled(plan())
     raw = json.loads((folder / "test.json").read_text())
-    (folder / "test.json").write_text(json.dumps({**raw, **change}))
+    (folder / "test.json").write_text(json.dumps({**raw, "slug": "../../x"}))
     code, _, err = dodo.dodo("run", "--compiled", str(folder))
     assert (code, "not a compiled test" in err) == (2, True)
 

@@ -91,14 +91,9 @@ def test_all_run_at_first_and_then_what_a_file_affects(running: Desk) -> None:
     assert "compared with the run before: " in running.stdout.getvalue()
     assert running.save(running.spec(BOTH[1])) == []
     assert running.stdout.getvalue().startswith("no test is affected by tests/sil-closed-straight/")
+    assert running.save(next((running.folder / "tests" / "maps" / "straight").glob("*.obj"))) == [BOTH[1]]
     assert running.save(running.folder / "kiwi" / "steering.py") == BOTH
     assert [outcome.slug for outcome in results.load(running.folder / "report" / "results.json")] == BOTH
-
-
-@pytest.mark.slow
-def test_the_map_of_a_test_affects_it(running: Desk) -> None:
-    files = [path for path in (running.folder / "tests" / "maps" / "straight").iterdir() if path.suffix == ".obj"]
-    assert running.save(files[0]) == [BOTH[1]]
 
 
 @pytest.mark.slow
