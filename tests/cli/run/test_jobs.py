@@ -208,5 +208,59 @@ def test_a_compiled_test_without_its_shared_files_is_not_run(folder: Path) -> No
     path = folder / "out/example" / PLAN_FILE
     path.write_text(path.read_text().replace('"shared": {}', f'"shared": {{"a.rec": "{"0" * 64}-a.rec"}}'))
     with pytest.raises(UsageError, match=r"example: 'a\.rec' is missing: '.*_files' belongs to the compiled tests"):
-        options = parser().parse_args(["run", "--compiled", str(path.parent), "--report", str(folder / "report")])
-        prepare(options, folder / "again", io.StringIO())
+        run_compiled(folder, path.parent)
+
+
+DRIVER = """\
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=111
+    x-dodo: {out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}
+    x-dodo-process: [python, driver.py]
+# dodo.yml
+registry: [tests, "dodo:"]
+"""
+ON_THE_RIG = ["hil-closed-oval", "hil-dynamic", "hil-open-straight"]
+RIGLESS = "skipped shipped tests that need a rig, which dodo.yml does not have: "
+SAID = f"skipped shipped tests on the emulated rig, which is not built: {', '.join(ON_THE_RIG)} (see dodo doctor)\n"
+
+
+@pytest.fixture
+def shipped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A deployment of the shipped tests, without an emulated rig that is built."""
+    examples.write(DRIVER, folder)
+    (folder / "driver.py").touch()
+    monkeypatch.setenv("DODO_FIRMWARE", str(folder / "firmware"))
+    return folder
+
+
+def selected(folder: Path, *words: str) -> tuple[list[str], str]:
+    """The tests that run, and what is said about others."""
+    said = io.StringIO()
+    options = parser().parse_args(["run", "--report", str(folder / "report"), *words])
+    jobs, _ = prepare(options, folder / "out", said)
+    return sorted(job.test for job in jobs), said.getvalue()
+
+
+@pytest.mark.thorough
+def test_those_that_nobody_named_are_left_out(shipped: Path) -> None:
+    names, said = selected(shipped, "--level", "sil", "--level", "hil", "--emulate")
+    assert SAID in said and "sil-closed-straight" in names and not set(ON_THE_RIG) & set(names)
+    names, said = selected(shipped, "--level", "sil", "--level", "hil")
+    assert f"{RIGLESS}{', '.join(ON_THE_RIG)} (--emulate" in said and "sil-closed-straight" in names
+    assert SAID not in said and not set(ON_THE_RIG) & set(names)
+    with pytest.raises(UsageError, match="no tests to run"):
+        selected(shipped, "hil-*")
+
+
+@pytest.mark.thorough
+def test_they_run_where_they_are_named_or_can_run(shipped: Path) -> None:
+    assert selected(shipped, "hil-dynamic") == (["hil-dynamic"], "")
+    assert selected(shipped, "hil-*", "--backend", "docker")[0] == ON_THE_RIG, "the rig is in an image"
+    (shipped / "firmware").mkdir()
+    for name in ("rig-emulator", "gantry.elf"):
+        (shipped / "firmware" / name).touch()
+    names, said = selected(shipped, "hil-*")
+    assert names == ON_THE_RIG and "emulated rig" not in said
