@@ -1,6 +1,5 @@
 """The hil tests on the emulated rig: the firmware's binary, the gantry, a camera at the rig's true place."""
 
-import contextlib
 import json
 import math
 import os
@@ -26,6 +25,7 @@ from services.gantry.rig_table import BOUNDS, MICROSTEP
 from tests.drive.applications import KIWI, ROOT, dodo, kiwi, results
 from tests.drive.variants import registry, variant
 from tests.realtime import hurry
+from tests.run.desk import processes_with
 
 LABELLED = """
 record: {frames: 2 Hz}
@@ -95,16 +95,6 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
     assert re.search(r"turns of 50 ms, \d+ without an answer; jitter median .* ms; position after median .* ms", log)
 
 
-def emulators(folder: Path) -> list[int]:
-    """Ids of the processes of the emulator in a folder."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with contextlib.suppress(OSError):
-            if path.read_bytes().startswith(bytes(folder / "rig-emulator")):
-                found.append(int(path.parent.name))
-    return found
-
-
 def test_an_emulated_rig_that_is_held_up_for_a_moment_drives_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,10 +111,10 @@ def test_an_emulated_rig_that_is_held_up_for_a_moment_drives_on(
             output.append(line)
             if line.endswith("  running\n"):
                 time.sleep(0.5)
-                (emulator,) = emulators(firmware)
-                os.kill(emulator, signal.SIGSTOP)
+                (emulator,) = processes_with(f"{firmware}/rig-emulator")
+                os.kill(int(emulator), signal.SIGSTOP)
                 time.sleep(0.12)
-                os.kill(emulator, signal.SIGCONT)
+                os.kill(int(emulator), signal.SIGCONT)
     assert process.returncode == 0, "".join(output)
     (test,) = results(tmp_path / "report").values()
     assert 0.1 < test["machine"]["paused_s"] <= 0.25

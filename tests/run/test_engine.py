@@ -339,13 +339,6 @@ def test_a_service_with_a_longer_set_up_is_waited_for() -> None:
     )
 
 
-def test_the_less_patient_of_two_services_is_named() -> None:
-    tested = plan(evaluators=("track", "signal"))
-    camera, track, signal = tested.services
-    tested = replace(tested, services=(camera, replace(track, setup_s=10.0), signal))
-    assert "service 'signal'" in outcome(ScriptedBackend(tested, {"environment": READY["environment"]})).reason
-
-
 @pytest.mark.parametrize("problem", [BackendError("no subnet is free"), OSError(28, "full"), ValueError("odd")])
 def test_a_backend_that_does_not_open_is_closed(problem: Exception) -> None:
     backend = ScriptedBackend(plan(), problem=problem)

@@ -17,11 +17,10 @@ import pytest
 from dodo_dsl.run import capabilities, leases
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal, runs_alone
+from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError
 from tests.run.desk import ROOT
-from tests.run.helpers import Bench
 from tests.run.scripted import plan
 
 SHARES = """
@@ -95,13 +94,6 @@ def test_a_slot_has_names_of_its_own_unless_it_is_alone(cid: int, folder: Path) 
     assert [slot.memory_prefix for slot in slots] == [slots[0].name, slots[1].name, ""]
     assert slots[0].name != slots[1].name
     assert list(folder.glob("*.lease")) == []
-
-
-@pytest.mark.slow
-def test_applications_without_flags_run_alone(tmp_path: Path) -> None:
-    bench = Bench(tmp_path)
-    words = ((), ("--cid=1",), ("--name=a",), ("--cid=1", "--name=a"))
-    assert [runs_alone(bench.plan(command=command)) for command in words] == [True, True, True, False]
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import pytest
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base.flags import Flags
-from services.base.service import Check, Context, Service, Verdict, period_of, undeclared_checks
+from services.base.service import Check, Context, Verdict, period_of, undeclared_checks
 
 
 @pytest.mark.parametrize(("slow", "fast"), [(30.0, 60.0), (15.0, 60.0), (12.0, 24.0), (29.97, 59.94), (0.3, 0.9)])
@@ -31,13 +31,6 @@ def test_memory_is_removed_with_the_resources() -> None:
         SharedMemory.attach(name).close()
     with pytest.raises(SharedMemoryError):
         SharedMemory.attach(name)
-
-
-def test_a_service_needs_nothing_of_its_own() -> None:
-    service = Service()
-    service.begin(1)
-    service.end_of_input(2)
-    assert (tuple(service.update(1)), service.verdict, service.finished, service.drive) == ((), None, False, None)
 
 
 def test_the_line() -> None:
