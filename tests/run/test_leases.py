@@ -14,7 +14,7 @@ import pytest
 from dodo_dsl.run import leases
 from dodo_dsl.run.leases import Lease, LeaseTimeout
 from tests.run.desk import ROOT
-from tests.run.scripted import run
+from tests.run.scripted import one_by_one, run
 
 
 @pytest.fixture
@@ -125,10 +125,7 @@ def test_waiters_are_served_in_the_order_in_which_they_came(folder: Path) -> Non
         lease.release()
 
     async def scene() -> None:
-        tasks = []
-        for name in "abc":
-            tasks.append(asyncio.ensure_future(waiter(name)))
-            await asyncio.sleep(0.05)
+        tasks = await one_by_one(*map(waiter, "abc"))
         held.release()
         late = leases.lease_any(["cid-121"], {"test": "late"}, said.setdefault("late", []).append)
         (await late).release()
@@ -172,10 +169,7 @@ def test_shared_use_waits_behind_an_exclusive_one_that_came_before(folder: Path)
         lease.release()
 
     async def scene() -> None:
-        tasks = []
-        for name, shared in (("alone", False), ("one", True), ("two", True)):
-            tasks.append(asyncio.ensure_future(waiter(name, shared)))
-            await asyncio.sleep(0.05)
+        tasks = await one_by_one(waiter("alone", False), waiter("one", True), waiter("two", True))
         assert served == []
         held.release()
         await asyncio.gather(*tasks)

@@ -169,17 +169,15 @@ def test_nor_in_real_time(found: Found, attack: BusAttack) -> None:
     check(found(attack), attack)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("attack", chosen("lockstep", "host"), ids=named)
+@pytest.mark.parametrize(
+    "attack",
+    [
+        *(pytest.param(each, id=f"{each.name}-steps", marks=pytest.mark.slow) for each in chosen("lockstep", "host")),
+        *(pytest.param(each, id=each.name, marks=pytest.mark.realtime) for each in chosen("realtime", "host")),
+    ],
+)
 def test_nor_on_the_host(tmp_path: Path, attack: BusAttack) -> None:
     """The same on the host, with the leases of this user, which keep it apart from other tests there."""
-    check(attacked(tmp_path, [attack], "host")[named(attack)], attack)
-
-
-@pytest.mark.realtime
-@pytest.mark.parametrize("attack", chosen("realtime", "host"), ids=named)
-def test_nor_on_the_host_in_real_time(tmp_path: Path, attack: BusAttack) -> None:
-    """The same on the host in real time."""
     check(attacked(tmp_path, [attack], "host")[named(attack)], attack)
 
 

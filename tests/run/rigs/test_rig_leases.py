@@ -16,7 +16,7 @@ from dodo_dsl.run.rigs.leases import (
     quarantined,
 )
 from dodo_dsl.run.rigs.problems import RigProblem
-from tests.run.scripted import run
+from tests.run.scripted import one_by_one, run
 
 
 def test_flags_name_hardware() -> None:
@@ -59,10 +59,7 @@ def test_who_has_waited_for_the_cid_is_not_the_last_for_the_device(folder: Path)
             order.append(name)
 
     async def scene() -> None:
-        users = []
-        for name, cid in (("both", 121), ("device", None)):
-            users.append(asyncio.ensure_future(user(name, cid)))
-            await asyncio.sleep(0.05)
+        users = await one_by_one(user("both", 121), user("device", None))
         for lease in held:
             assert lease is not None
             lease.release()

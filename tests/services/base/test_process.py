@@ -1,10 +1,11 @@
 """The tiny service as a process on a real bus."""
 
+import logging
 import re
 import subprocess
 import sys
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,8 +18,9 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base import Check
-from services.base.process import sentence, short_traceback
+from services.base.process import LONGEST, published, sentence, short_traceback
 from tests.services.base.conftest import ROOT, Start
+from tests.services.process import receive
 
 MESSAGES = MessageSet.standard()
 READY = {"dodo": "ready"}
@@ -249,3 +251,55 @@ def test_what_the_base_cannot_use_is_shown_there(tmp_path: Path) -> None:
     told = sentence(error, tmp_path / "my_services/judge")
     assert told.startswith("AttributeError: 'str' object has no attribute 'items' (services/base/service.py:")
     assert told.endswith(", in as_json)")
+
+
+LOG = "opendlv.system.LogMessage"
+LAST = "the last line of this test"
+
+
+@pytest.fixture
+def sessions(cid: int) -> Iterator[tuple[Session, Session]]:
+    with Session(cid) as ours, Session(cid) as theirs:
+        yield ours, theirs
+
+
+def logged(session: Session, sender_stamp: int = 3) -> list[tuple[int, str]]:
+    """Severities and texts up to the last line."""
+    lines = []
+    while not lines or lines[-1][1] != LAST:
+        message = receive(session, LOG, sender_stamp)[1]
+        lines.append((message.level, message.description))
+    return lines[:-1]
+
+
+def test_each_line_with_its_severity(sessions: tuple[Session, Session]) -> None:
+    ours, theirs = sessions
+    log = logging.getLogger("published")
+    log.setLevel(logging.DEBUG)
+    with published(ours, 3):
+        log.debug("a %s", "detail")
+        log.info("a fact")
+        log.warning("odd\nthing")
+        log.error("x" * 2 * LONGEST)
+        log.warning(LAST)
+    log.warning("nobody is told of this")
+    assert logged(theirs) == [(7, "a detail"), (6, "a fact"), (4, "odd thing"), (3, "x" * LONGEST)]
+    assert theirs.receive(0.0) is None
+
+
+def test_the_error_that_ends_it(sessions: tuple[Session, Session]) -> None:
+    ours, theirs = sessions
+    with pytest.raises(ValueError, match="lost"), published(ours, 0):
+        raise ValueError("the rig is lost")
+    message = receive(theirs, LOG)[1]
+    assert (message.level, message.description) == (2, "the rig is lost")
+
+
+def test_a_service_says_on_the_bus_what_it_logs_where_it_is_asked_to(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        assert start("--role=broken").end()[0] == 1
+        service = start("--role=broken", "--log-id=9")
+        message = receive(session, LOG, 9)[1]
+        assert (message.level, message.description) == (2, "a model went wrong")
+        assert service.end()[0] == 1
+        assert session.receive(0.0) is None
