@@ -62,10 +62,3 @@ def test_paths_that_are_not_utf_8(tmp_path: Path, record: Callable[..., Path], m
         assert code in (0, 1, 2, 3), words
         assert "Traceback" not in output and "internal error" not in output, (words, output)
         output.encode()  # a terminal takes it
-
-
-@pytest.mark.slow
-def test_a_path_that_is_not_utf_8_is_an_argument(tmp_path: Path) -> None:
-    """Such a path may be an argument of the command."""
-    result = run("rec", "info", os.fsencode(tmp_path) + b"/\xff.rec")
-    assert (result.returncode, "No such file" in result.stderr) == (2, True)

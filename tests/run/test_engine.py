@@ -321,11 +321,6 @@ def test_one_that_waits_for_others_has_the_time_that_these_may_take() -> None:
     assert (found.outcome, found.reason) == ("error", reason)
 
 
-def test_an_application_that_ends_during_set_up_fails() -> None:
-    found = outcome(ScriptedBackend(plan(), {**READY, "application": [(0.0, Exited("app", 3))], "begin": []}))
-    assert (found.outcome, found.reason) == ("failed", f"{APP} ended with exit code 3 {EARLY.replace('2.0', '0.0')}")
-
-
 def test_a_service_with_a_longer_set_up_is_waited_for() -> None:
     late = READY_PATIENCE_S + 5.0
     stages = {**drives(), "environment": [(late, Ready("camera"))]}
@@ -387,12 +382,6 @@ def test_a_verdict_says_what_the_application_is_told() -> None:
     for stages, expected in ((drives(), f"it drove; {told}"), ({**READY, "begin": [(1.0, Lost("gone"))]}, "gone")):
         found = outcome(ScriptedBackend(replace(plan(), told=("opendlv.sim.Frame",)), stages))
         assert found.reason == expected
-
-
-def test_the_last_lines_are_those_of_the_service_that_decided() -> None:
-    stages = {**READY, "begin": [(2.0, Exited("app", 7))]}
-    found = outcome(ScriptedBackend(plan(), stages, tails={"app": ["cone lost"], "camera": ["picture 3"]}))
-    assert found.last_lines == ("cone lost",)
 
 
 @pytest.mark.parametrize(

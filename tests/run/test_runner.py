@@ -10,10 +10,10 @@ import pytest
 
 from dodo_dsl.application.model import Access
 from dodo_dsl.outcome import NotRun, Outcome
-from dodo_dsl.plan.model import Application, ApplicationService, Plan
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import BackendError, Exited, VerdictEvent
-from dodo_dsl.run.runner import Policy, Runner, default_backend
+from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import Schedule
 from tests.run.helpers import Recorded
 from tests.run.scripted import (
@@ -301,12 +301,6 @@ def test_a_signal_ends_what_runs_and_what_waits(scene: Scene, number: int) -> No
     assert (scene.runner.interrupted, scene.progress.notes[1:]) == (True, ["interrupted: taking down"])
     assert (scene.backends.began, scene.backends.closed) == (["a"], 1)
     assert ("b", "error") not in scene.progress.phases
-
-
-def test_containers_are_needed_by_what_cannot_be_started() -> None:
-    started, image = ApplicationService("a", ("python", "a.py")), ApplicationService("b")
-    assert default_backend([plan(application=Application(".", (started,)))]) == "process"
-    assert default_backend([plan(application=Application(".", (started, image)))]) == "docker"
 
 
 def test_a_secret_that_is_passed_is_told(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
