@@ -14,7 +14,7 @@ from tests.rec.conftest import video
 ROOT = Path(__file__).parents[2]
 
 
-def run(*words: str | bytes, shell: str = "") -> "subprocess.CompletedProcess[str]":
+def run(*words: str, shell: str = "") -> "subprocess.CompletedProcess[str]":
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "dodo_dsl", *words]
     if shell:

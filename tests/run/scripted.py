@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, PlannedService
+from dodo_dsl.plan.model import Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
@@ -218,6 +218,3 @@ def jobs(folder: Path, *plans: Plan) -> list[Job]:
 def send_signal_after(seconds: float, number: int) -> None:
     """A signal to this very process, in which only the running loop handles it."""
     asyncio.get_running_loop().call_later(seconds, os.kill, os.getpid(), number)
-
-
-assert set(READY) <= set(LAYERS)
