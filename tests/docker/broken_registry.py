@@ -4,14 +4,15 @@ An engine asks again, six times in more than a minute by default. To make it giv
 at the second time that it has no such layer.
 """
 
+import contextlib
 import hashlib
 import json
 import os
 import socket
+from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 IMAGE = "broken:1"
 _MANIFEST = "application/vnd.docker.distribution.manifest.v2+json"
@@ -79,30 +80,21 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class _Server(ThreadingHTTPServer):
+    """``image`` is the reference of one that never arrives; ``breaks`` is how often its layer was asked for."""
+
     breaks = 0
     is_forgetful = False
 
-
-class BrokenRegistry:
-    """Serves on 127.0.0.1 while it is entered; ``image`` is the reference of an image that never arrives."""
-
-    def __init__(self, is_forgetful: bool = False) -> None:
-        self._is_forgetful = is_forgetful
-
-    def __enter__(self) -> Self:
-        self._server = _Server(("127.0.0.1", 0), _Handler)
-        self._server.is_forgetful = self._is_forgetful
-        self._thread = Thread(target=self._server.serve_forever, daemon=True)
-        self._thread.start()
-        self.image = f"127.0.0.1:{self._server.server_port}/{IMAGE}"
-        return self
-
     @property
-    def breaks(self) -> int:
-        """How often the layer was asked for."""
-        return self._server.breaks
+    def image(self) -> str:
+        return f"127.0.0.1:{self.server_port}/{IMAGE}"
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        self._server.shutdown()
-        self._server.server_close()
-        self._thread.join()
+
+@contextlib.contextmanager
+def broken_registry(is_forgetful: bool = False) -> Iterator[_Server]:
+    """Serves on 127.0.0.1."""
+    with _Server(("127.0.0.1", 0), _Handler) as server:
+        server.is_forgetful = is_forgetful
+        Thread(target=server.serve_forever, daemon=True).start()
+        yield server
+        server.shutdown()

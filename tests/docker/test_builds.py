@@ -1,7 +1,9 @@
-"""What a run builds replaces no image of the engine, whatever name the application's file asks for."""
+"""What a run builds replaces no image of the engine; who mounts the repository finds no test in it."""
 
 import contextlib
+import json
 import secrets
+import shutil
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from tests.docker.compose import IMAGE
 from tests.docker.test_started_anywhere import WITHOUT_COLON
 from tests.drive.applications import dodo, results
 from tests.drive.variants import registry, variant
+from tests.run.desk import ROOT
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
@@ -38,3 +41,29 @@ def test_an_image_keeps_what_its_name_stands_for(tmp_path: Path) -> None:
     assert test["outcome"] == "failed", test
     logs = tmp_path / "report" / "sil-built" / "logs"
     assert {(logs / f"application.{service}.log").read_text() for service in "ab"} == {"it is built\n"}
+
+
+TEST = "sil-closed-straight"
+OWN = ("docker-compose.yml", "dodo.yml", f"{TEST}/README.md")
+HIDDEN = (".git/config", "generated/child.gitlab-ci.yml", "dodo-report/old/test.rec", "tests/a/a.json")
+LOOK = "exec 2>&1; touch /read/tests/left-behind; find /app /read ! -size 0 -type f"
+
+
+@pytest.mark.parametrize("backend", ["docker", pytest.param("mixed", marks=pytest.mark.proof)])
+def test_what_is_hidden_is_empty(tmp_path: Path, backend: str) -> None:
+    """Where the registry holds the application, also in the copy that it may change."""
+    for name in (TEST, "maps/straight"):
+        shutil.copytree(ROOT / "tests_registry" / name, tmp_path / name)
+    for name in HIDDEN:
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("hidden")
+    service = {"image": IMAGE, "entrypoint": ["sh", "-c", LOOK], "command": "--cid=111", "user": "0:0"}
+    services = {"looks": {**service, "volumes": [".:/app", "./:/read:ro"]}}
+    (tmp_path / "docker-compose.yml").write_text(json.dumps({"services": services}))
+    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [., tests]\napplication: docker-compose.yml\n")
+    words = ("run", TEST, "--backend", backend, "--report", "report", "--retry-errors", "2")
+    dodo(*words, code=1, before=("env", "-C", str(tmp_path)))
+    refused, *seen = (tmp_path / "report" / TEST / "logs" / "application.looks.log").read_text().splitlines()
+    assert refused.endswith("Read-only file system")
+    assert set(seen) == {f"/{place}/{name}" for place in ("app", "read") for name in OWN}
+    assert not (tmp_path / "tests" / "left-behind").exists()

@@ -27,50 +27,21 @@ OTHERS: dict[str, tuple[str, str, dict[str, Any]]] = {
     ),
     "plain": ("service_started", "touch /tmp/$0; sleep 600", {}),
 }
-WAITS = "service 'app' could not be started: it waits for 'db' to be healthy (depends_on), which"
-TABLE: dict[str, tuple[dict[str, Any], str, str]] = {
+CONDITION = tuple[str, str, dict[str, Any]]
+ILL: dict[str, Any] = {"healthcheck": {**CHECK, "test": ["CMD", "false"]}}
+TABLE: dict[str, tuple[dict[str, CONDITION], str, str]] = {
     "come-true": ({}, "passed", "it drove"),
-    "init-fails": (
-        {"init": (COMPLETED, "exit 3", {})},
-        "failed",
-        "application service 'init' ended with exit code 3 during set-up, before the test was decided; 'app' waits for "
-        "it to end with exit code 0",
-    ),
+    "init-fails": ({"init": (COMPLETED, "exit 3", {})}, "failed", "'init' ended with exit code 3 during set-up"),
     "optional": ({"init": (COMPLETED, "exit 3", {})}, "passed", "it drove"),
-    "unhealthy": (
-        {"db": (HEALTHY, "sleep 600", {"healthcheck": {**CHECK, "test": ["CMD", "false"]}})},
-        "error",
-        WAITS + " is unhealthy",
-    ),
-    "ends-in-time": (
-        {"db": (HEALTHY, "exit 0", OTHERS["db"][2])},
-        "failed",
-        "application service 'db' ended with exit code 0 during set-up, before the test was decided; 'app' waits for "
-        "it to be healthy",
-    ),
-    "without-check": (
-        {"db": (HEALTHY, "sleep 600", {})},
-        "error",
-        "service 'app' waits for 'db' to be healthy (depends_on), but neither the compose file nor the image of 'db' "
-        "has a healthcheck",
-    ),
+    "unhealthy": ({"db": (HEALTHY, "sleep 600", ILL)}, "error", "'app' could not be started: it waits for 'db'"),
+    "ends-in-time": ({"db": (HEALTHY, "exit 0", OTHERS["db"][2])}, "failed", "'db' ended with exit code 0 during"),
+    "without-check": ({"db": (HEALTHY, "sleep 600", {})}, "error", "nor the image of 'db' has a healthcheck"),
     "own-health": (
-        {
-            "app": (
-                "",
-                "",
-                {"entrypoint": ["sleep", "600"], "command": [], "healthcheck": {**CHECK, "test": ["CMD", "false"]}},
-            )
-        },
+        {"app": ("", "", {"entrypoint": ["sleep", "600"], "command": [], **ILL})},
         "error",
-        "service 'app' could not be started: its healthcheck failed",
+        "'app' could not be started: its healthcheck failed",
     ),
-    "never-ends": (
-        {"init": (COMPLETED, "sleep 600", {})},
-        "error",
-        "service 'app' could not be started: it waits for 'init' to end with exit code 0 (depends_on), and it did not "
-        "within 9 s",
-    ),
+    "never-ends": ({"init": (COMPLETED, "sleep 600", {})}, "error", "'init' to end with exit code 0 (depends_on), and"),
 }
 
 
@@ -94,21 +65,18 @@ def waiting(crate: Crate, slug: str, others: Mapping[str, tuple[str, str, dict[s
     return changed(job, replace(job.plan, application=made))
 
 
-FEW = {
+NAMES = {
     "process": ("come-true", "init-fails", "optional", "never-ends"),
-    "docker": ("come-true", "unhealthy", "own-health"),
+    "docker": ("come-true", "unhealthy", "ends-in-time", "without-check", "own-health"),
     "mixed": ("come-true", "init-fails"),
 }
-NO_CHECK = {"db": ("service_healthy", "sleep 600", {})}
+NO_CHECK: dict[str, CONDITION] = {"db": ("service_healthy", "sleep 600", {})}
 """Of processes: who has started is healthy."""
 
 
 @pytest.mark.parametrize(
     ("backend", "names"),
-    [
-        *(pytest.param(backend, names, id=backend, marks=MARKS[backend]) for backend, names in FEW.items()),
-        pytest.param("docker", tuple(TABLE), id="docker, all", marks=[*MARKS["docker"], pytest.mark.proof]),
-    ],
+    [pytest.param(backend, names, id=backend, marks=MARKS[backend]) for backend, names in NAMES.items()],
 )
 def test_conditions(
     backend: str,
@@ -128,7 +96,7 @@ def test_conditions(
     chosen = {name: TABLE[name] for name in names}
     jobs = [waiting(crate, slug, {**others, **row[0]}, slug == "optional") for slug, row in chosen.items()]
     outcomes = crate.run(*jobs, backend=backend)
-    assert {slug: (o.outcome, o.reason) for slug, o in outcomes.items()} == {k: row[1:] for k, row in chosen.items()}
+    for slug, (_, expected, said) in chosen.items():
+        assert (outcomes[slug].outcome, said in outcomes[slug].reason) == (expected, True), outcomes[slug].reason
     if "optional" in names:
-        told = "it waits for 'init' to end with exit code 0 (depends_on, required: false), which ended with exit code 3"
-        assert f"service 'app' starts all the same: {told}" in outcomes["optional"].notes
+        assert "service 'app' starts all the same: it waits for 'init'" in "".join(outcomes["optional"].notes)

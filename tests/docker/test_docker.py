@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shutil
-import socket
 import stat
 import subprocess
 import sys
@@ -14,35 +13,22 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
 
-from dodo_dsl.opendlv.address import group
-from dodo_dsl.outcome import differs_each_run
+from dodo_dsl.outcome import Outcome, differs_each_run
 from tests.docker.compose import Crate
+from tests.drive.applications import ROOT, dodo, results
 from tests.realtime import wait_for_nobody
 from tests.run.desk import wait_for
-from tests.run.helpers import WAIT
+from tests.run.helpers import AFTER_START, PASS, READY, WAIT
+from tests.run.process.test_resources import FORKS, LEAKS
 
-ROOT = Path(__file__).parents[2]
-HOSTILE = Path(__file__).parent / "hostile"
 DRIVE = "sil-closed-straight"
+DOCKER = ("--backend", "docker")
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
-
-
-def start(folder: Path, *words: str, backend: str = "docker") -> "subprocess.Popen[str]":
-    environment = {**os.environ, "DODO_LEASES": str(folder / "leases")}
-    command = [sys.executable, "-m", "dodo_dsl", "run", "--backend", backend, *words]
-    return subprocess.Popen(
-        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-
-
-def results(report: Path) -> dict[str, dict[str, Any]]:
-    return {t["slug"]: t for t in json.loads((report / "results.json").read_text())["tests"]}
 
 
 def of_dodo() -> set[str]:
@@ -57,8 +43,9 @@ def of_dodo() -> set[str]:
 
 
 @pytest.fixture(autouse=True)
-def clean_engine() -> Iterator[None]:
+def clean_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Every test leaves the engine as it was; what other runs on this machine have there, they take down."""
+    monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
     before = of_dodo()
     yield
     deadline = time.monotonic() + 60
@@ -67,6 +54,48 @@ def clean_engine() -> Iterator[None]:
     assert left == set()
 
 
+HARMS = """
+import contextlib, itertools, socket, threading
+import sysv_ipc
+from dodo_dsl.opendlv.address import group
+
+def flood():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for turn in itertools.count():
+            sender.sendto(os.urandom(100 if turn % 2 else 20_000), group(111))
+            if turn % 200 == 0:
+                time.sleep(0.01)
+
+def groups():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        while True:
+            for cid in range(1, 255):
+                sender.sendto(b"hostile", group(cid))
+            time.sleep(0.05)
+
+def memory():
+    while True:
+        open("/tmp/video1.argb", "w").close()
+        sysv_ipc.SharedMemory(sysv_ipc.ftok("/tmp/video1.argb", 1, True), sysv_ipc.IPC_CREAT, size=1000)
+        for line in list(open("/proc/sysvipc/shm"))[1:]:
+            segment = sysv_ipc.SharedMemory(int(line.split()[0]))
+            segment.write(bytes(segment.size))
+            segment.detach()
+        time.sleep(0.02)
+
+def tmp():
+    for number in itertools.count():
+        with contextlib.suppress(OSError), open(f"/tmp/filler-{number % 1000}", "wb") as file:
+            file.write(os.urandom(1 << 20))
+        time.sleep(0.01 if number < 1000 else 0.1)
+
+threads = [threading.Thread(target=harm, daemon=True) for harm in (flood, groups, memory, tmp)]
+for thread in threads:
+    thread.start()
+while not os.path.exists("{stop}"):
+    assert all(map(threading.Thread.is_alive, threads))
+    time.sleep(0.1)
+"""
 FEELS = """
 import socket
 from dodo_dsl.opendlv.address import group
@@ -95,15 +124,14 @@ print(f'{{"dodo": "verdict", "outcome": "{outcome}", "reason": "felt {len(felt)}
 
 def test_a_hostile_neighbour_is_neither_heard_nor_felt(crate: Crate) -> None:
     """It floods its bus, sends to all groups, writes into all shared memory and fills its ``/tmp`` meanwhile."""
-    script = shutil.copy(HOSTILE / "hostile.py", crate.bench.folder)
-    words = ["--cid=111", "--name=video0.argb", "--harm=flood,groups,memory,tmp", f"--stop={crate.bench.folder}/stop"]
-    hostile = crate.start(crate.job("hostile", entrypoint=["python3", "-u", str(script)], command=words))
+    stop = crate.bench.folder / "stop"
+    hostile = crate.start(crate.job("hostile", application=HARMS.replace("{stop}", str(stop))))
     try:
         wait_for(hostile, "running")
         (outcome,) = crate.run(crate.job("quiet", FEELS, "open('/tmp/app-began', 'w').close()\n" + WAIT)).values()
-        assert hostile.poll() is None
+        assert hostile.poll() is None, (crate.log("hostile"), outcome)
     finally:
-        (crate.bench.folder / "stop").touch()
+        stop.touch()
         said, _ = hostile.communicate(timeout=600)
     assert (outcome.outcome, outcome.reason) == ("passed", "felt 0")
     assert re.search(r"^FAILED .*application service 'app' ended with exit code 0", said, re.MULTILINE), said
@@ -135,12 +163,10 @@ def test_the_emulated_rig_in_containers(tmp_path: Path) -> None:
     helper = threading.Thread(target=hurry_emulators, args=(ended,))
     helper.start()
     try:
-        with start(tmp_path, "hil-dynamic", "--retry-errors", "2", "--report", str(report)) as process:
-            out, _ = process.communicate()
+        dodo("run", "hil-dynamic", *DOCKER, "--retry-errors", "2", "--report", str(report), code=0)
     finally:
         ended.set()
         helper.join()
-    assert process.returncode == 0, out
     assert {test["outcome"] for test in results(report).values()} == {"passed"}
     assert (report / "hil-dynamic" / "snapshot.png").read_bytes().startswith(b"\x89PNG")
 
@@ -197,9 +223,8 @@ def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
     assert verdict["outcome"] == "passed"
     values = [verdict["checks"]]
     for backend in ("docker", "process", *(["mixed"] if os.geteuid() == 0 else [])):
-        run = start(tmp_path, "--compiled", str(folder), "--report", str(tmp_path / backend), backend=backend)
-        said_of_run, _ = run.communicate(timeout=1800)
-        assert run.returncode == 0, said_of_run
+        report = ("--report", str(tmp_path / backend))
+        dodo("run", "--compiled", str(folder), "--backend", backend, *report, code=0)
         ours = results(tmp_path / backend)[DRIVE]
         assert (ours["clock"], ours["backend"]) == ("lockstep", backend)
         assert (tmp_path / backend / DRIVE / "trajectory.png").is_file()
@@ -209,28 +234,26 @@ def test_compiled_test_runs_by_hand(tmp_path: Path) -> None:
     assert len(of_hand) > 3 and all(each == of_hand for each in of_runs)
 
 
-ON_HOST = ("sil-closed-left-curve", "--isolation", "host")
-
-
 @pytest.mark.proof
 def test_host_isolation(tmp_path: Path) -> None:
-    process = start(tmp_path, *ON_HOST, "--report", str(tmp_path / "report"))
-    out, _ = process.communicate(timeout=900)
-    assert process.returncode == 0, out
+    dodo("run", "sil-closed-left-curve", *DOCKER, "--isolation", "host", "--report", str(tmp_path), code=0)
 
 
-def test_host_isolation_refuses_foreign_traffic(tmp_path: Path) -> None:
-    out = tmp_path / "generated"
-    subprocess.run([sys.executable, "-m", "dodo_dsl", "compile", ON_HOST[0], "-o", str(out)], cwd=ROOT, check=True)
-    cid = json.loads((out / ON_HOST[0] / "test.json").read_text())["cid"]
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        stranger.connect(group(cid))
-        port = stranger.getsockname()[1]
-        process = start(tmp_path, *ON_HOST, "--report", str(tmp_path / "report"))
-        while process.poll() is None:
-            stranger.send(b"\x0d\xa4\x00\x00\x00")
-            time.sleep(0.02)
-    said, _ = process.communicate()
-    assert process.returncode == 3, said
-    (test,) = results(tmp_path / "report").values()
-    assert f":{port}; end it" in str(test["reason"])
+JUDGE = READY + AFTER_START + "time.sleep(3)\n" + PASS
+
+
+def test_each_manner_has_its_figures(crate: Crate) -> None:
+    manners = {"leaks": LEAKS, "forks": FORKS + WAIT}
+    outcomes = crate.run(*(crate.job(n, JUDGE, text, mem_limit="400m") for n, text in manners.items()))
+    have_limits(outcomes)
+    (forks,) = outcomes["forks"].resources
+    assert forks.processor_s > 0.3, "of a child that was waited for"
+    assert 50e6 < forks.peak_memory_bytes < 100e6, "what four processes share counts once"
+
+
+def have_limits(outcomes: dict[str, Outcome]) -> None:
+    for slug, outcome in outcomes.items():
+        (use,) = outcome.resources
+        assert (outcome.outcome, use.service, use.memory_limit_bytes) == ("passed", "app", 400 << 20), outcome.reason
+        told = [note for note in outcome.notes if "it would reach its limit of 419 MB in " in note]
+        assert bool(told) is slug.endswith("leaks"), (use, outcome.notes)

@@ -13,8 +13,9 @@ import yaml
 
 from dodo_dsl.application.model import Access
 from dodo_dsl.emit.render import render_plan
-from dodo_dsl.plan.model import Application, Plan
+from dodo_dsl.plan.model import Application
 from tests.docker.compose import IMAGE, Crate
+from tests.run.scripted import plan
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
@@ -50,9 +51,9 @@ time.sleep(4)
 
 def networks(outside: bool) -> object:
     """The networks of a compiled test."""
-    common = ("", "sil", "closed-loop", 10.0, "realtime", "network", 1, 140, SUBNETS[0], "sil", "dodo/sandbox:1", ())
-    plan = Plan("t", "t", "t.dodo.yml", *common, Application(".", (), access=Access(outside=outside)))
-    texts = {file.path: file.text for file in render_plan(plan)}
+    application = Application(".", (), access=Access(outside=outside))
+    made = plan("t", services=(), subnet=SUBNETS[0], application=application)
+    texts = {file.path: file.text for file in render_plan(made)}
     return yaml.safe_load(texts["t/environment.compose.yml"])["networks"]
 
 

@@ -10,28 +10,12 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import __version__
-from tests.drive.test_started_anywhere import OUTSIDE, Case, checkout_of, parameters, scratch, started  # noqa: F401
+from tests.drive.test_started_anywhere import OUTSIDE, Case, checkout_of, scratch, started  # noqa: F401
 
 pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 
 ODD = "a$HOME:b#c%20 'ü\""
 WITHOUT_COLON = ODD.replace(":", "")
-DOCKER = (
-    Case("subfolder", at="{checkout}/tests"),
-    Case("outside", at="{scratch}", words=OUTSIDE, report="checkout/out"),
-    Case("umask 077", umask=0o077),
-    Case("odd path", ODD),
-    Case("odd path in ASCII", ODD, environment={"LC_ALL": "C", "PYTHONUTF8": "0"}),
-    Case("odd TMPDIR", WITHOUT_COLON, environment={"TMPDIR": "{checkout}/tests"}),
-    Case("no HOME", environment={"HOME": None}),
-)
-MIXED = (
-    Case("subfolder of a symlink", made="symlink", at="{checkout}/tests"),
-    Case("umask 077", umask=0o077),
-    Case("odd path", ODD),
-    Case("TMPDIR in memory", environment={"TMPDIR": "/dev/shm"}),
-    Case("read-only checkout", made="read-only", report="{scratch}/out"),
-)
 IN_ASCII = Case(
     "subfolder of an odd path in ASCII without HOME, umask 077",
     ODD,
@@ -56,11 +40,10 @@ READ_ONLY = Case(
     umask=0o077,
     environment={"TMPDIR": "/dev/shm"},
 )
-TOGETHER = (IN_ASCII, FROM_OUTSIDE)
-CASES = parameters((), (*TOGETHER, *DOCKER), "docker") + parameters((), (READ_ONLY, *MIXED), "mixed")
 
 
-@pytest.mark.parametrize(("backend", "case"), CASES)
+@pytest.mark.proof
+@pytest.mark.parametrize(("backend", "case"), [("docker", IN_ASCII), ("docker", FROM_OUTSIDE), ("mixed", READ_ONLY)])
 def test_it_passes(backend: str, case: Case, scratch: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
     """The application is a user whom no file of DoDo's belongs to."""
     config = os.environ.get("DOCKER_CONFIG", str(Path.home() / ".docker"))

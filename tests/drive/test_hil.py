@@ -1,6 +1,5 @@
 """The hil tests on the emulated rig: the firmware's binary, the gantry, a camera at the rig's true place."""
 
-import contextlib
 import json
 import math
 import os
@@ -16,6 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import yaml
 from numpy.typing import NDArray
 
 from dodo_dsl.cli.main import main
@@ -25,11 +25,9 @@ from services.gantry.rig_table import BOUNDS, MICROSTEP
 from tests.drive.applications import KIWI, ROOT, dodo, kiwi, results
 from tests.drive.variants import registry, variant
 from tests.realtime import hurry
+from tests.run.desk import processes_with
 
 LABELLED = """
-dodo: 1
-name: hil-labelled
-extends: ../hil-camera/hil-camera.dodo.yml
 record: {frames: 2 Hz}
 environment:
   camera: {uses: camera, with: {scene.truth-sender: 9, scene.truth-classes: [cone_yellow=yellow, cone_blue=blue]}}
@@ -80,16 +78,6 @@ def same_at_rest(measured: NDArray[np.float64], true: NDArray[np.float64]) -> No
     assert all(abs(m - t) <= step for m, t, step in zip(measured[1:], true[1:], MICROSTEPS, strict=True))
 
 
-def registry_with(folder: Path, name: str, spec: str, *beside: str) -> Path:
-    """The place of a spec of its own beside folders of the shipped registry."""
-    for each in beside:
-        shutil.copytree(ROOT / "tests_registry" / each, folder / "tests" / each)
-    path = folder / "tests" / name / f"{name}.dodo.yml"
-    path.parent.mkdir()
-    path.write_text(spec)
-    return path
-
-
 def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> None:
     test = run(tmp_path, "hil-dynamic", code=0)
     assert (test["outcome"], test["level"]) == ("passed", "hil")
@@ -105,16 +93,6 @@ def test_the_emulated_rig_reaches_the_goal_within_its_limits(tmp_path: Path) -> 
         assert low <= true[:, column].min() and true[:, column].max() <= high
     log = (tmp_path / "hil-dynamic" / "logs" / "action.pose.log").read_text()
     assert re.search(r"turns of 50 ms, \d+ without an answer; jitter median .* ms; position after median .* ms", log)
-
-
-def emulators(folder: Path) -> list[int]:
-    """Ids of the processes of the emulator in a folder."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with contextlib.suppress(OSError):
-            if path.read_bytes().startswith(bytes(folder / "rig-emulator")):
-                found.append(int(path.parent.name))
-    return found
 
 
 def test_an_emulated_rig_that_is_held_up_for_a_moment_drives_on(
@@ -133,10 +111,10 @@ def test_an_emulated_rig_that_is_held_up_for_a_moment_drives_on(
             output.append(line)
             if line.endswith("  running\n"):
                 time.sleep(0.5)
-                (emulator,) = emulators(firmware)
-                os.kill(emulator, signal.SIGSTOP)
+                (emulator,) = processes_with(f"{firmware}/rig-emulator")
+                os.kill(int(emulator), signal.SIGSTOP)
                 time.sleep(0.12)
-                os.kill(emulator, signal.SIGCONT)
+                os.kill(int(emulator), signal.SIGCONT)
     assert process.returncode == 0, "".join(output)
     (test,) = results(tmp_path / "report").values()
     assert 0.1 < test["machine"]["paused_s"] <= 0.25
@@ -212,7 +190,7 @@ def shows_its_board(report: Path) -> None:
 
 
 def test_the_static_rig_sees_its_board_and_its_recording_is_a_labelled_data_set(tmp_path: Path) -> None:
-    spec = registry_with(tmp_path, "hil-labelled", LABELLED, "maps", "truths", "hil-camera")
+    spec = variant(registry(tmp_path), "hil-camera", "hil-labelled", **yaml.safe_load(LABELLED))
     run(tmp_path / "report", str(spec), "--application", str(KIWI / "docker-compose.yml"), code=0)
     shows_its_board(tmp_path / "report")
     recording = tmp_path / "report" / "hil-labelled" / "test.rec"

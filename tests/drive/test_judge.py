@@ -8,6 +8,7 @@ import json
 import math
 import re
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,60 @@ import shapely
 import shapely.affinity
 
 from dodo_dsl.cli.main import main
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.outcome import SAMPLE_TIMES, SLOW_ANSWERS
-from tests.drive.applications import ROOT
-from tests.drive.recordings import Runs, judged, run
+from services.base.lockstep_clock import EPOCH
+from services.base.recorded_clock import read_steps
+from tests.drive.applications import ROOT, dodo, kiwi, results
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("judged")]
+
+MESSAGES = MessageSet.standard()
+
+
+@dataclass(frozen=True)
+class Runs:
+    """The report of a run of several tests."""
+
+    report: Path
+    tests: dict[str, dict[str, Any]]
+
+    def recording(self, slug: str) -> Path:
+        return self.report / slug / "test.rec"
+
+    def checks(self, slug: str) -> dict[str, float]:
+        """The values by name."""
+        return {check["name"]: check["value"] for check in self.tests[slug]["checks"]}
+
+    def evidence(self, slug: str) -> dict[str, Any]:
+        (verdict,) = self.tests[slug]["verdicts"]
+        return dict(verdict["evidence"])
+
+    def messages(self, slug: str, name: str, sender_stamp: int = 0) -> list[tuple[float, int, Any]]:
+        """What evaluators got of a message: seconds since the begin, sample time in us, the message."""
+        found: list[Envelope] = [
+            envelope
+            for step in read_steps(self.recording(slug), MESSAGES)
+            for envelope in step.messages
+            if (envelope.data_type, envelope.sender_stamp) == (MESSAGES.id(name), sender_stamp)
+        ]
+        return [((e.sample_time - EPOCH) / 1e6, e.sample_time, MESSAGES.decode(e.data_type, e.payload)) for e in found]
+
+
+def run(report: Path, *words: str) -> Runs:
+    """Run tests that the example application passes."""
+    dodo("run", *words, "-j", "2", "--report", str(report), code=0)
+    return Runs(report, results(report))
+
+
+def judged(code: int, *words: str | Path) -> dict[str, Any]:
+    """What ``dodo judge --json`` says, in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    assert main(["judge", *map(str, words), "--json"], out, err) == code, out.getvalue() + err.getvalue()
+    document: dict[str, Any] = json.loads(out.getvalue())
+    return document
+
 
 REGISTRY = ROOT / "tests_registry"
 STRAIGHT, CURVE, SIGNAL = "sil-closed-straight", "sil-closed-left-curve", "sil-open-straight"
@@ -152,3 +202,22 @@ def test_a_drive_is_that_of_shapely(runs: Runs, slug: str, map_name: str) -> Non
     assert (evidence["time"], evidence["x"], evidence["y"]) == (time, last.x, last.y)
     closest = next(frame for seconds, _, frame in frames if seconds == evidence["closest-time"])
     assert (evidence["closest-x"], evidence["closest-y"]) == (closest.x, closest.y)
+
+
+CLOSED, PERCEPTION = "sil-closed-two-cars", "sil-perception-cars"
+BLIND = (
+    "perception.py",
+    "        for colour, found in boxes.items()\n",
+    "        for colour, found in [*boxes.items()][:-1]\n",
+)
+
+
+@pytest.mark.proof
+def test_an_application_that_sees_no_car_fails(tmp_path: Path) -> None:
+    application, report = kiwi(tmp_path / "app", BLIND), tmp_path / "report"
+    dodo("run", CLOSED, PERCEPTION, "--application", str(application), "--report", str(report), code=1)
+    found = results(report)
+    assert found[CLOSED]["reason"].startswith("came within 0.097 m of body kiwi after 2.67 s at x = ")
+    assert found[PERCEPTION]["reason"].startswith(
+        "precision of car has no value (at least 0.7), because nothing was detected"
+    )

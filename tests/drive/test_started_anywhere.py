@@ -1,7 +1,4 @@
-"""Where and how a command is started does not matter: a table of cases, each of which drives a few centimetres.
-
-``make test`` has several conditions in one case; each by itself, which tells what matters, is for ``make proof``.
-"""
+"""Where and how a command is started does not matter: cases of several conditions, each drives a few centimetres."""
 
 import contextlib
 import json
@@ -11,9 +8,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -53,113 +49,68 @@ class Case:
     says: str = ""
 
 
-def of_locale(locale: str, mode: str | None) -> Case:
-    environment = {"LC_ALL": locale, "PYTHONUTF8": mode, "PYTHONCOERCECLOCALE": "0"}
-    return Case(f"locale {locale}, UTF-8 mode {mode}", "größe", environment=environment)
-
-
-FOLDERS = (
-    Case("a subfolder", at="{checkout}/tests"),
-    Case("a deep subfolder, report above", at="{checkout}/tests/sil-tiny", report="../../dodo-report"),
-    Case("outside, report beside", at="{scratch}", words=OUTSIDE),
-    Case("outside, report in the application's folder", at="{scratch}", words=OUTSIDE, report="checkout/out"),
-    Case("report outside", report="{scratch}/a/b"),
-    Case("read-only checkout", made="read-only", report="{scratch}/out"),
-    Case("read-only checkout of a user", made="read-only", report="{scratch}/out", is_user=True),
-    Case("worktree", made="worktree"),
-    Case("symlink", made="symlink"),
-    Case("subfolder of a symlink", made="symlink", at="{checkout}/tests"),
-    Case("compiled from a subfolder", at="{checkout}/tests", words=("compile", "-o", "{report}")),
-    Case("compiled elsewhere", words=("compile", "-o", "{report}"), report="{scratch}/generated"),
+ODD = "-a b#c%20d%'\"`$HOME${b}$(c){{d}}{%e:,=\\n\n[b]*?<i>&amp;größe"
+IN_ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+CASES = (
+    Case(
+        "odd path in ASCII, umask 077 of a user, no HOME, TMPDIR",
+        ODD,
+        umask=0o077,
+        is_user=True,
+        environment={**IN_ASCII, "HOME": None, "TMPDIR": "{scratch}/tmp"},
+    ),
+    Case(
+        "deep subfolder of a symlink, report above, locale C, umask 077, memories of POSIX, HOME and TMPDIR missing",
+        "größe",
+        made="symlink",
+        at="{checkout}/tests/sil-tiny",
+        report="../../dodo-report",
+        umask=0o077,
+        environment={
+            "LC_ALL": "C",
+            "CLUON_SHAREDMEMORY_POSIX": "1",
+            "HOME": "{scratch}/missing",
+            "TMPDIR": "{scratch}/missing",
+        },
+    ),
+    Case(
+        "outside, report in the application's folder, umask 027 of a user, HOME read-only, TMPDIR relative",
+        at="{scratch}",
+        words=OUTSIDE,
+        report="checkout/out",
+        umask=0o027,
+        is_user=True,
+        environment={"HOME": "/usr", "TMPDIR": "."},
+    ),
+    Case(
+        "read-only checkout of a user, report outside, HOME and XDG folders read-only, TMPDIR in memory",
+        made="read-only",
+        report="{scratch}/a/b",
+        is_user=True,
+        environment={"HOME": "/proc", "XDG_STATE_HOME": "/proc/a", "XDG_CACHE_HOME": "/proc/b", "TMPDIR": "/dev/shm"},
+    ),
+    Case(
+        "report, HOME and TMPDIR not UTF-8",
+        report=NOT_UTF8,
+        environment={"HOME": f"{{scratch}}/{NOT_UTF8}", "TMPDIR": f"{{scratch}}/{NOT_UTF8}"},
+    ),
+    Case(
+        "subfolder of a worktree, locale POSIX, HOME relative, TMPDIR among the tests",
+        "größe",
+        made="worktree",
+        at="{checkout}/tests",
+        environment={"LC_ALL": "POSIX", "PYTHONUTF8": "1", "HOME": "relative", "TMPDIR": "{checkout}/tests"},
+    ),
+    Case("not UTF-8 in ASCII", NOT_UTF8, environment=IN_ASCII, code=2, says="/caf\\xe9' is not UTF-8"),
+    Case(
+        "odd path compiled elsewhere from a subfolder",
+        ODD,
+        at="{checkout}/tests",
+        words=("compile", "-o", "{report}"),
+        report="{scratch}/generated",
+    ),
     Case("a new test from a subfolder", at="{checkout}/tests", words=("new", "sil-more")),
 )
-USERS = (
-    Case("umask 077", umask=0o077),
-    Case("umask 077, memories of POSIX", umask=0o077, environment={"CLUON_SHAREDMEMORY_POSIX": "1"}),
-    Case("umask 027", umask=0o027),
-    Case("umask 022 of a user", is_user=True),
-    Case("umask 077 of a user", umask=0o077, is_user=True),
-    Case("umask 027 of a user", umask=0o027, is_user=True),
-)
-LOCALES = (of_locale("C", None), *(of_locale(name, mode) for name in ("C", "POSIX", "C.UTF-8") for mode in "01"))
-PATHS = (
-    Case("blank, number sign and percent", "a b#c%20d%"),
-    Case("quotes", "a'b\"c`"),
-    Case("dollar and braces", "a$HOME${b}$(c){{d}}{%e"),
-    Case("colon, comma and equals", "a:b,c=d"),
-    Case("backslash and line break", "a\\nb\nc"),
-    Case("pattern and tag", "a[b]*?<i>&amp;"),
-    Case("dash", "-a"),
-    Case("not UTF-8", NOT_UTF8, code=2, says="/caf\\xe9' is not UTF-8"),
-    Case("not UTF-8 in ASCII", NOT_UTF8, environment={"LC_ALL": "C", "PYTHONUTF8": "0"}, code=2, says="is not UTF-8"),
-    Case("report not UTF-8", report=NOT_UTF8),
-)
-FOLDERS_OF_USERS = (
-    Case("no HOME", environment={"HOME": None}),
-    Case("HOME missing", environment={"HOME": "{scratch}/missing"}),
-    Case("HOME read-only", environment={"HOME": "/proc"}),
-    Case("HOME relative", environment={"HOME": "relative"}),
-    Case("HOME not UTF-8", environment={"HOME": f"{{scratch}}/{NOT_UTF8}"}),
-    Case("no HOME of a user", environment={"HOME": None}, is_user=True),
-    Case("HOME read-only of a user", environment={"HOME": "/usr"}, is_user=True),
-    Case("XDG folders", environment={"XDG_STATE_HOME": "{scratch}/st ate", "XDG_CACHE_HOME": "{scratch}/ca che"}),
-    Case("XDG folders read-only", environment={"XDG_STATE_HOME": "/proc/a", "XDG_CACHE_HOME": "/proc/b"}),
-    Case("TMPDIR", environment={"TMPDIR": "{scratch}/tmp"}),
-    Case("TMPDIR of a user", environment={"TMPDIR": "{scratch}/tmp"}, is_user=True),
-    Case("TMPDIR missing", environment={"TMPDIR": "{scratch}/missing"}),
-    Case("TMPDIR relative", environment={"TMPDIR": "."}),
-    Case("TMPDIR in memory", environment={"TMPDIR": "/dev/shm"}),
-    Case("TMPDIR in memory of a user", environment={"TMPDIR": "/dev/shm"}, is_user=True),
-    Case("TMPDIR among the tests", environment={"TMPDIR": "{checkout}/tests"}),
-    Case("TMPDIR not UTF-8", environment={"TMPDIR": f"{{scratch}}/{NOT_UTF8}"}),
-)
-ONE_BY_ONE = (*FOLDERS, *USERS, *LOCALES, *PATHS, *FOLDERS_OF_USERS)
-ODD = "-a b#c%20d%'\"`$HOME${b}$(c){{d}}{%e:,=\\n\n[b]*?<i>&amp;größe"
-"""All that is odd in ``PATHS``."""
-ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-KNOWN = {case.name: case for case in (*ONE_BY_ONE, Case("odd path", ODD), Case("in ASCII", environment=ASCII))}
-
-
-def together(*names: str) -> Case:
-    """One case with all that several say."""
-    cases = [KNOWN[name] for name in names]
-    said: dict[str, Any] = {}
-    for case in cases:
-        said |= {
-            each.name: getattr(case, each.name) for each in fields(Case) if getattr(case, each.name) != each.default
-        }
-    environment = {name: value for case in cases for name, value in case.environment.items()}
-    return Case(**{**said, "name": "; ".join(names), "environment": environment})
-
-
-TOGETHER = (
-    together("odd path", "in ASCII", "umask 077 of a user", "no HOME", "TMPDIR"),
-    together("symlink", "a deep subfolder, report above", "umask 077, memories of POSIX", "HOME missing"),
-    together("outside, report in the application's folder", "umask 027 of a user", "HOME read-only of a user"),
-    together(
-        "read-only checkout of a user", "report outside", "HOME read-only", "XDG folders read-only", "TMPDIR in memory"
-    ),
-    together("report not UTF-8", "HOME not UTF-8", "TMPDIR not UTF-8"),
-    together(
-        "worktree",
-        "a subfolder",
-        "HOME relative",
-        "TMPDIR among the tests",
-        "locale POSIX, UTF-8 mode 1",
-        "XDG folders",
-    ),
-    together("not UTF-8 in ASCII"),
-    together("odd path", "compiled elsewhere", "a subfolder"),
-    together("a new test from a subfolder"),
-)
-
-
-def parameters(together: tuple[Case, ...], one_by_one: tuple[Case, ...], *before: str) -> list[Any]:
-    """Cases of ``make test``, and those of ``make proof``, with what is ``before`` each."""
-    short = [pytest.param(*before, case, id=" ".join((*before, case.name))) for case in together]
-    long = [" ".join((*before, "only", case.name)) for case in one_by_one]
-    proof = pytest.mark.proof
-    return [*short, *(pytest.param(*before, c, id=i, marks=proof) for c, i in zip(one_by_one, long, strict=True))]
 
 
 @pytest.fixture
@@ -172,7 +123,7 @@ def scratch() -> Iterator[Path]:
     shutil.rmtree(os.fsencode(folder))
 
 
-@pytest.mark.parametrize("case", parameters(TOGETHER, ONE_BY_ONE))
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_it_passes(case: Case, scratch: Path) -> None:
     with checkout_of(case, scratch) as checkout:
         started(case, scratch, checkout)
@@ -180,7 +131,8 @@ def test_it_passes(case: Case, scratch: Path) -> None:
 
 def test_it_passes_below_tmp() -> None:
     """Each test has a ``/tmp`` of its own, through which its application has to get to its folder."""
-    case = Case("below /tmp", umask=0o077)
+    folders = {"XDG_STATE_HOME": "{scratch}/st ate", "XDG_CACHE_HOME": "{scratch}/ca che"}
+    case = Case("below /tmp", umask=0o077, environment=folders)
     scratch = tempfile.TemporaryDirectory(prefix="dodo-tests-", dir="/tmp")
     with scratch as name, checkout_of(case, Path(name)) as checkout:
         started(case, Path(name), checkout)

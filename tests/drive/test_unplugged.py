@@ -1,24 +1,190 @@
 """Eight ways of pulling the plug in mid test, and two more: the outcome is error, and the rig comes to rest in time.
 
 The whole stack runs: `dodo run` of hil-dynamic with the example application on the firmware's binary. The emulator is
-the test's own, so that it goes on when those who use it are killed.
+the test's own, in real time as hardware, so that it goes on when those who use it are killed.
 """
 
+import contextlib
 import itertools
+import json
+import math
+import os
 import signal
+import subprocess
+import sys
 import threading
 import time
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import pytest
+import yaml
 
+from services.gantry.emulator import START
 from services.gantry.rig_table import ACCELERATION
-from tests.drive.applications import results
-from tests.drive.rig import REST, Hardware, Pose, Run, at_its_start, on_its_way, running
+from tests.drive.applications import KIWI, ROOT, results
+from tests.drive.variants import registry, variant
+from tests.realtime import hurry, wait_for_nobody
 
 pytestmark = pytest.mark.realtime
+
+BUILT = ROOT / "build" / "firmware"
+REST = 0.005
+"""m/s below which a rig stands."""
+
+
+Runner = subprocess.Popen[str]
+"""``dodo run`` as a process, with its output."""
+
+
+class Pose(NamedTuple):
+    """When (s, the rig's time), where (m, m, rad) and how fast (m/s, m/s, rad/s) it truly is."""
+
+    t: float
+    x: float
+    y: float
+    yaw: float
+    vx: float
+    vy: float
+    vyaw: float
+
+    @property
+    def speed(self) -> float:
+        return max(abs(self.vx), abs(self.vy))
+
+
+class Hardware:
+    """The emulator with a port at ``path``; it lives until the end, whoever uses the port."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.poses: list[Pose] = []
+        self._answers = 0
+        words = [BUILT / "rig-emulator", "--start", START, "--link", path, BUILT / "gantry.elf"]
+        self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        wait_for_nobody(self.process.pid)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._reader.join()
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        with self.process.stdout as lines:
+            for line in lines:
+                said = json.loads(line)
+                if "x" in said:
+                    self.poses.append(Pose(*(float(said[name]) for name in Pose._fields)))
+                elif "ramp" in said:
+                    self._answers += 1
+
+    def order(self, line: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def now(self) -> float:
+        """The rig's time, in s, once it has done all that it was ordered."""
+        known = self._answers
+        self.order("extremes")
+        self.until(lambda _: self._answers > known, 60)
+        return self.poses[-1].t
+
+    def until(self, true: Callable[[Pose], bool], patience: float, runner: "Runner | None" = None) -> Pose:
+        """The first pose from now on for which something is true; a ``runner`` that ends before has failed."""
+        seen, end = len(self.poses), time.monotonic() + patience
+        while time.monotonic() < end:
+            for pose in self.poses[seen:]:
+                if true(pose):
+                    return pose
+            if runner is not None and runner.poll() is not None:
+                raise AssertionError(f"dodo run ended before the rig did it: {runner.communicate()[0]}")
+            seen = len(self.poses)
+            time.sleep(0.01)
+        raise AssertionError(f"the rig did not come to do it within {patience:g} s: {self.poses[-1:]}")
+
+
+@dataclass
+class Run:
+    """`dodo run` of the one test in a folder, on a rig."""
+
+    folder: Path
+    rig: Hardware
+    runner: Runner
+    found: dict[str, int] = field(default_factory=dict)
+
+    def processes(self) -> Iterator[Path]:
+        """All of this very run; a service that was forked has the runner's variables."""
+        mine = f"DODO_RIGS={self.folder}/state".encode()
+        for entry in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                if mine in (entry / "environ").read_bytes().split(b"\0"):
+                    yield entry
+
+    def find(self, module: str) -> int:
+        """The one process that was started to run a module; from the second time on without a look."""
+        if module in self.found:
+            return self.found[module]
+        for entry in self.processes():
+            with contextlib.suppress(OSError):
+                if module.encode() in (entry / "cmdline").read_bytes().split(b"\0"):
+                    return self.found.setdefault(module, int(entry.name))
+        raise AssertionError(f"no process {module}")
+
+    def kill(self, word: str, number: signal.Signals = signal.SIGKILL) -> None:
+        os.kill(self.find(word), number)
+
+
+@contextlib.contextmanager
+def running(folder: Path, rig: Hardware, isolation: str) -> Iterator[Run]:
+    """hil-dynamic, as test `unplugged`, on a rig as if it were the emulated one, which needs no check."""
+    camera = {"camera": {"with": {"frame-id": 0}}}
+    pose = {"pose": {"with": {"serial": str(rig.path), "calibrate": True, "truth-id": None}}}
+    variant(registry(folder), "hil-dynamic", "unplugged", isolation=isolation, environment=camera, action=pose)
+    (folder / "dodo.yml").write_text(yaml.safe_dump({"dodo": 1, "registry": ["tests"]}))
+    words = ["run", "unplugged", "--backend", "process", "--application", str(KIWI / "docker-compose.yml")]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DODO_RIGS": str(folder / "state")}
+    runner = subprocess.Popen(
+        [sys.executable, "-m", "dodo_dsl", *words],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    hurry(runner.pid)
+    try:
+        yield Run(folder, rig, runner)
+    finally:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            runner.communicate(timeout=60)
+        runner.kill()
+        runner.communicate()
+
+
+def at_its_start(run: Run) -> Pose:
+    """The pose at which it stands and waits for the drive."""
+    start = math.radians(-34)
+    return run.rig.until(
+        lambda pose: pose.speed < REST and abs(pose.y) < 0.01 and abs(pose.yaw - start) < 0.2, 120, run.runner
+    )
+
+
+def on_its_way(run: Run) -> Pose:
+    """The pose at which it drives, after it has stood at its start."""
+    at_its_start(run)
+    return run.rig.until(lambda pose: pose.vx > 0.2, 120, run.runner)
+
 
 BEGIN, AT_ONCE, REST_YAW = 0.55, 0.1, 0.05
 """s until braking begins, s in which a rig without current stands, rad/s below which it does (rotors swing)."""

@@ -73,14 +73,6 @@ def test_no_writer_replaces_what_is_no_file(strange: dict[str, Path], kind: str,
     assert strange[kind].lstat().st_ino == before
 
 
-def test_logs_follow_no_symlink(tmp_path: Path) -> None:
-    (tmp_path / "mine").write_text("mine")
-    (tmp_path / "log").symlink_to(tmp_path / "mine")
-    with pytest.raises(OSError, match="Too many levels of symbolic links"):
-        atomic.appended(tmp_path / "log")
-    assert (tmp_path / "mine").read_text() == "mine"
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("link", ["", "files", "files/maps"])
 def test_compiling_follows_no_symlink(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, link: str) -> None:

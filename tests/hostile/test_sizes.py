@@ -2,22 +2,17 @@
 
 import json
 import os
-import shutil
 import struct
-import subprocess
-import sys
 import time
 import zlib
 from collections.abc import Callable
 from contextlib import closing
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dodo_dsl.cli.main import main
 from dodo_dsl.opendlv import video as opendlv_video
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.opendlv.assets.json_file import MapError
@@ -33,9 +28,8 @@ from dodo_dsl.opendlv.video import VideoDecoder
 from dodo_dsl.rec import truth
 from dodo_dsl.rec.frames import IMAGE, MOST_DECODERS, decoded
 from dodo_dsl.rec.truth import TruthError
-from dodo_dsl.run.outcomes import Finding
-from dodo_dsl.run.protocol import Flooded, MemoryTaken, Noted
-from dodo_dsl.run.run_state import MOST_NOTES, Ended, RunState
+from dodo_dsl.run.protocol import Flooded, Noted
+from dodo_dsl.run.run_state import MOST_NOTES, RunState
 from dodo_dsl.run.service_protocol import read
 from dodo_dsl.spec import registry
 from dodo_dsl.spec.registry import RegistryError, locate
@@ -46,9 +40,11 @@ from services.scene import scene
 from services.scene.meshes import load_obj
 from services.scene.textures import load_picture
 from services.virtual_camera.optics import load_with_alpha
-from tests.drive.applications import program, results
+from tests.drive.applications import dodo, program, results
+from tests.drive.variants import registry as registry_of_dodo
+from tests.drive.variants import variant
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
-from tests.run.helpers import Bench
+from tests.run.scripted import plan
 
 __all__ = ["record"]
 SIDE = 20_000
@@ -211,15 +207,6 @@ def test_hidden_folders_and_mounts_are_no_part_of_a_registry(small_disk: Path) -
     assert [found.stem for found in locate([], [small_disk.parent])[0]] == ["a"]
 
 
-@pytest.mark.slow
-def test_the_whole_machine_is_no_registry(tmp_path: Path) -> None:
-    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [/]\n")
-    words = [sys.executable, "-m", "dodo_dsl", "list"]
-    result = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
-    assert (result.returncode, result.stdout) == (2, "")
-    assert result.stderr == "dodo list: '/' has more than 10000 folders: name the folder with the tests\n"
-
-
 class Clock:
     now = 5_000_000
 
@@ -277,32 +264,8 @@ def test_senders_without_end_take_no_memory() -> None:
     assert len(counter._bytes) <= 1001
 
 
-def state(tmp_path: Path) -> RunState:
-    return RunState(Bench(tmp_path).plan(), time.monotonic)
-
-
-def decided(found: RunState, event: Flooded | MemoryTaken) -> Finding:
-    with pytest.raises(Ended):
-        found.take(event)
-    (finding,) = found.facts.findings
-    return finding
-
-
-def test_a_flood_is_named_and_the_application_s_only_where_no_service_sends_it(tmp_path: Path) -> None:
-    flood = Flooded("dodo-recorder", "more than 20000 messages came within a second", "a.M", 3, 0.981, True)
-    finding = decided(state(tmp_path), flood)
-    words = "more than 20000 messages came within a second: 98% of it is a.M/3, which service 'camera' sends"
-    assert (finding.result, finding.reason) == ("error", words), "what an unknown service sends is not known"
-    known = state(tmp_path)
-    known.plan = Bench(tmp_path).plan()
-    services = tuple(type(s)(**{**vars(s), "uses": "collision"}) for s in known.plan.services)
-    known.plan = type(known.plan)(**{**vars(known.plan), "services": services})
-    finding = decided(known, flood)
-    assert (finding.result, finding.reason.partition("which ")[2]) == ("failed", "only the application can have sent")
-
-
-def test_notes_do_not_grow_without_end(tmp_path: Path) -> None:
-    found = state(tmp_path)
+def test_notes_do_not_grow_without_end() -> None:
+    found = RunState(plan(), time.monotonic)
     for number in range(1000):
         found.take(Noted(str(number)))
     assert len(found.notes) == MOST_NOTES + 1
@@ -342,21 +305,14 @@ def test_whole_applications(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kin
     """Applications that fill the recording, or keep a camera's lock, end their own test."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DODO_LEASES", str(tmp_path / "leases"))
-    shipped = Path(__file__).parents[2] / "tests_registry"
-    for name in ("maps", "sil-closed-straight"):
-        shutil.copytree(shipped / name, tmp_path / "tests" / name)
-    about = {"dodo": 1, "name": "sil-small", "extends": "../sil-closed-straight/sil-closed-straight.dodo.yml"}
-    about |= {"description": "Drive.", "clock": "realtime", "record": {"limit": "5 MB"}}
-    (tmp_path / "tests" / "sil-small").mkdir()
-    (tmp_path / "tests" / "sil-small" / "sil-small.dodo.yml").write_text(json.dumps(about))
+    keys = {"clock": "realtime", "record": {"limit": "5 MB"}}
+    spec = variant(registry_of_dodo(tmp_path), "sil-closed-straight", "sil-small", **keys)
     (tmp_path / "app.py").write_text(BEGIN_OF_ALL + APPLICATIONS[kind][0])
-    program(tmp_path, "python", "app.py")
-    (tmp_path / "dodo.yml").write_text("dodo: 1\nregistry: [tests]\napplication: docker-compose.yml\n")
-    output = StringIO()
-    main(["run", "sil-small", "--backend", "process"], output, output)
-    (test,) = results(tmp_path / "dodo-report").values()
+    application = program(tmp_path, "python", "app.py")
+    dodo("run", str(spec), "--application", str(application), "--report", str(tmp_path / "report"), code=(1, 3))
+    (test,) = results(tmp_path / "report").values()
     result, reason = APPLICATIONS[kind][1]
-    assert (test["outcome"], test["reason"][: len(reason)]) == (result, reason), output.getvalue()
+    assert (test["outcome"], test["reason"][: len(reason)]) == (result, reason), test
 
 
 @pytest.mark.parametrize("posix", [False, True])
@@ -372,15 +328,3 @@ def test_a_lock_that_a_reader_keeps_is_not_the_creator_s_fault(posix: bool) -> N
         with ours.lock(), pytest.raises(SharedMemoryError) as caught, theirs.lock(0.05):
             raise AssertionError("it is locked")
         assert not isinstance(caught.value, MemoryTakenError)
-
-
-def test_a_kept_lock_fails_the_application(tmp_path: Path) -> None:
-    line = b'{"dodo": "taken", "text": "shared memory \'video0.argb\' was locked by another for 5 s"}'
-    event = read("camera", False, line)
-    assert isinstance(event, MemoryTaken)
-    finding = decided(state(tmp_path), event)
-    assert (finding.result, finding.cause) == ("failed", "")
-    assert finding.reason == (
-        "the application keeps service 'camera' from its shared memory: "
-        "shared memory 'video0.argb' was locked by another for 5 s"
-    )

@@ -1,4 +1,4 @@
-"""Streams that are closed, users without a home and paths in another encoding get a sentence."""
+"""Streams that are closed and paths in another encoding get a sentence."""
 
 import os
 import subprocess
@@ -14,17 +14,14 @@ from tests.rec.conftest import video
 ROOT = Path(__file__).parents[2]
 
 
-def run(
-    *words: str | bytes, shell: str = "", folder: Path | None = None, **variables: str | None
-) -> "subprocess.CompletedProcess[str]":
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
+def run(*words: str, shell: str = "") -> "subprocess.CompletedProcess[str]":
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "dodo_dsl", *words]
     if shell:
         command = ["sh", "-c", f'exec "$@" {shell}', "sh", *command]
     return subprocess.run(
-        command, cwd=folder or ROOT, env={k: v for k, v in environment.items() if v is not None},
-        capture_output=True, text=True, errors="surrogateescape", timeout=60, check=False,
-    )  # fmt: skip
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, errors="surrogateescape", check=False
+    )
 
 
 @pytest.mark.slow
@@ -43,15 +40,6 @@ def test_streams_that_are_closed_or_full(shell: str, code: int, said: str) -> No
     result = run("list", shell=shell)
     assert (result.returncode, result.stderr.endswith(said)) == (code, True), result.stderr
     assert "Traceback" not in result.stderr and "Exception ignored" not in result.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("words", [("doctor",), ("rig", "status")])
-def test_a_user_without_a_home(words: tuple[str, ...]) -> None:
-    """A user without a home folder gets a sentence."""
-    result = run(*words, HOME=None, XDG_STATE_HOME=None, DODO_HISTORY=None, DODO_RIGS=None)
-    assert result.returncode in (0, 1, 3)
-    assert "Traceback" not in result.stderr and "internal error" not in result.stderr
 
 
 @pytest.mark.thorough
@@ -74,10 +62,3 @@ def test_paths_that_are_not_utf_8(tmp_path: Path, record: Callable[..., Path], m
         assert code in (0, 1, 2, 3), words
         assert "Traceback" not in output and "internal error" not in output, (words, output)
         output.encode()  # a terminal takes it
-
-
-@pytest.mark.slow
-def test_a_path_that_is_not_utf_8_is_an_argument(tmp_path: Path) -> None:
-    """Such a path may be an argument of the command."""
-    result = run("rec", "info", os.fsencode(tmp_path) + b"/\xff.rec")
-    assert (result.returncode, "No such file" in result.stderr) == (2, True)

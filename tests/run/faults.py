@@ -1,10 +1,7 @@
-"""The faults around a test that scripts cause, with what they lead to, and a column for each backend.
-
-``make test`` has on each backend what only that one can show; all of them are for ``make proof``.
-"""
+"""The faults around a test that scripts cause, with what they lead to, each on the backends that may differ in it."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,20 +35,19 @@ while True:
     held.append(bytearray(os.urandom(1000)) * 4000)
 """
 MISSING = "127.0.0.1:9/dodo-no-such-image:1"
-SHORT, LONG = "make test", "make proof"
 
 
 @dataclass(frozen=True)
 class Fault:
     """Scripts that cause a fault, and how the sentence about it begins; ``name`` is the one on the page.
 
-    ``at`` has where it is tried, by backend; ``app`` are keys of the application's service in a compose file.
+    ``at`` are the backends on which it is tried; ``app`` are keys of the application's service in a compose file.
     """
 
     name: str
     outcome: str
     sentence: str
-    at: Mapping[str, str]
+    at: Sequence[str]
     judge: str = READY + WAIT
     application: str = WAIT
     environment: str = READY + WAIT
@@ -62,7 +58,7 @@ NEIGHBOUR = Fault(
     "",
     "passed",
     "it drove",
-    {"process": SHORT, "docker": SHORT, "mixed": SHORT},
+    ("process", "docker", "mixed"),
     judge=DRIVES,
     application=SHARES + WAIT,
 )
@@ -72,14 +68,14 @@ FAULTS = {
         "The application is killed",
         "failed",
         "application service 'app' was killed by SIGKILL after",
-        {"process": SHORT, "docker": SHORT, "mixed": LONG},
+        ("process", "docker"),
         application=SHARES + "time.sleep(0.5)\nos.kill(os.getpid(), 9)",
     ),
     "hungry": Fault(
         "The application takes more memory than it may",
         "failed",
         "application service 'app' ran out of memory after ",
-        {"docker": SHORT, "mixed": SHORT},
+        ("docker", "mixed"),
         application=HUNGRY,
         app={"mem_limit": "64m", "memswap_limit": "64m"},
     ),
@@ -87,7 +83,7 @@ FAULTS = {
         "A child of the application takes more memory than it may",
         "failed",
         "application service 'app' ran out of memory after ",
-        {"docker": SHORT, "mixed": LONG},
+        ("docker",),
         application="if os.fork() == 0:\n    " + HUNGRY.strip().replace("\n", "\n    ") + "\n" + WAIT,
         app={"mem_limit": "64m", "memswap_limit": "64m"},
     ),
@@ -95,28 +91,28 @@ FAULTS = {
         "A service of DoDo's is killed",
         "error",
         "service 'camera' of layer environment was killed by SIGKILL after",
-        {"process": SHORT, "docker": LONG, "mixed": LONG},
+        ("process",),
         environment=READY + BEGUN + "os.kill(os.getpid(), 9)",
     ),
     "no-verdict": Fault(
         "An evaluator ends without a verdict",
         "error",
         "evaluator 'judge' ended without a verdict after",
-        {"process": SHORT, "docker": LONG, "mixed": LONG},
+        ("process",),
         judge=READY + BEGUN,
     ),
     "two-verdicts": Fault(
         "An evaluator gives two verdicts",
         "error",
         "evaluator 'judge' gave 2 verdicts, expected one",
-        {"process": SHORT, "docker": LONG},
+        ("process",),
         judge=READY + BEGUN + PASS + FAIL,
     ),
     "own-verdict": Fault(
         "",
         "passed",
         "it drove",
-        {"process": SHORT, "docker": LONG, "mixed": LONG},
+        ("process",),
         judge=DRIVES,
         application=FAIL + WAIT,
     ),
@@ -124,14 +120,14 @@ FAULTS = {
         "An evaluator gives a malformed verdict",
         "error",
         "the verdict of evaluator 'judge' is malformed: its outcome is neither passed nor failed",
-        {"process": SHORT, "docker": LONG},
+        ("process",),
         judge=READY + BEGUN + MAYBE + WAIT,
     ),
     "many-lines": Fault(
         "The application logs 10,000 lines a second",
         "passed",
         "it drove",
-        {"process": SHORT, "docker": LONG},
+        ("process", "docker"),
         judge=READY + BEGUN + "time.sleep(2)\n" + PASS,
         application=LINES_A_SECOND,
         app={"tty": True},
@@ -140,29 +136,22 @@ FAULTS = {
         "The application logs a line of 5 MB",
         "passed",
         "it drove",
-        {"process": SHORT, "docker": SHORT},
+        ("process", "docker"),
         judge=READY + LONG_LINE + BEGUN + PASS,
         application=LONG_LINE + 'print("after")\n' + WAIT,
-    ),
-    "ends-early": Fault(
-        "",
-        "failed",
-        "application service 'app' ended with exit code 7",
-        {"process": SHORT, "docker": LONG},
-        application="sys.exit(7)\n",
     ),
     "no-program": Fault(
         "",
         "error",
         "service 'app' could not be started: ",
-        {"docker": SHORT},
+        ("docker",),
         app={"entrypoint": ["no-such-program"], "init": False},
     ),
     "missing": Fault(
         "An image is missing",
         "error",
         f"image {MISSING} cannot be pulled: ",
-        {"docker": SHORT},
+        ("docker",),
         app={"image": MISSING},
     ),
 }
@@ -178,15 +167,9 @@ MARKS: Mapping[str, list[pytest.MarkDecorator]] = {
 
 
 def by_backend() -> list[Any]:
-    """Each backend with faults, as parameters: those of ``make test``, and all, if that has not got them all."""
-    found = []
-    for backend, marks in MARKS.items():
-        every = {slug: fault for slug, fault in FAULTS.items() if backend in fault.at}
-        short = {slug: fault for slug, fault in every.items() if fault.at[backend] == SHORT}
-        found.append(pytest.param(backend, short, id=backend, marks=marks))
-        if short != every:
-            found.append(pytest.param(backend, every, id=f"{backend}, all", marks=[*marks, pytest.mark.proof]))
-    return found
+    """Each backend with its faults, as parameters."""
+    found = {backend: {slug: fault for slug, fault in FAULTS.items() if backend in fault.at} for backend in MARKS}
+    return [pytest.param(backend, faults, id=backend, marks=MARKS[backend]) for backend, faults in found.items()]
 
 
 def as_told(faults: Mapping[str, Fault], outcomes: Mapping[str, Outcome], backend: str, book: Book) -> None:

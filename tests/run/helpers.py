@@ -15,6 +15,7 @@ from dodo_dsl.run.backends import Backends, CombinedBackends, Job
 from dodo_dsl.run.run_state import Standing
 from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import schedule
+from tests.run import scripted
 
 READY = 'print(\'{"dodo": "ready"}\', flush=True)\n'
 PASS = 'print(\'{"dodo": "verdict", "outcome": "passed", "reason": "it drove", "checks": []}\', flush=True)\n'
@@ -114,24 +115,8 @@ class Bench:
             takes_cid=any("--cid" in w for w in command),
             takes_memory=any("--name" in w for w in command),
         )
-        return Plan(
-            name=slug,
-            slug=slug,
-            spec=f"{slug}/{slug}.dodo.yml",
-            description="",
-            level="sil",
-            kind="closed-loop",
-            timeout_s=timeout_s,
-            clock="realtime",
-            isolation="network",
-            seed=0,
-            cid=130,
-            subnet="",
-            tag="sil",
-            sandbox_image="x",
-            services=services,
-            application=Application("..", (app,)),
-        )
+        application = Application("..", (app,))
+        return scripted.plan(slug, seed=0, timeout_s=timeout_s, services=services, application=application)
 
     def jobs(self, *plans: Plan) -> list[Job]:
         (self.folder / "compiled").mkdir(exist_ok=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Lockstep, Plan, PlannedService
+from dodo_dsl.plan.model import Application, ApplicationService, Lockstep, Plan, PlannedService
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from dodo_dsl.run.protocol import Backend, BackendError, Event, Exited, Ready, Unmatched, VerdictEvent
@@ -175,7 +175,7 @@ BUSY = load(0.8, app=(0.2, 0.3), camera=(0.2, 0.05))
 
 @dataclass
 class ScriptedBackends:
-    """Makes backends by ``make(plan, attempt)``, attempts counted from 1, and counts how many are open at once."""
+    """Makes backends by ``make(plan, attempt)``, attempts counted from 1, and counts how many are open."""
 
     make: Callable[[Plan, int], ScriptedBackend] = lambda plan, _: ScriptedBackend(plan, drives())
     open_problem: BackendError | OSError | None = None
@@ -183,7 +183,6 @@ class ScriptedBackends:
     name: str = "process"
     began: list[str] = field(default_factory=list)
     now: int = 0
-    most: int = 0
     closed: int = 0
 
     async def prepare(self, plans: Sequence[Plan], note: Callable[[str], None]) -> None:
@@ -198,11 +197,19 @@ class ScriptedBackends:
             raise self.open_problem
         self.began.append(job.plan.slug)
         self.now += 1
-        self.most = max(self.most, self.now)
         yield self.make(job.plan, self.began.count(job.plan.slug))
         self.now -= 1
         if self.leave_problem:
             raise self.leave_problem
+
+
+async def one_by_one(*works: Coroutine[Any, Any, T]) -> list[asyncio.Future[T]]:
+    """Begins works a twentieth of a second apart."""
+    begun = []
+    for work in works:
+        begun.append(asyncio.ensure_future(work))
+        await asyncio.sleep(0.05)
+    return begun
 
 
 def jobs(folder: Path, *plans: Plan) -> list[Job]:
@@ -212,6 +219,3 @@ def jobs(folder: Path, *plans: Plan) -> list[Job]:
 def send_signal_after(seconds: float, number: int) -> None:
     """A signal to this very process, in which only the running loop handles it."""
     asyncio.get_running_loop().call_later(seconds, os.kill, os.getpid(), number)
-
-
-assert set(READY) <= set(LAYERS)

@@ -4,29 +4,20 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.application.model import Access
 from dodo_dsl.plan.model import Application
-from dodo_dsl.run.application_files import application_paths, variables_of
+from dodo_dsl.run.application_files import variables_of
 
 FOLDER = Path("generated/t")
 
 
-def application(roots: tuple[str, ...] = ()) -> Application:
+def application() -> Application:
     secrets = {
         "LD_PRELOAD": "../../team/.env",
         "API_KEY": "../../team/.env",
         "GONE_KEY": "../../team/.env",
         "OLD_KEY": "../../none/.env",
     }
-    access = Access(roots=roots, paths=("/etc/ros",))
-    return Application("../../team", (), secrets=secrets, access=access)
-
-
-def test_paths(tmp_path: Path) -> None:
-    (tmp_path / "team").mkdir()
-    paths = application_paths(application(roots=("../../maps",)), tmp_path / FOLDER)
-    assert (paths.folder, paths.roots) == (tmp_path / "team", (tmp_path / "team", tmp_path / "maps"))
-    assert paths.is_own("/etc/ros/x")
+    return Application("../../team", (), secrets=secrets)
 
 
 def test_secrets_are_read_where_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

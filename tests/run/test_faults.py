@@ -13,12 +13,12 @@ from tests.docker.conftest import crate, images  # noqa: F401
 from tests.faults import Book
 from tests.images.conftest import base_image, built  # noqa: F401
 from tests.run.desk import gone
-from tests.run.faults import MARKS, Fault, as_told, by_backend, whole_logs
+from tests.run.faults import Fault, as_told, by_backend, whole_logs
 from tests.run.helpers import STARTED, WAIT, Bench
 
 Run = Callable[[str, dict[str, Fault]], dict[str, Outcome]]
 NEVER_READY = Fault(
-    "A service never gets ready", "error", "service 'camera' was not ready within 2 s", {}, environment=WAIT
+    "A service never gets ready", "error", "service 'camera' was not ready within 2 s", (), environment=WAIT
 )
 
 
@@ -59,7 +59,7 @@ def nothing_left(bench: Bench) -> None:
     assert gone(f"{bench.folder}/", 5.0)
 
 
-@pytest.mark.parametrize(("backend", "faults"), by_backend())
+@pytest.mark.parametrize(("backend", "faults"), by_backend())  # with MARKS, such as mark.engine
 def test_faults_at_once(backend: str, faults: dict[str, Fault], run: Run, bench: Bench, book: Book) -> None:
     as_told(faults, run(backend, faults), backend, book)
 
@@ -70,14 +70,8 @@ def test_faults_at_once(backend: str, faults: dict[str, Fault], run: Run, bench:
     whole_logs(faults, log)
 
 
-@pytest.mark.parametrize(
-    "backend",
-    [
-        pytest.param("process", marks=MARKS["process"]),
-        pytest.param("docker", marks=[*MARKS["docker"], pytest.mark.proof]),
-    ],
-)
-def test_service_that_never_gets_ready(backend: str, run: Run, book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.slow
+def test_service_that_never_gets_ready(run: Run, book: Book, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "READY_PATIENCE_S", 2.0)
     faults = {"never-ready": NEVER_READY}
-    as_told(faults, run(backend, faults), backend, book)
+    as_told(faults, run("process", faults), "process", book)

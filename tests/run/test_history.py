@@ -100,14 +100,6 @@ def test_a_long_history_with_bytes_that_are_not_utf_8_is_shortened(
     assert [entry.name for entry in tmp_path.iterdir()] == ["history.jsonl"]
 
 
-def test_a_place_that_cannot_be_written_keeps_nothing(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    found = History(tmp_path / "file" / "history.jsonl")
-    found.add([took(1.0, 2.0)])
-    found.save()
-    assert len(found.runs) == 1
-
-
 def test_a_user_without_a_home_folder_has_no_history(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("HOME", "DODO_HISTORY", "XDG_STATE_HOME"):
         monkeypatch.delenv(name, raising=False)

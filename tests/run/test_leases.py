@@ -14,7 +14,7 @@ import pytest
 from dodo_dsl.run import leases
 from dodo_dsl.run.leases import Lease, LeaseTimeout
 from tests.run.desk import ROOT
-from tests.run.scripted import run
+from tests.run.scripted import one_by_one, run
 
 
 @pytest.fixture
@@ -109,12 +109,6 @@ def wait(names: list[str], *releases: tuple[float, Lease], patience_s: float = 6
     return *run(scene()), said
 
 
-def test_the_first_free_lease_is_taken_at_once(folder: Path) -> None:
-    held = take("cid-121")
-    assert wait(["cid-121", "cid-122"]) == ("cid-122", 0.0, [])
-    held.release()
-
-
 def test_a_busy_lease_is_waited_for_and_its_holder_named_once(folder: Path) -> None:
     name, when, said = wait(["cid-121", "cid-122"], (30.0, take("cid-121")), (20.0, take("cid-122")))
     assert (name, said) == ("cid-122", [f"waiting for test mine of process {os.getpid()}"])
@@ -131,10 +125,7 @@ def test_waiters_are_served_in_the_order_in_which_they_came(folder: Path) -> Non
         lease.release()
 
     async def scene() -> None:
-        tasks = []
-        for name in "abc":
-            tasks.append(asyncio.ensure_future(waiter(name)))
-            await asyncio.sleep(0.05)
+        tasks = await one_by_one(*map(waiter, "abc"))
         held.release()
         late = leases.lease_any(["cid-121"], {"test": "late"}, said.setdefault("late", []).append)
         (await late).release()
@@ -178,10 +169,7 @@ def test_shared_use_waits_behind_an_exclusive_one_that_came_before(folder: Path)
         lease.release()
 
     async def scene() -> None:
-        tasks = []
-        for name, shared in (("alone", False), ("one", True), ("two", True)):
-            tasks.append(asyncio.ensure_future(waiter(name, shared)))
-            await asyncio.sleep(0.05)
+        tasks = await one_by_one(waiter("alone", False), waiter("one", True), waiter("two", True))
         assert served == []
         held.release()
         await asyncio.gather(*tasks)
@@ -264,15 +252,6 @@ def test_a_lease_that_cannot_be_written_is_not_held(folder: Path, monkeypatch: p
         with pytest.raises(OSError, match="No space left"):
             leases.try_lease("cid-121", {})
     take("cid-121").release()
-
-
-def test_all_that_is_waited_for_within_a_turn_keeps_its_place(folder: Path) -> None:
-    """A test that has waited for one lease is not the last again for the next."""
-    with leases.arrived():
-        since = leases.arrival_time()
-        with leases.ticket(["cid-121"], since):
-            (asyncio.run(leases.lease_any(["cid-121"], {}, print))).release()
-    assert leases.arrival_time() > since
 
 
 def test_waiting_has_a_limit(folder: Path) -> None:

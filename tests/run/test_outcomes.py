@@ -12,8 +12,6 @@ from dodo_dsl.run.outcomes import (
     Facts,
     Finding,
     decide,
-    describe,
-    error_outcome,
     error_reason,
     how_it_ended,
     lost_messages,
@@ -21,7 +19,7 @@ from dodo_dsl.run.outcomes import (
     windowless,
     worst,
 )
-from dodo_dsl.run.protocol import BackendError, VerdictEvent
+from dodo_dsl.run.protocol import VerdictEvent
 from tests.run.scripted import plan
 
 RESULTS: tuple[Result, ...] = ("passed", "failed", "error")
@@ -108,14 +106,6 @@ def test_a_program_that_is_not_there_has_to_be_built(program: str, why: str, hin
     assert sentence == f"service 'app' could not be started: {why}{hint}"
 
 
-def test_errors_of_the_system_and_of_the_backend_are_sentences(tmp_path: Path) -> None:
-    assert error_reason(BackendError("no subnet is free"), tmp_path) == "no subnet is free"
-    full = OSError(28, "No space left on device", "/x")
-    assert error_reason(full, tmp_path) == "this machine cannot run the test: /x: No space left on device"
-    assert describe(OSError("odd"), tmp_path) == "odd"
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_an_internal_error_leaves_its_traceback(tmp_path: Path) -> None:
     reason = error_reason(KeyError("a\nb" + "c" * 1000), tmp_path)
     assert reason.startswith("internal error: KeyError: 'a\\nbccc")
@@ -127,18 +117,6 @@ def test_an_internal_error_leaves_its_traceback(tmp_path: Path) -> None:
 def test_an_internal_error_without_room_for_its_traceback(tmp_path: Path) -> None:
     (tmp_path / "logs").touch()
     assert error_reason(ValueError("a\n b"), tmp_path) == "internal error: ValueError: a b"
-
-
-def test_the_outcome_of_a_test_that_never_began() -> None:
-    found = error_outcome(plan("one"), "docker", "no engine")
-    assert (found.slug, found.outcome, found.reason, found.backend, found.cid) == (
-        "one",
-        "error",
-        "no engine",
-        "docker",
-        130,
-    )
-    assert (found.setup_s, found.execution_s, found.sim_s) == (None, None, None)
 
 
 @pytest.mark.parametrize(

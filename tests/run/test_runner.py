@@ -10,10 +10,10 @@ import pytest
 
 from dodo_dsl.application.model import Access
 from dodo_dsl.outcome import NotRun, Outcome
-from dodo_dsl.plan.model import Application, ApplicationService, Plan
+from dodo_dsl.plan.model import Plan
 from dodo_dsl.run.backends import Job
 from dodo_dsl.run.protocol import BackendError, Exited, VerdictEvent
-from dodo_dsl.run.runner import Policy, Runner, default_backend
+from dodo_dsl.run.runner import Policy, Runner
 from dodo_dsl.run.schedule import Schedule
 from tests.run.helpers import Recorded
 from tests.run.scripted import (
@@ -47,7 +47,6 @@ class Scene:
     lengths: dict[str, float] = field(default_factory=dict)
     progress: Recorded = field(default_factory=Recorded)
     signals: tuple[tuple[float, int], ...] = ()
-    finished: Callable[[Job, Outcome], None] = lambda job, outcome: None
     begins: list[tuple[float, int]] = field(default_factory=list)
     """When attempts began, and how many tests ran then."""
 
@@ -59,7 +58,7 @@ class Scene:
     async def _run(self, given: list[Job]) -> list[Outcome]:
         for seconds, number in self.signals:
             send_signal_after(seconds, number)
-        return await self.runner.run(given, self.finished)
+        return await self.runner.run(given, lambda *_: None)
 
     def _expected(self, job: Job) -> float:
         return self.lengths.get(job.plan.slug, 1.0)
@@ -90,20 +89,6 @@ def test_the_longest_begins_first_and_outcomes_keep_the_order_of_the_jobs(scene:
     assert scene.progress.notes == ["prepared 3"]
     assert [left for _, left in scene.progress.rests] == [2, 1]
     assert scene.backends.closed == 1
-
-
-def test_each_test_is_handed_on_as_soon_as_it_has_ended(scene: Scene) -> None:
-    scene.capacity, seen = 1, []
-    scene.finished = lambda job, outcome: seen.append((job.plan.slug, outcome.outcome, len(scene.backends.began)))
-    scene.run(*plans("ab"))
-    assert seen == [("a", "passed", 1), ("b", "passed", 2)]
-
-
-@pytest.mark.parametrize(("capacity", "most"), [(1, 1), (2, 2), (9, 5)])
-def test_as_many_run_at_once_as_there_is_room_for(scene: Scene, capacity: int, most: int) -> None:
-    scene.capacity = capacity
-    assert [outcome.outcome for outcome in scene.run(*plans("abcde"))] == ["passed"] * 5
-    assert scene.backends.most == most
 
 
 @pytest.mark.parametrize(("fail_fast", "began"), [(True, ["a"]), (False, ["a", "b", "c"])])
@@ -287,20 +272,6 @@ def test_backends_that_make_none_are_the_error_of_each_test(scene: Scene) -> Non
     assert scene.backends.closed == 1
 
 
-class Fragile(Recorded):
-    """A progress that breaks between two attempts of test a."""
-
-    def phase(self, slug: str, text: str) -> None:
-        if slug == "a" and text.startswith("retrying"):
-            raise ValueError("odd")
-
-
-def test_an_error_between_two_attempts_is_the_outcome_of_its_test_alone(scene: Scene) -> None:
-    scene.progress, scene.policy, scene.backends.make = Fragile(), Policy(retries=1), by_slug(a=CRASH)
-    a, b = scene.run(*plans("ab"))
-    assert (a.reason, b.outcome) == ("internal error: ValueError: odd (traceback in logs/runner.log)", "passed")
-
-
 @pytest.mark.parametrize(
     ("problem", "note"),
     [
@@ -330,25 +301,6 @@ def test_a_signal_ends_what_runs_and_what_waits(scene: Scene, number: int) -> No
     assert (scene.runner.interrupted, scene.progress.notes[1:]) == (True, ["interrupted: taking down"])
     assert (scene.backends.began, scene.backends.closed) == (["a"], 1)
     assert ("b", "error") not in scene.progress.phases
-
-
-def test_a_signal_during_teardown_keeps_the_verdict(scene: Scene) -> None:
-    """A test ends at 7 s, and its teardown at 10 s."""
-    made: list[ScriptedBackend] = []
-
-    def make(tested: Plan, _: int) -> ScriptedBackend:
-        made.append(ScriptedBackend(tested, drives(5.0), {"close": 3.0}))
-        return made[-1]
-
-    scene.backends.make, scene.signals = make, ((8.0, signal.SIGINT), (9.0, signal.SIGINT))
-    assert endings(scene.run(plan())) == [("test", "passed", "it drove")]
-    assert (scene.runner.interrupted, made[0].calls[-1]) == (True, "close")
-
-
-def test_containers_are_needed_by_what_cannot_be_started() -> None:
-    started, image = ApplicationService("a", ("python", "a.py")), ApplicationService("b")
-    assert default_backend([plan(application=Application(".", (started,)))]) == "process"
-    assert default_backend([plan(application=Application(".", (started, image)))]) == "docker"
 
 
 def test_a_secret_that_is_passed_is_told(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:

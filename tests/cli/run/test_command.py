@@ -16,16 +16,20 @@ from xml.etree import ElementTree
 
 import jsonschema
 import pytest
+from docker.errors import DockerException, ImageNotFound
 
 from dodo_dsl import __version__, package_data
+from dodo_dsl.cli import run
 from dodo_dsl.cli import run as cli_run
 from dodo_dsl.cli.main import main
+from dodo_dsl.cli.run import reserved
+from dodo_dsl.compiler import load
 from dodo_dsl.outcome import Outcome
-from dodo_dsl.plan.model import Plan
+from dodo_dsl.plan.model import Application, ApplicationService, Plan, PlannedService
 from dodo_dsl.plan.plan_json import to_json
 from dodo_dsl.report.viewer import page
 from dodo_dsl.run.backends import Job
-from dodo_dsl.run.protocol import Event, Exited, Overrun, Ready, Time
+from dodo_dsl.run.protocol import BackendError, Event, Exited, Ready, Time
 from dodo_dsl.run.runner import Runner
 from tests.cli.terminal import Terminal
 from tests.run.scripted import FAILED, PASSED, Events, ScriptedBackend, ScriptedBackends, plan
@@ -120,14 +124,6 @@ def test_the_report_of_a_test_that_failed(dodo: Command) -> None:
     assert [service["name"] for service in dodo.result()["services"]] == ["camera", "track", "app"]
 
 
-def test_losses_of_messages_are_noted_below_the_test(dodo: Command) -> None:
-    dodo.stages = stages(Overrun("track", 5), PASSED, Exited("track", 0))
-    code, out, _ = dodo.run()
-    note = "service 'track' lost 5 messages, because its receive buffer was full: its verdict does not consider them"
-    assert (code, f"        note: {note}\n" in out) == (0, True), out
-    assert dodo.result()["notes"] == [note]
-
-
 def test_times_of_all_runs_are_kept_and_drawn(dodo: Command) -> None:
     """A second run forecasts what the first one took, and the report shows both."""
     assert "; at most " in dodo.run()[1]
@@ -169,15 +165,10 @@ def test_report_among_tests_is_refused_and_harms_nothing(dodo: Command) -> None:
     assert Path("generated/test/test.json").is_file()
 
 
-@pytest.mark.parametrize(
-    "change",
-    [{"slug": "../../x"}, {"timeout_s": "1"}, {"cid": 999}, {"seed": -1}, {"services": 3}, {"application": {}}],
-    ids=str,
-)
-def test_tampered_compiled_tests_are_refused(dodo: Command, change: dict[str, object]) -> None:
+def test_tampered_compiled_tests_are_refused(dodo: Command) -> None:
     folder = dodo.compiled(plan())
     raw = json.loads((folder / "test.json").read_text())
-    (folder / "test.json").write_text(json.dumps({**raw, **change}))
+    (folder / "test.json").write_text(json.dumps({**raw, "slug": "../../x"}))
     code, _, err = dodo.dodo("run", "--compiled", str(folder))
     assert (code, "not a compiled test" in err) == (2, True)
 
@@ -189,6 +180,7 @@ USAGE = [
     (("a/b.dodo.yml",), "there is no test at"),
     (("--seed", "-1"), "'-1' is "),
     (("-j", "0"), "'0' is "),
+    (("-q", "-v"), "not allowed with argument"),
 ]
 
 
@@ -210,11 +202,6 @@ def test_quiet_says_only_the_counts_of_a_run_that_passed(dodo: Command) -> None:
     assert dodo.run("-q")[1] == "1 passed, 0 failed, 0 in error\n"
     dodo.stages = ENDINGS["failed"]
     assert [line.split()[0] for line in dodo.run("--quiet")[1].splitlines()] == ["FAILED", "in", "open", "0"]
-
-
-def test_quiet_and_verbose_do_not_go_together(dodo: Command, capsys: pytest.CaptureFixture[str]) -> None:
-    assert dodo.run("-q", "-v")[0] == 2
-    assert "not allowed with argument" in capsys.readouterr().err
 
 
 def test_verbose_shows_lines_on_a_terminal_too(dodo: Command) -> None:
@@ -330,3 +317,91 @@ def test_a_report_says_when_where_and_of_what_it_is(dodo: Command) -> None:
     assert (run["host"], run["dodo"]) == (platform.node(), __version__)
     assert run["command"] == f"dodo run --seed 3 --compiled {dodo.folder / 'generated/test'}"
     assert abs((datetime.now(UTC) - datetime.fromisoformat(run["date"])).total_seconds()) < 60
+
+
+STEPPED = ("--clock", "lockstep")
+HIL = sum(spec.level == "hil" for spec in load([Path(__file__).parents[3] / "tests_registry"]).specs)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["hil-dynamic", *STEPPED], "hil-dynamic runs"), (["hil-*", *STEPPED], f"hil-camera and {HIL - 1} more run")],
+)
+@pytest.mark.thorough
+def test_hardware_keeps_its_clock_and_it_is_said(dodo: Command, words: list[str], said: str) -> None:
+    (dodo.folder / "dodo.yml").write_text('dodo: 1\nregistry: ["dodo:"]\n')
+    code, out, err = dodo.dodo("run", *words)
+    assert (code, out) == (2, f"note: {said} in real time, because hardware does not wait\n")
+    assert dodo.dodo("run", "hil-dynamic")[1] == ""
+    assert err.startswith("dodo run: no application; ")
+
+
+@pytest.mark.thorough
+def test_who_cannot_be_a_process_is_told_what_to_write(dodo: Command) -> None:
+    assert dodo.dodo("new", "--deployment")[0] == dodo.dodo("new", "mine")[0] == 0
+    code, _, err = dodo.dodo("run", "mine", "--backend", "process")
+    assert (code, "add for example 'x-dodo-process: [python, main.py]'" in err) == (2, True)
+
+
+def said(folder: Path) -> str:
+    """What a run says that begins now."""
+    out = StringIO()
+    with reserved(folder, out):
+        pass
+    return out.getvalue()
+
+
+def test_the_second_says_so_and_nothing_stays(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    with reserved(tmp_path, StringIO()):
+        assert said(tmp_path).startswith(f"note: another run also writes into '{tmp_path}': ")
+        assert said(tmp_path / "other") == ""
+    assert said(tmp_path) == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["other"]
+
+
+IMAGE = Application(".", (ApplicationService("app"),))
+OWN = (PlannedService("environment", "camera", "camera", "dodo/camera:1", ("python",)),)
+
+
+class Engine:
+    """An engine's client that has one image, or none."""
+
+    def __init__(self, *images: str, url: str = "http+docker://localhost", problem: Exception | None = None) -> None:
+        self.images, self.api, self.base_url, self.problem = images, self, url, problem
+
+    def inspect_image(self, image: str) -> None:
+        if self.problem:
+            raise self.problem
+        if image not in self.images:
+            raise ImageNotFound(image)
+
+
+@pytest.mark.parametrize(
+    ("engine", "root", "backend"),
+    [
+        (Engine("dodo/camera:1"), True, "docker"),
+        (Engine(), True, "mixed"),
+        (Engine(), False, "docker"),
+        (Engine(url="https://elsewhere:2376"), True, "docker"),
+        (Engine(problem=DockerException("gone")), True, "docker"),
+        (None, True, "docker"),
+    ],
+)
+def test_without_images_of_dodo(
+    engine: Engine | None, root: bool, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def connect() -> Any:
+        if engine is None:
+            raise BackendError("no engine")
+        return engine
+
+    monkeypatch.setattr("dodo_dsl.run.docker.client.connect", connect)
+    monkeypatch.setattr(run, "may_enter", lambda: root)
+    assert run.choose_backend([plan(application=IMAGE, services=OWN)]) == backend
+
+
+def test_on_rigs_unless_the_application_can_be_started() -> None:
+    assert run.choose_backend([plan(application=IMAGE, rig="desk")]) == "mixed"
+    started = Application(".", (ApplicationService("app", ("python", "a.py")),))
+    assert run.choose_backend([replace(plan(application=started), rig="desk")]) == "process"

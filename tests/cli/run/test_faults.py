@@ -1,4 +1,4 @@
-"""Faults of the runner itself and of its disk, with a real ``dodo run``."""
+"""``dodo run`` as users meet it, a real command on tests of small scripts, and faults of the runner and its disk."""
 
 import os
 import re
@@ -118,3 +118,47 @@ def test_two_runs_at_once(desk: Desk, book: Book) -> None:
     assert len({result["cid"] for result in results}) == 2
     for result in results:
         book.record("Two runners at once", "process", str(result["outcome"]), str(result["reason"]))
+
+
+@pytest.mark.proof
+def test_letters_that_the_terminal_lacks_cost_no_verdict(desk: Desk) -> None:
+    desk.environment["PYTHONIOENCODING"] = "ascii"
+    process = desk.start(desk.bench.plan(judge=READY + PASS.replace("it drove", "it turned 5\\\\u00b0 and")), *HOST)
+    out, _ = process.communicate(timeout=200)
+    assert process.returncode == 0, out
+    assert re.search("^PASSED  test .*  it turned 5[?] and", out, re.MULTILINE)
+
+
+def test_reader_that_leaves_does_not_end_the_run(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan(), *HOST)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.wait(200) == 0
+    (test,) = desk.results()
+    assert test["outcome"] == "passed"
+
+
+def test_kept_test_stays_until_it_is_taken_down(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan(), "--keep")
+    out, _ = process.communicate(timeout=200)
+    assert process.returncode == 0, out
+    assert processes_with(marks(desk))
+    (pid,) = [line.rpartition(" ")[2] for line in out.splitlines() if line.startswith("take it down: kill ")]
+    other = desk.start(desk.bench.plan(slug="other"), *HOST, report="other")
+    assert other.communicate(timeout=200)[0]
+    assert processes_with(marks(desk)), "the next run takes no kept test down"
+    os.kill(int(pid), signal.SIGTERM)
+    assert gone(marks(desk))
+
+
+def test_interrupt_takes_everything_down_and_still_reports(desk: Desk) -> None:
+    process = desk.start(desk.bench.plan(judge=READY + WAIT))
+    wait_for(process, "running")
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=200)
+    assert process.returncode == 130, out
+    assert "Traceback" not in out
+    (test,) = desk.results()
+    assert (test["outcome"], test["reason"]) == ("error", "the run was interrupted")
+    assert gone(marks(desk))

@@ -52,13 +52,17 @@ def test_a_changed_isolation_is_checked_and_built(folder: Path) -> None:
     assert (jobs[0].plan.isolation, jobs[0].plan.subnet) == ("host", "")
 
 
+def on_pool(folder: Path, more: str = "") -> None:
+    """The test runs on any of two rigs."""
+    examples.write(f"level: hil\nrig: static\n{more}", folder)
+    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
+    path = folder / "dodo.yml"
+    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+
+
 def test_any_rig_of_a_pool_is_one_job(folder: Path) -> None:
     """The compiled folders are those of the instances; name, report and history are the test's."""
-    text = "level: hil\nrig: static\n"
-    examples.write(text, folder)
-    path = folder / "dodo.yml"
-    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
-    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+    on_pool(folder)
     jobs, _ = prepared(folder, "--repeat", "2")
     assert [(job.plan.slug, job.report.name, job.test, job.plan.rig) for job in jobs] == [
         ("example", "example", "example", "a"),
@@ -73,10 +77,7 @@ def test_any_rig_of_a_pool_is_one_job(folder: Path) -> None:
 def test_samples_on_any_rig_of_a_pool_are_a_job_each(folder: Path) -> None:
     vary = "vary: {wait: {from: 40 s, to: 50 s, nominal: 40 s}}\n"
     track = "evaluation:\n  track: {uses: collision, with: {goal: finish, max-time: '${vary.wait}'}}\n"
-    examples.write(f"level: hil\nrig: static\n{vary}{track}", folder)
-    path = folder / "dodo.yml"
-    rigs = "{b: {kind: static, cid: 121, camera: {source: b}}, a: {kind: static, cid: 122, camera: {source: a}}}"
-    path.write_text(f"{path.read_text()}rigs: {rigs}\n")
+    on_pool(folder, vary + track)
     jobs, _ = prepared(folder, "--samples", "2")
     assert [(job.plan.slug, job.test, job.plan.rig, [other.plan.rig for other in job.others]) for job in jobs] == [
         ("example--sample-1", "example", "a", ["b"]),
@@ -196,5 +197,59 @@ def test_a_compiled_test_without_its_shared_files_is_not_run(folder: Path) -> No
     path = folder / "out/example" / PLAN_FILE
     path.write_text(path.read_text().replace('"shared": {}', f'"shared": {{"a.rec": "{"0" * 64}-a.rec"}}'))
     with pytest.raises(UsageError, match=r"example: 'a\.rec' is missing: '.*_files' belongs to the compiled tests"):
-        options = parser().parse_args(["run", "--compiled", str(path.parent), "--report", str(folder / "report")])
-        prepare(options, folder / "again", io.StringIO())
+        run_compiled(folder, path.parent)
+
+
+DRIVER = """\
+# docker-compose.yml
+services:
+  driver:
+    image: driver
+    command: --cid=111
+    x-dodo: {out: [opendlv.proxy.GroundSteeringRequest, opendlv.proxy.PedalPositionRequest]}
+    x-dodo-process: [python, driver.py]
+# dodo.yml
+registry: [tests, "dodo:"]
+"""
+ON_THE_RIG = ["hil-closed-oval", "hil-dynamic", "hil-open-straight"]
+RIGLESS = "skipped shipped tests that need a rig, which dodo.yml does not have: "
+SAID = f"skipped shipped tests on the emulated rig, which is not built: {', '.join(ON_THE_RIG)} (see dodo doctor)\n"
+
+
+@pytest.fixture
+def shipped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A deployment of the shipped tests, without an emulated rig that is built."""
+    examples.write(DRIVER, folder)
+    (folder / "driver.py").touch()
+    monkeypatch.setenv("DODO_FIRMWARE", str(folder / "firmware"))
+    return folder
+
+
+def selected(folder: Path, *words: str) -> tuple[list[str], str]:
+    """The tests that run, and what is said about others."""
+    said = io.StringIO()
+    options = parser().parse_args(["run", "--report", str(folder / "report"), *words])
+    jobs, _ = prepare(options, folder / "out", said)
+    return sorted(job.test for job in jobs), said.getvalue()
+
+
+@pytest.mark.thorough
+def test_those_that_nobody_named_are_left_out(shipped: Path) -> None:
+    names, said = selected(shipped, "--level", "sil", "--level", "hil", "--emulate")
+    assert SAID in said and "sil-closed-straight" in names and not set(ON_THE_RIG) & set(names)
+    names, said = selected(shipped, "--level", "sil", "--level", "hil")
+    assert f"{RIGLESS}{', '.join(ON_THE_RIG)} (--emulate" in said and "sil-closed-straight" in names
+    assert SAID not in said and not set(ON_THE_RIG) & set(names)
+    with pytest.raises(UsageError, match="no tests to run"):
+        selected(shipped, "hil-*")
+
+
+@pytest.mark.thorough
+def test_they_run_where_they_are_named_or_can_run(shipped: Path) -> None:
+    assert selected(shipped, "hil-dynamic") == (["hil-dynamic"], "")
+    assert selected(shipped, "hil-*", "--backend", "docker")[0] == ON_THE_RIG, "the rig is in an image"
+    (shipped / "firmware").mkdir()
+    for name in ("rig-emulator", "gantry.elf"):
+        (shipped / "firmware" / name).touch()
+    names, said = selected(shipped, "hil-*")
+    assert names == ON_THE_RIG and "emulated rig" not in said

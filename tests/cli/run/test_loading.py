@@ -78,12 +78,6 @@ def marked(variable: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("chosen", [{"backend": "docker"}, {"isolation": "host"}])
-def test_none_where_none_is_needed(chosen: dict[str, str]) -> None:
-    with loading(options(**chosen), 0) as load:
-        assert load.take() is None
-
-
 def test_an_error_ends_one_that_nobody_took() -> None:
     with pytest.raises(ValueError, match="no such test"), loading(options(), 0) as load:
         server = load.fork_server

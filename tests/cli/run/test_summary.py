@@ -47,12 +47,6 @@ def test_repetitions_have_a_rate_and_skipped_tests_are_named() -> None:
     assert shown.endswith("6 tests not run, because the run was interrupted: a, b, c, d, e and 1 more\n")
 
 
-def test_quiet_names_only_what_did_not_pass() -> None:
-    stream = StringIO()
-    run_report.write_summary(stream, [PASSED, OUTCOME], {"ok": "ok", "test": "test"}, [], Verbosity.QUIET)
-    assert stream.getvalue() == "FAILED  test  hit wall\n1 passed, 1 failed, 0 in error\n"
-
-
 def test_verbose_shows_checks_use_and_what_services_complained_of(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     logs.mkdir()

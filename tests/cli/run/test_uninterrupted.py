@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, stop_like_interrupt, undisturbed
+from dodo_dsl.cli.uninterrupted import UninterruptedStream, more_descriptors, undisturbed
 
 
 def test_a_reader_that_leaves_ends_nothing() -> None:
@@ -49,11 +49,6 @@ def test_signals_wait_until_results_are_written() -> None:
             interrupted()
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def test_other_signals_stop_a_run_as_an_interrupt_does() -> None:
-    with pytest.raises(KeyboardInterrupt):
-        stop_like_interrupt(signal.SIGTERM, None)
 
 
 def test_as_many_descriptors_as_are_allowed() -> None:

@@ -1,6 +1,7 @@
 """``dodo run --watch``: which tests run again after a file was saved, with scripted backends."""
 
 import argparse
+import os
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ import pytest
 
 from dodo_dsl.cli import run, watch
 from dodo_dsl.cli.main import main, parser
-from dodo_dsl.cli.watch import Watch
+from dodo_dsl.cli.watch import Watch, saved, seen
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.report import results
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
@@ -90,14 +91,9 @@ def test_all_run_at_first_and_then_what_a_file_affects(running: Desk) -> None:
     assert "compared with the run before: " in running.stdout.getvalue()
     assert running.save(running.spec(BOTH[1])) == []
     assert running.stdout.getvalue().startswith("no test is affected by tests/sil-closed-straight/")
+    assert running.save(next((running.folder / "tests" / "maps" / "straight").glob("*.obj"))) == [BOTH[1]]
     assert running.save(running.folder / "kiwi" / "steering.py") == BOTH
     assert [outcome.slug for outcome in results.load(running.folder / "report" / "results.json")] == BOTH
-
-
-@pytest.mark.slow
-def test_the_map_of_a_test_affects_it(running: Desk) -> None:
-    files = [path for path in (running.folder / "tests" / "maps" / "straight").iterdir() if path.suffix == ".obj"]
-    assert running.save(files[0]) == [BOTH[1]]
 
 
 @pytest.mark.slow
@@ -137,3 +133,39 @@ def test_some_options_make_no_sense_with_it(word: str) -> None:
     stdout, stderr = StringIO(), StringIO()
     assert main(["run", "--watch", word], stdout, stderr) == 2
     assert stderr.getvalue() == f"dodo run: --watch and {word.partition('=')[0]} do not go together\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in ("a.py", "tests/b.yml", "report/c.json", ".git/d", "__pycache__/e.pyc", "f.py~", "tests/.g.swp"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("text")
+    return tmp_path
+
+
+def names(folder: Path, paths: "set[Path] | dict[Path, tuple[int, int]]") -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in paths)
+
+
+def test_hidden_files_and_outputs_are_left_out(folder: Path) -> None:
+    assert names(folder, seen([folder], {folder / "report"})) == ["a.py", "tests/b.yml"]
+
+
+def test_what_is_written_replaced_made_or_removed_is_saved(folder: Path) -> None:
+    before = seen([folder], ())
+    assert saved(before, seen([folder], ())) == set()
+    os.utime(folder / "a.py", ns=(1, 1))
+    (folder / "tests" / "b.yml").unlink()
+    (folder / "tests" / "new.yml").write_text("text")
+    assert names(folder, saved(before, seen([folder], ()))) == ["a.py", "tests/b.yml", "tests/new.yml"]
+
+
+def test_links_lead_into_no_other_folder_and_a_missing_folder_is_empty(folder: Path) -> None:
+    (folder / "tests" / "up").symlink_to(folder)
+    (folder / "dangling").symlink_to("nowhere")
+    assert names(folder, seen([folder / "tests", folder / "nowhere"], ())) == ["tests/b.yml"]
+
+
+def test_no_more_files_than_can_be_looked_at(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watch, "MOST_FILES", 1)
+    assert names(folder, seen([folder], ())) == ["a.py"]

@@ -37,11 +37,11 @@ LATER = 5
 
 
 class Application:
-    """The bus, what came on it since the last picture, and the time of this one in us."""
+    """The bus, what came since the last picture on it or to an address of its own, and the time of this one in us."""
 
-    def __init__(self, session: Session) -> None:
-        self.session, self.messages = session, session.messages
-        self.heard: list[tuple[Envelope, tuple[str, int]]] = []
+    def __init__(self, session: Session, ear: Session) -> None:
+        self.session, self.ear, self.messages = session, ear, session.messages
+        self.heard: list[Envelope] = []
         self.sampled = 0
         self.steering = 0.0
         self.names: set[str] = set()
@@ -55,22 +55,25 @@ class Application:
         return encode_frame(Envelope(self.messages.id(message), self.messages.encode(message), time, 0, time, 0))
 
     def listen(self) -> None:
-        while (envelope := self.session.receive(0.0)) is not None:
-            self.heard.append((envelope, self.session.source))
-            name = f"{self.messages.name(envelope.data_type)}/{envelope.sender_stamp}"
+        while (envelope := self.ear.receive(0.0)) is not None:
+            self.heard.append(envelope)
+            is_own = self.ear.source == self.session.address
+            name = "itself" if is_own else f"{self.messages.name(envelope.data_type)}/{envelope.sender_stamp}"
             if name not in self.names:
                 self.names.add(name)
                 print(f"heard {name}", flush=True)
 
-    def of(self, name: str, stamp: int = 0) -> Iterator[tuple[Envelope, Any, tuple[str, int]]]:
+    def of(self, name: str, stamp: int = 0) -> Iterator[tuple[Envelope, Any]]:
         id_ = self.messages.id(name)
-        for envelope, source in self.heard:
+        for envelope in self.heard:
             if (envelope.data_type, envelope.sender_stamp) == (id_, stamp):
-                yield envelope, self.messages.decode(id_, envelope.payload), source
+                yield envelope, self.messages.decode(id_, envelope.payload)
 
 
 def honest(app: Application, number: int) -> None:
-    """No attack."""
+    """No attack, and an answer where boxes are asked for."""
+    if number:
+        app.send(SEEN, width=640, height=480)
 
 
 def finish(app: Application, number: int) -> None:
@@ -148,7 +151,7 @@ def disguise(app: Application, number: int) -> None:
     """Datagrams with the address of the service that has the pose, whose port is free at another local address."""
     if number != LATER:
         return
-    for port in set(ports()) - {BUS_PORT, app.session.port}:
+    for port in set(ports()) - {BUS_PORT, app.session.port, app.ear.port}:
         host = app.session.address[0]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
             try:
@@ -174,21 +177,8 @@ def directly(app: Application, number: int) -> None:
 
 def true_pose(app: Application, number: int) -> None:
     """It never looks at a picture: it steers by the vehicle's true pose, and would reach the finish."""
-    for _, pose, _ in app.of(FRAME):
+    for _, pose in app.of(FRAME):
         app.steering = 1.8 * pose.x + 1.2 * (math.pi / 2 - 2 * math.atan2(pose.qz, pose.qw))
-
-
-def true_pose_curve(app: Application, number: int) -> None:
-    """The same along the left curve: 1 m ahead, a quarter of a circle of 1.5 m, and straight on."""
-    for _, pose, _ in app.of(FRAME):
-        right, ahead = pose.x + 1.5, pose.y - 1
-        wanted, away, bend = math.pi / 2, pose.x, 0.0
-        if right <= 0:
-            wanted, away = math.pi, pose.y - 2.5
-        elif ahead > 0:
-            wanted, away, bend = math.atan2(ahead, right) + math.pi / 2, math.hypot(right, ahead) - 1.5, 0.25
-        turn = math.remainder(wanted - 2 * math.atan2(pose.qz, pose.qw), 2 * math.pi)
-        app.steering = 3.0 * away + 1.5 * turn + bend
 
 
 def ports() -> list[int]:
@@ -220,7 +210,7 @@ def echo(app: Application, number: int) -> None:
     """It finds what the truth on the bus says."""
     app.listen()
     for name in (BOX, PROPERTY):
-        for envelope, message, _ in list(app.of(name, 9)):
+        for envelope, message in list(app.of(name, 9)):
             app.session.send(message, envelope.sample_time, 0)
     if number:
         app.send(SEEN, width=640, height=480)
@@ -244,7 +234,7 @@ def easy(app: Application, number: int) -> None:
 ATTACKS = {name.replace("_", "-"): function for name, function in list(globals().items()) if name in (
     "honest", "finish", "finish_at_once", "motion", "reset", "end", "begin", "seek", "nan_once", "unrecorded", "join",
     "disguise", "channel",
-    "echo", "boxes", "easy", "directly", "true_pose", "true_pose_curve",
+    "echo", "boxes", "easy", "directly", "true_pose",
 )}  # fmt: skip
 
 
@@ -260,8 +250,9 @@ def main() -> None:
     by_bus = dict(pair.split("=") for pair in FLAGS["attacks"].split(","))
     names = set(by_bus.values())
     attack = ATTACKS[names.pop() if len(names) == 1 else by_bus[FLAGS["cid"]]]
-    with Session(int(FLAGS["cid"])) as session:
-        app = Application(session)
+    with Session(int(FLAGS["cid"])) as session, Session(int(FLAGS["cid"])) as ear:
+        ear.hear_directly()
+        app = Application(session, ear)
         app.sampled = time.time_ns() // 1000
         attack(app, 0)
         with attached(app) as memory:

@@ -1,5 +1,6 @@
 """Projects are removed from an engine that may still be busy with what has ended."""
 
+import contextlib
 from typing import Any
 
 import pytest
@@ -56,34 +57,26 @@ def rests(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return found
 
 
-def test_what_is_refused_at_first_is_removed(rests: list[float]) -> None:
-    engine = Engine(*[APIError("network has active endpoints")] * 2)
-    assert cleanup.remove_project(engine, "dodo-x") == 1
-    assert (engine.things, rests) == ([], [0.5, 1.0])
+BUSY = APIError("network has active endpoints")
 
 
-def test_what_is_refused_for_long_is_an_error(rests: list[float]) -> None:
-    engine = Engine(*[APIError("network has active endpoints")] * 4)
-    with pytest.raises(APIError, match="active endpoints"):
-        cleanup.remove_project(engine, "dodo-x")
-    assert rests == [0.5, 1.0, 2.0]
-
-
-def test_what_earlier_runs_left_is_not_waited_for(rests: list[float]) -> None:
-    with pytest.raises(APIError):
-        cleanup.remove_project(Engine(APIError("network has active endpoints")), "dodo-x", rests_s=())
-    assert rests == []
-
-
-def test_an_engine_that_does_not_answer_is_not_waited_for(rests: list[float]) -> None:
-    with pytest.raises(ConnectionError):
-        cleanup.remove_project(Engine(ConnectionError("it has stopped")), "dodo-x")
-    assert rests == []
-
-
-def test_what_is_gone_already_is_no_problem(rests: list[float]) -> None:
-    assert cleanup.remove_project(Engine(NotFound("gone")), "dodo-x") == 0
-    assert rests == []
+@pytest.mark.parametrize(
+    ("errors", "more", "expected", "waited"),
+    [
+        ([BUSY] * 2, {}, 1, [0.5, 1.0]),
+        ([BUSY] * 4, {}, APIError, [0.5, 1.0, 2.0]),
+        ([BUSY], {"rests_s": ()}, APIError, []),
+        ([ConnectionError("it has stopped")], {}, ConnectionError, []),
+        ([NotFound("gone")], {}, 0, []),
+    ],
+    ids=["refused at first", "refused for long", "of an earlier run", "the engine does not answer", "gone already"],
+)
+def test_what_cannot_be_removed_at_once(
+    errors: list[Exception], more: dict[str, Any], expected: Any, waited: list[float], rests: list[float]
+) -> None:
+    with contextlib.nullcontext() if isinstance(expected, int) else pytest.raises(expected):
+        assert cleanup.remove_project(Engine(*errors), "dodo-x", **more) == expected
+    assert rests == waited
 
 
 def test_endpoints_of_containers_that_could_not_start_are_removed(rests: list[float]) -> None:

@@ -18,17 +18,6 @@ def only_these_variables(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(name, raising=False)
 
 
-def version() -> str:
-    with contextlib.closing(connect()) as client:
-        return str(client.version()["Version"])
-
-
-def test_an_engine_on_a_port(monkeypatch: pytest.MonkeyPatch) -> None:
-    with engine_stub() as host:
-        monkeypatch.setenv("DOCKER_HOST", host)
-        assert version() == VERSION["Version"]
-
-
 @needs_openssl
 def test_an_engine_with_tls_is_trusted_by_its_own_authority(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Whatever authorities the runner names for the web."""
@@ -38,7 +27,8 @@ def test_an_engine_with_tls_is_trusted_by_its_own_authority(monkeypatch: pytest.
     with engine_stub(own) as host:
         monkeypatch.setenv("DOCKER_HOST", host)
         monkeypatch.setenv("DOCKER_CERT_PATH", str(own))
-        assert version() == VERSION["Version"]
+        with contextlib.closing(connect()) as client:
+            assert client.version()["Version"] == VERSION["Version"]
         monkeypatch.setenv("DOCKER_CERT_PATH", str(other))
         with pytest.raises(NoEngine, match="certificate verify failed"):
             connect()

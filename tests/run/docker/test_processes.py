@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import tempfile
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
+from dodo_dsl.run.docker.beside_processes import covers, uncovered
 from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.machine_load.service_use import Used
@@ -174,3 +176,23 @@ def test_the_load_is_measured_where_all_containers_run_here(proc: Proc) -> None:
     assert used(proc, app=Container("c0ffee", 12)) is None
     assert used(proc, app=Container("c0ffee", 10, APIError("gone"))) is None
     assert used(proc) is None
+
+
+@pytest.mark.parametrize("own", [{"Mounts": [{"Destination": "/dev/shm"}]}, {"HostConfig": {"Tmpfs": {"/dev": ""}}}])
+def test_what_is_mounted_over_shared_memory_is_named_where_the_test_needs_it(own: dict[str, Any]) -> None:
+    (hidden,) = [mount["Destination"] for mount in own.get("Mounts", ())] or ["/dev"]
+    container = {"Mounts": [], "HostConfig": {"Tmpfs": None}, **own}
+    assert uncovered(container) == ""
+    container["Mounts"] = [*container["Mounts"], {"Destination": "/dev/shm/folder-of-services"}]
+    assert uncovered(container) == hidden
+    assert uncovered({"Mounts": container["Mounts"][-1:], "HostConfig": {}}) == ""
+
+
+def test_only_folders_are_covered() -> None:
+    """A file in the place of a folder would keep the container from starting."""
+    with tempfile.TemporaryDirectory(dir="/tmp") as name, tempfile.NamedTemporaryFile(dir="/tmp") as file:
+        volume, cover = covers([Path(name), Path(file.name), Path("/tmp/there-is-none")])
+        assert cover["target"] == f"{volume['target']}/{Path(name).name}"
+        assert (volume["source"], volume["read_only"]) == ("tmp", True)
+        assert covers([Path(name)])[0]["target"] != volume["target"]
+    assert covers([Path("/tmp/there-is-none")]) == []

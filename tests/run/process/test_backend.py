@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan.model import Application, ApplicationService
-from dodo_dsl.run import engine
 from tests.run.desk import processes_with
 from tests.run.helpers import AFTER_START, BEGUN, PASS, READY, STARTED, WAIT, Bench
 
@@ -68,13 +66,6 @@ def test_mount_that_goes_away_meanwhile(host: Bench, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
     (result,) = host.run(host.plan(application=STARTED + WAIT, judge=READY + BEGUN + PASS))
     assert (result.outcome, len(count.read_text().split())) == (outcome, min(most + 1, 10))
-
-
-def test_missing_program_is_an_error(host: Bench) -> None:
-    broken = Application(".", (ApplicationService("app", ("no-such-program-of-dodo",)),))
-    (outcome,) = host.run(replace(host.plan(), application=broken))
-    assert outcome.outcome == "error"
-    assert outcome.reason == "service 'app' could not be started: no-such-program-of-dodo: No such file or directory"
 
 
 def test_variables_file_of_an_unknown_user_is_an_error_of_its_test_alone(host: Bench) -> None:
@@ -150,17 +141,6 @@ def test_application_without_flags_runs_alone_on_the_host(host: Bench) -> None:
     spans = sorted(tuple(map(float, p.read_text().split())) for p in host.folder.glob("*.span"))
     assert len(spans) == 2
     assert spans[0][1] <= spans[1][0]
-
-
-def test_services_are_waited_for_until_they_are_ready(host: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A service with a longer set-up than others may take by its manifest."""
-    monkeypatch.setattr(engine, "READY_PATIENCE_S", 0.1)
-    plan = host.plan(environment="time.sleep(0.5)\n" + READY + WAIT)
-    services = tuple(replace(service, setup_s=30.0) for service in plan.services)
-    (outcome,) = host.run(replace(plan, services=services))
-    assert outcome.outcome == "passed"
-    assert outcome.setup_s is not None
-    assert outcome.setup_s >= 0.5
 
 
 IS_THERE = """

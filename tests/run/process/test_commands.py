@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.plan.model import Application, Plan, PlannedService
+from dodo_dsl.plan.model import PlannedService
 from dodo_dsl.run.process.commands import Command, Commands
 from dodo_dsl.run.process.slot import Slot
 from tests.application.compiled import FILE, compiled, repository
@@ -112,11 +112,8 @@ def test_a_nul_character_is_named_without_its_value(tmp_path: Path, where: str) 
 
 def own_path(process: tuple[str, ...], folder: Path) -> list[str]:
     """Where a service's Python looks first, in a test with own services in two places."""
-    common = ("", "sil", "closed-loop", 10.0, "realtime", "host", 1, 140, "", "sil", "sandbox")
     service = PlannedService("evaluation", "judge", "judge", "dodo/judge:1", process)
-    plan = Plan(
-        "t", "t", "t.dodo.yml", *common, (service,), Application(".", ()), import_paths=("../..", "../../../more")
-    )
+    plan = scripted.plan(services=(service,), import_paths=("../..", "../../../more"))
     made = Commands(plan, folder, folder / "report", Slot(150)).of(service)
     return made.environment["PYTHONPATH"].split(os.pathsep)
 

@@ -1,5 +1,6 @@
-"""A forked module is as one that was started."""
+"""A forked module is as one that was started, of a server that leaves no trace in it."""
 
+import os
 import subprocess
 import sys
 import textwrap
@@ -76,3 +77,27 @@ def test_a_module_that_is_not_there(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="gone"):
         ForkedModule(["python", "-m", "this"], {}, str(tmp_path / "gone"), 1)
+
+
+LOAD = """
+import os, sys
+from dodo_dsl.run.process import fork_server
+before = dict(os.environ)
+fork_server.load()
+fork_server.load_services(["services.virtual_camera", "services.not_there"])
+assert {"numpy", "services.virtual_camera.service"} <= sys.modules.keys()
+assert "scipy" not in sys.modules
+assert "services.virtual_camera.__main__" not in sys.modules
+print(len(os.listdir("/proc/self/task")), before == os.environ)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("threads", [None, "3"])
+def test_it_has_one_thread_and_the_variables_of_before(threads: str | None) -> None:
+    """The kernel lets no process with several threads into a user namespace, and applications inherit the variables."""
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    environment.update({} if threads is None else {"OPENBLAS_NUM_THREADS": threads})
+    words = [sys.executable, "-c", LOAD]
+    result = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+    assert result.stdout == "1 True\n"

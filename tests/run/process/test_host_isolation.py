@@ -15,13 +15,12 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run import capabilities, leases
-from dodo_dsl.run.process import leftovers
+from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.process.fork_server_client import ForkServer
-from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal, runs_alone
+from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError
 from tests.run.desk import ROOT
-from tests.run.helpers import Bench
 from tests.run.scripted import plan
 
 SHARES = """
@@ -73,27 +72,18 @@ def test_foreign_traffic_is_an_error_that_names_its_sender(cid: int, traffic: in
 
 
 @pytest.mark.slow
-def test_a_cid_is_held_against_other_lease_folders(
-    cid: int, tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cid_is_held_against_other_lease_folders(cid: int) -> None:
     """As those of two users of one machine, who share its bus."""
     said: list[str] = []
 
-    async def wait() -> int:
+    async def scene() -> None:
+        claim = host_isolation._claimed(f"cid-{cid}")
+        assert claim is not None
+        asyncio.get_running_loop().call_later(0.2, claim.close)
         async with host_slot(plan(cid=cid), (cid,), said.append, alone=False) as slot:
-            return slot.cid
+            assert (slot.cid, host_isolation._claimed(f"cid-{cid}")) == (cid, None)
 
-    async def scene() -> int:
-        async with host_slot(plan(cid=cid), (cid,), print, alone=False):
-            monkeypatch.setenv("DODO_LEASES", str(tmp_path / "other"))
-            second = asyncio.create_task(wait())
-            while not said:
-                await asyncio.sleep(0)
-            monkeypatch.setenv("DODO_LEASES", str(folder))
-        monkeypatch.setenv("DODO_LEASES", str(tmp_path / "other"))
-        return await second
-
-    assert asyncio.run(scene()) == cid
+    asyncio.run(scene())
     assert said == ["waiting for another process"]
 
 
@@ -104,13 +94,6 @@ def test_a_slot_has_names_of_its_own_unless_it_is_alone(cid: int, folder: Path) 
     assert [slot.memory_prefix for slot in slots] == [slots[0].name, slots[1].name, ""]
     assert slots[0].name != slots[1].name
     assert list(folder.glob("*.lease")) == []
-
-
-@pytest.mark.slow
-def test_applications_without_flags_run_alone(tmp_path: Path) -> None:
-    bench = Bench(tmp_path)
-    words = ((), ("--cid=1",), ("--name=a",), ("--cid=1", "--name=a"))
-    assert [runs_alone(bench.plan(command=command)) for command in words] == [True, True, True, False]
 
 
 @pytest.mark.slow

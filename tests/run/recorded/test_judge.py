@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.plan.model import Application, Plan, PlannedService
+from dodo_dsl.plan.model import PlannedService
 from dodo_dsl.run.judge import Judgement, judge
 from dodo_dsl.run.test_recording import TestRecording, inspect
 from tests.run.helpers import FAIL, PASS, READY
 from tests.run.recorded.made import begin, step, write
+from tests.run.scripted import plan
 
 pytestmark = pytest.mark.slow
 
@@ -31,12 +32,8 @@ def judged(folder: Path, recording: TestRecording, **scripts: str) -> Judgement:
         path = folder / f"{name}.py"
         path.write_text(READY + script)
         services.append(PlannedService("evaluation", name, "x", "x", (sys.executable, str(path)), judge=True))
-    plan = Plan(
-        "t", "t", "t.dodo.yml", "", "sil", "closed-loop", 9.0, "lockstep", "network", 0, 111, "", "sil", "",
-        tuple(services), Application(".", ()), rig="desk",
-    )  # fmt: skip
     (folder / "work").mkdir()
-    return judge(plan, folder, recording, 130, folder / "work")
+    return judge(plan("t", lockstep=9.0, services=tuple(services), rig="desk"), folder, recording, 130, folder / "work")
 
 
 def test_it_passes_where_all_pass(tmp_path: Path, recording: TestRecording) -> None:
@@ -54,12 +51,6 @@ def test_one_that_fails_decides(tmp_path: Path, recording: TestRecording) -> Non
 REASONS = {
     "silent": ("", "the recording ends after 5.2 s, before evaluator 'track' gave a verdict"),
     "broken": ("raise SystemExit(2)", "evaluator 'track' ended with exit code 2"),
-    "killed": ("import os; os.kill(os.getpid(), 9)", "evaluator 'track' was killed by SIGKILL"),
-    "twice": (PASS + PASS, "evaluator 'track' gave 2 verdicts, expected one"),
-    "malformed": (
-        'print(\'{"dodo": "verdict", "outcome": "maybe"}\')',
-        "the verdict of evaluator 'track' is malformed: its outcome is neither passed nor failed",
-    ),
 }
 
 

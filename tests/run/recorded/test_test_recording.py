@@ -1,13 +1,16 @@
-"""What a recording says of its test, and which ones cannot be judged."""
+"""What a recording says of its test and its application, and which ones cannot be judged."""
 
 from pathlib import Path
 
 import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import RecordingError
-from dodo_dsl.run.test_recording import NoTestRecording, inspect
+from dodo_dsl.plan.model import Application, ApplicationService, Flag, Plan, PlannedService
+from dodo_dsl.run.test_recording import NoTestRecording, inspect, long_pause, silent_consumer
 from tests.run.recorded.made import EPOCH, begin, message, step, write
+from tests.run.scripted import plan
 
 PEDAL = "opendlv.proxy.PedalPositionRequest"
 WALL = 1_790_000_000_000_000
@@ -65,19 +68,9 @@ LATER = 400 * 86_400_000_000
 @pytest.mark.parametrize(
     ("envelopes", "row", "changed", "said"),
     [
-        (
-            LOCKSTEP,
-            1,
-            ZERO,
-            "1 mark of the test has a time stamp outside its steps, the first is message 2 (dodo.TestB",
-        ),
+        (LOCKSTEP, 1, ZERO, "1 mark of the test has a time stamp outside its steps, the first is message 2 "),
         (LOCKSTEP, 2, ZERO, f"1 of 38 messages, the first is message 3 ({PEDAL}/0, at byte "),
-        (
-            LOCKSTEP,
-            30,
-            {"sample_time": EPOCH + LATER},
-            f"1 of 38 messages, the first is message 31 ({PEDAL}/0, at byte ",
-        ),
+        (LOCKSTEP, 30, {"sample_time": EPOCH + LATER}, "1 of 38 messages, the first is message 31 "),
         (LOCKSTEP, 30, {"sample_time": EPOCH + 9_000_000}, f"message 33 ({PEDAL}/0, at byte "),
         (REALTIME, 7, ZERO, f"1 of 39 messages, the first is message 8 ({PEDAL}/0, at byte "),
         (REALTIME, 7, {"received": EPOCH + LATER}, f"message 9 ({PEDAL}/0, at byte "),
@@ -120,3 +113,65 @@ def test_bytes_that_are_no_message_are_told_but_at_the_end(tmp_path: Path) -> No
     assert not inspect(path).fault
     path.write_bytes(whole[:100] + b"\x0d\xa4" + whole[100:])
     assert inspect(path).fault.startswith("skipped ")
+
+
+STEERING = "opendlv.proxy.GroundSteeringRequest"
+
+
+def of(freq: str, output: str = STEERING) -> Plan:
+    flags = (Flag("name", "video0.argb", "memory"), *([Flag("freq", freq)] if freq else []))
+    camera = PlannedService("environment", "camera", "virtual-camera", "x", (), flags)
+    application = Application(".", (ApplicationService("driver", outputs=("team.Unknown", output)),))
+    return plan(services=(camera,), application=application)
+
+
+@pytest.mark.parametrize(
+    ("period", "pause", "freq", "output", "told"),
+    [
+        (0.1, 1.5, "10", STEERING, "for 1.5 s, as long as 15 frames, after 2.0 s"),
+        (0.1, 1.5, "10", f"{STEERING}/0", "for 1.5 s, as long as 15 frames, after 2.0 s"),
+        (0.1, 1.5, "10", f"{STEERING}/3", ""),
+        (0.1, 1.5, "", STEERING, "for 1.5 s, as long as 15 frames, after 2.0 s"),
+        (0.1, 0.9, "10", STEERING, ""),
+        (0.01, 0.5, "10", STEERING, ""),
+        (0.5, 3.0, "10", STEERING, ""),
+    ],
+)
+def test_pauses(tmp_path: Path, period: float, pause: float, freq: str, output: str, told: str) -> None:
+    """Before the begin nothing counts, nor a message that comes less often than frames do."""
+    times = [-50.0, *(period * n for n in range(1, 21)), *(20 * period + pause + period * n for n in range(20))]
+    sent = [message(STEERING, 0, EPOCH + round(t * 1e6)) for t in times]
+    rec = write(tmp_path / "test.rec", begin(EPOCH), *sent)
+    found = long_pause(of(freq, output), tmp_path, rec)
+    assert found == (f"application service 'driver' sent no GroundSteeringRequest {told}" if told else "")
+
+
+def test_a_few_messages_are_no_answers_to_frames(tmp_path: Path) -> None:
+    rec = write(tmp_path / "test.rec", begin(EPOCH), *(message(STEERING, 0, EPOCH + n**5) for n in range(9)))
+    assert long_pause(of("10"), tmp_path, rec) == ""
+
+
+STATUS = "opendlv.system.SystemStatusMessage"
+TOLD = f"{STATUS} came from 'lane', but 'driver', which consumes it, sent nothing"
+
+
+@pytest.mark.parametrize(
+    ("consumed", "came", "told"),
+    [
+        (STATUS, [STATUS], TOLD),
+        (f"{STATUS}/0", [STATUS], TOLD.replace(STATUS, f"{STATUS}/0")),
+        (f"{STATUS}/2", [STATUS], ""),
+        (STATUS, [], ""),
+        (STATUS, [STATUS, STEERING], ""),
+        (STEERING, [STEERING], ""),
+        ("team.Unknown", [STATUS], ""),
+    ],
+)
+def test_the_consumer_of_what_came(tmp_path: Path, consumed: str, came: list[str], told: str) -> None:
+    services = (
+        ApplicationService("lane", outputs=(STATUS, "team.Unknown")),
+        ApplicationService("driver", inputs=(consumed,), outputs=(STEERING,)),
+    )
+    rec = write(tmp_path / "test.rec", begin(), *(message(name, 1, 1) for name in came))
+    assert set(came) <= set(MessageSet.standard().names())
+    assert silent_consumer(plan(application=Application(".", services)), tmp_path, rec) == told

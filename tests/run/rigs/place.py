@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -18,14 +17,12 @@ import yaml
 from dodo_dsl.cli.main import main
 from services.gantry.rig_table import LIMITS
 from tests.drive.applications import KIWI, ROOT, results
+from tests.drive.variants import registry, variant
 from tests.services.gantry.fake_rig import FakeRig
 
 APPLICATION = ("--application", str(KIWI / "docker-compose.yml"))
 CAMERA = {"map-path": "../maps/rig-straight", "z": "9.5 cm", "freq": "10 Hz"}
-SPEC = {
-    "dodo": 1,
-    "name": "hil-fake",
-    "extends": "../hil-dynamic/hil-dynamic.dodo.yml",
+KEYS = {
     "rig": "fake",
     "environment": {"camera": {"uses": "virtual-camera", "with": CAMERA}},
     "action": {"pose": {"with": {"truth-id": None}}},
@@ -39,10 +36,7 @@ class Place:
         self.folder, self.rig = folder, rig
         rig.memory, rig.source = [1.0 if name == "y" else widest for name, (_, widest) in LIMITS.items()], 1
         self._started: list[subprocess.Popen[bytes]] = []
-        for name in ("maps", "vehicles", "sil-closed-straight", "hil-dynamic"):
-            shutil.copytree(ROOT / "tests_registry" / name, folder / "tests" / name)
-        (folder / "tests" / "hil-fake").mkdir()
-        (folder / "tests" / "hil-fake" / "hil-fake.dodo.yml").write_text(yaml.safe_dump(SPEC, sort_keys=False))
+        variant(registry(folder), "hil-dynamic", "hil-fake", **KEYS)
         fake = {"kind": "dynamic", "cid": cid, "serial": str(rig.path), "limits": {"y": "1 m"}}
         deployment = {"dodo": 1, "registry": ["tests"], "rigs": {"fake": fake}}
         (folder / "dodo.yml").write_text(yaml.safe_dump(deployment))

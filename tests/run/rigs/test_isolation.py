@@ -5,7 +5,6 @@ import json
 import pytest
 
 from tests.drive.applications import results
-from tests.images.conftest import engine_answers
 from tests.run.rigs.place import APPLICATION, Place, place
 
 __all__ = ["place"]
@@ -22,15 +21,12 @@ def test_no_isolation_leads_around_a_rigs_checks(place: Place) -> None:
     assert place.rig.received == []
 
 
-@pytest.mark.parametrize("backend", ["process", "docker"])
-def test_a_plan_with_a_network_of_its_own_is_examined_all_the_same(place: Place, backend: str) -> None:
-    if backend == "docker" and not engine_answers():
-        pytest.skip("no Docker engine answers (scripts/start-engine starts one)")
+def test_a_plan_with_a_network_of_its_own_is_examined_all_the_same(place: Place) -> None:
     place.dodo("compile", "tests/hil-fake", *APPLICATION, "-o", "generated", code=0)
     file = place.folder / "generated" / "hil-fake" / "test.json"
     file.write_text(json.dumps({**json.loads(file.read_text()), "isolation": "network"}))
     place.rig.unplug()
-    place.dodo("run", "--compiled", str(file.parent), "--backend", backend, code=3)
+    place.dodo("run", "--compiled", str(file.parent), "--backend", "process", code=3)
     (test,) = results(place.folder / "dodo-report").values()
     assert test["reason"].startswith("rig 'fake' cannot be checked: '")
     assert list((place.folder / "leases").glob("*.lease")) == []

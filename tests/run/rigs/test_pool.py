@@ -19,7 +19,7 @@ from dodo_dsl.run.process import host_isolation
 from dodo_dsl.run.protocol import Backend, BackendError, Ready
 from dodo_dsl.run.rigs.leases import leased, quarantine
 from dodo_dsl.run.rigs.pool import opened
-from tests.run.scripted import ScriptedBackend, drives, plan, run
+from tests.run.scripted import ScriptedBackend, drives, one_by_one, plan, run
 
 DEVICES = {"kiwi-1": "/dev/null", "kiwi-2": "/dev/zero"}
 CIDS = {"kiwi-1": 121, "kiwi-2": 122}
@@ -70,12 +70,7 @@ def test_each_takes_another_rig_and_the_next_the_first_that_comes_free(folder: P
     said: list[str] = []
 
     async def scene() -> list[str]:
-        tests = []
-        for slug, seconds in (("a", 30.0), ("b", 10.0)):
-            tests.append(asyncio.ensure_future(drive(slug, seconds)))
-            await asyncio.sleep(0.1)
-        tests.append(asyncio.ensure_future(drive("c", 1.0, said)))
-        return await asyncio.gather(*tests)
+        return await asyncio.gather(*await one_by_one(drive("a", 30.0), drive("b", 10.0), drive("c", 1.0, said)))
 
     assert run(scene()) == ["kiwi-1", "kiwi-2", "kiwi-2"]
     assert said == [f"waiting for test a of process {os.getpid()}", "on rig 'kiwi-2'"]
@@ -103,11 +98,8 @@ def test_who_takes_a_rig_no_longer_waits_and_keeps_it_from_those_who_come_later(
         yield
 
     async def scene() -> tuple[str, ...]:
-        tests = []
-        for driving in (drive("a", 0.0, held=after(health_check)), drive("b", 30.0), drive("c", 1.0, said)):
-            tests.append(asyncio.ensure_future(driving))
-            await asyncio.sleep(0.1)
-        return tuple(await asyncio.gather(*tests))
+        first = drive("a", 0.0, held=after(health_check))
+        return tuple(await asyncio.gather(*await one_by_one(first, drive("b", 30.0), drive("c", 1.0, said))))
 
     assert run(scene()) == ("kiwi-1", "kiwi-2", "kiwi-1")
     assert "before this one" not in "".join(said)

@@ -15,6 +15,7 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.session import Session
 from services.gantry.link import SerialPort
+from tests.run.desk import gone
 from tests.run.rigs.place import APPLICATION, Place, place
 from tests.services.process import receive, running, send
 
@@ -59,15 +60,9 @@ def sandbox(run: "subprocess.Popen[bytes]") -> int:
     return found
 
 
-def on_the_rig(place: Place) -> list[str]:
-    """The processes that have to do with the rig's port."""
-    word = f"--serial={place.rig.path}".encode()
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            if word in (entry / "cmdline").read_bytes().split(b"\0"):
-                found.append(entry.name)
-    return found
+def stopped_and_left(place: Place) -> bool:
+    """Whether the rig has been told to stop, and no process has it any more."""
+    return gone(f"--serial={place.rig.path}", 10.0) and place.rig.last() == "STOP"
 
 
 def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place) -> None:
@@ -76,11 +71,7 @@ def test_whoever_is_killed_the_rig_is_stopped_and_then_free(place: Place) -> Non
     os.kill(sandbox(run), signal.SIGKILL)
     run.kill()
     assert run.wait(20) == -signal.SIGKILL
-    end = time.monotonic() + 10
-    while on_the_rig(place) and time.monotonic() < end:
-        time.sleep(0.05)
-    assert not on_the_rig(place)
-    assert place.rig.last() == "STOP" and not any(place.rig.velocity)
+    assert stopped_and_left(place) and not any(place.rig.velocity)
     assert "fake: the rig is idle" in place.dodo("rig", "status", "--wait", "10", code=0)
 
 
@@ -117,11 +108,7 @@ def test_a_check_whose_runner_is_killed_stops_the_rig(place: Place) -> None:
         time.sleep(0.02)
     run.kill()
     run.wait()
-    end = time.monotonic() + 10
-    while on_the_rig(place) and time.monotonic() < end:
-        time.sleep(0.02)
-    assert not on_the_rig(place)
-    assert place.rig.last() == "STOP"
+    assert stopped_and_left(place)
     assert "the rig is " in place.dodo("rig", "status", "--wait", "60", code=0)
 
 

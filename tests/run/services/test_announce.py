@@ -1,6 +1,5 @@
 """What the runner sends to a session of this machine, and where it announces the begin of a test."""
 
-import asyncio
 import io
 from contextlib import closing
 from dataclasses import replace
@@ -13,7 +12,7 @@ from dodo_dsl.opendlv.address_book import AddressBook
 from dodo_dsl.opendlv.relay import Relay, serve
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.plan.model import Lockstep
-from dodo_dsl.run.announce import begin_frame, hearers, heartbeat
+from dodo_dsl.run.announce import begin_frame, hearers
 from tests.run.scripted import plan
 
 
@@ -39,18 +38,3 @@ def test_who_does_not_say_its_address_hears_on_the_bus(known: bool, cid: int, tm
             assert (envelope is not None) == hears
             if envelope:
                 assert book.knows(session.source, envelope.received)
-
-
-@pytest.mark.slow
-def test_a_runner_gives_a_sign_of_life_each_second_and_none_afterwards(cid: int, tmp_path: Path) -> None:
-    async def live() -> None:
-        async with heartbeat(cid, tmp_path):
-            await asyncio.sleep(1.5)
-
-    with Session(cid) as session:
-        asyncio.run(live())
-        heard, book = [], AddressBook(tmp_path)
-        while (envelope := session.receive(1.5)) is not None:
-            heard.append(envelope)
-            assert book.knows(session.source, envelope.received)
-    assert [envelope.data_type for envelope in heard] == [session.messages.id("dodo.Alive")] * 2

@@ -1,14 +1,21 @@
 """What services tell the runner is taken only when it is well-formed and a report can show it."""
 
+import asyncio
 import json
+import socket
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection
 from dodo_dsl.outcome import Response, with_margin
 from dodo_dsl.run.protocol import (
+    Event,
     Foreign,
     InputEnded,
     Late,
@@ -23,7 +30,8 @@ from dodo_dsl.run.protocol import (
     Time,
     VerdictEvent,
 )
-from dodo_dsl.run.service_protocol import read
+from dodo_dsl.run.service_protocol import Reports, read
+from tests.run.scripted import plan
 
 CHECK = {"name": "time", "value": 1.5, "limit": {"max": 2}, "unit": "s", "ok": True}
 JUDGED = {**CHECK, "margin": 0.5, "margin_share": 0.2}
@@ -37,38 +45,33 @@ def test_a_complete_verdict_is_taken_from_an_evaluator() -> None:
     assert read("track", True, line()) == VerdictEvent("track", True, "done", (JUDGED,))
     assert read("track", True, line(outcome="failed")) == VerdictEvent("track", False, "done", (JUDGED,))
     assert read("track", False, line()) is None
-    assert read("camera", False, b'{"dodo": "ready"}\n') == Ready("camera")
 
 
-def test_losses_are_taken_from_every_service() -> None:
-    assert read("recorder", False, b'{"dodo": "lost", "messages": 12}\n') == Overrun("recorder", 12)
-    for count in (b"0", b"-1", b"true", b"1.5", b'"12"', b"null", b"1" * 30):
-        assert read("track", True, b'{"dodo": "lost", "messages": ' + count + b"}") is None
+LATE = {"dodo": "late", "updates": 12, "late": 3, "worst_s": 0.25}
+SAID = {
+    '{"dodo": "ready"}': Ready("camera"),
+    '{"dodo": "lost", "messages": 12}': Overrun("camera", 12),
+    '{"dodo": "foreign", "reason": "so"}': Foreign("so"),
+    json.dumps(LATE): Late("camera", 12, 3, 0.25),
+    '{"dodo": "paused", "seconds": 0.061}': Paused("camera", 0.061),
+    '{"dodo": "end-of-input"}': InputEnded("camera"),
+    '{"dodo": "note", "text": "so"}': Noted("service 'camera': so"),
+}
+WRONG = {
+    '{{"dodo": "lost", "messages": {}}}': ("0", "-1", "true", "1.5", '"12"', "null", "1" * 30),
+    '{{"dodo": "foreign", "reason": {}}}': ('""',),
+    '{{"dodo": "paused", "seconds": {}}}': ("0", "-1", '"1"', "null", "true", "NaN", "[]"),
+    '{{"dodo": "note", "text": {}}}': ('""', "3", "null", f'"{"x" * 3000}"', '"\\ud800"'),
+}
 
 
-def test_what_the_application_must_not_send_is_taken_from_every_service() -> None:
-    assert read("pose", False, b'{"dodo": "foreign", "reason": "so"}') == Foreign("so")
-    assert read("pose", False, b'{"dodo": "foreign", "reason": ""}') is None
-
-
-def test_lateness_is_taken_from_every_service() -> None:
-    text = b'{"dodo": "late", "updates": 12, "late": 3, "worst_s": 0.25}\n'
-    assert read("camera", False, text) == Late("camera", 12, 3, 0.25)
+def test_these_are_taken_from_every_service() -> None:
+    for text, event in SAID.items():
+        assert read("camera", False, f"{text}\n".encode()) == event
+    for form, values in WRONG.items():
+        assert [read("camera", True, form.format(value).encode()) for value in values] == [None] * len(values)
     for change in ({"late": 13}, {"late": 0}, {"updates": "12"}, {"worst_s": -1}, {"worst_s": None}, {"late": 1.5}):
-        assert read("camera", False, json.dumps({**json.loads(text), **change}).encode()) is None
-
-
-def test_pauses_are_taken_from_every_service() -> None:
-    assert read("pose", False, b'{"dodo": "paused", "seconds": 0.061}\n') == Paused("pose", 0.061)
-    for seconds in (b"0", b"-1", b'"1"', b"null", b"true", b"NaN", b"[]"):
-        assert read("pose", False, b'{"dodo": "paused", "seconds": ' + seconds + b"}") is None
-
-
-def test_notes_and_the_end_of_the_input_are_taken_from_every_service() -> None:
-    assert read("camera", False, b'{"dodo": "end-of-input"}\n') == InputEnded("camera")
-    assert read("pose", False, b'{"dodo": "note", "text": "so"}') == Noted("service 'pose': so")
-    for text in (b'""', b"3", b"null", b'"' + b"x" * 3000 + b'"', b'"\\ud800"'):
-        assert read("pose", False, b'{"dodo": "note", "text": ' + text + b"}") is None
+        assert read("camera", False, json.dumps({**LATE, **change}).encode()) is None
 
 
 def test_a_verdict_may_carry_the_data_of_its_decision() -> None:
@@ -217,3 +220,35 @@ KINDS = st.sampled_from(["verdict", "ready", "lost", "time", "stopped"]) | VALUE
 @pytest.mark.thorough
 def test_any_message_is_read(message: dict[str, Any]) -> None:
     read("dodo-clock", True, json.dumps(message).encode())
+
+
+NOTE = b'{"dodo": "note", "text": "so"}'
+VERDICT = b'{"dodo": "verdict", "outcome": "passed", "reason": "so", "checks": []}'
+
+
+def test_what_was_said_counts_and_nobody_waits(tmp_path: Path) -> None:
+    """Of those, too, who end at once, whose name comes late, or whose message comes in parts."""
+    one, events, path = plan(), list[Event](), tmp_path / RUNNER_SOCKET
+    (judge, *_) = (service for service in one.services if service.judge)
+    brief = [replace(judge, name=f"brief{n}", judge=False) for n in range(4)]
+
+    async def scene() -> None:
+        reports = Reports(replace(one, services=(judge, *brief)), tmp_path, events.append, {})
+        reports.listen(tmp_path)
+        for service in brief:
+            with closing(Connection.open(path, service.name)) as connection:
+                connection.send(NOTE)
+        await reports.ended(brief[-1].name)
+        assert events == [Noted(f"service '{service.name}': so") for service in brief]
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as late:
+            late.connect(str(path))
+            await asyncio.sleep(0.01)
+            for packet in (b"\0" + judge.name.encode(), b"\1" + VERDICT[:9], b"\0" + VERDICT[9:]):
+                late.send(packet)
+                await asyncio.sleep(0.01)
+            assert not reports.take_line(judge.name, VERDICT), "it has connected"
+        await reports.ended(judge.name)
+        assert events[4:] == [VerdictEvent(judge.name, True, "so", ())] and not path.exists()
+        reports.close()
+
+    asyncio.run(scene())

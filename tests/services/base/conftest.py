@@ -1,6 +1,5 @@
 import json
 import os
-import select
 import signal
 import subprocess
 import sys
@@ -11,14 +10,11 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[3]
-PATIENCE = 20.0
+LATE = '{"dodo": "late"'
 
 
 class Process:
-    """A service as a process; every reading of its output has a limit in time.
-
-    What it says of updates that came late is left out: they are the machine's.
-    """
+    """A service as a process. What it says of updates that came late is left out: they are the machine's."""
 
     def __init__(self, argv: list[str], **environment: str) -> None:
         self.process = subprocess.Popen(
@@ -29,35 +25,23 @@ class Process:
             stderr=subprocess.PIPE,
             text=True,
         )
-        self._unread = b""
 
     def line(self) -> Any:
         """The next line of its output, decoded."""
         assert self.process.stdout is not None
-        while True:
-            line, is_whole, rest = self._unread.partition(b"\n")
-            if is_whole:
-                self._unread = rest
-                if not _is_late(line):
-                    return json.loads(line)
-                continue
-            assert select.select([self.process.stdout], [], [], PATIENCE)[0], "the service is silent"
-            data = os.read(self.process.stdout.fileno(), 65_536)
-            assert data, "the service ended"
-            self._unread += data
+        while (line := self.process.stdout.readline()).startswith(LATE):
+            pass
+        assert line, "the service ended"
+        return json.loads(line)
 
     def stop(self) -> None:
         self.process.send_signal(signal.SIGTERM)
 
     def end(self) -> tuple[int, str, str]:
         """Exit code, what is left of standard output, and standard error."""
-        out, err = self.process.communicate(timeout=PATIENCE)
-        left = (self._unread.decode() + out).splitlines(keepends=True)
-        return self.process.returncode, "".join(line for line in left if not _is_late(line.encode())), err
-
-
-def _is_late(line: bytes) -> bool:
-    return line.startswith(b'{"dodo": "late"')
+        assert self.process.stdout is not None and self.process.stderr is not None
+        out, err = self.process.stdout.readlines(), self.process.stderr.read()
+        return self.process.wait(), "".join(line for line in out if not line.startswith(LATE)), err
 
 
 Start = Callable[..., Process]

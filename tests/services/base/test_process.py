@@ -1,10 +1,11 @@
 """The tiny service as a process on a real bus."""
 
+import logging
 import re
-import shlex
 import subprocess
 import sys
 import uuid
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,7 +17,10 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
-from tests.services.base.conftest import ROOT, Process, Start
+from services.base import Check
+from services.base.process import LONGEST, published, sentence, short_traceback
+from tests.services.base.conftest import ROOT, Start
+from tests.services.process import receive
 
 MESSAGES = MessageSet.standard()
 READY = {"dodo": "ready"}
@@ -59,20 +63,6 @@ def test_steps_are_even_and_stamped_with_test_time(start: Start, cid: int) -> No
     assert all(envelope.sample_time <= envelope.sent for envelope in pedals)
 
 
-@pytest.mark.thorough
-def test_what_it_emulates_stood_still(start: Start, cid: int) -> None:
-    with Session(cid) as session:
-        service = start("--role=echo", "--freq=20")
-        assert service.line() == READY
-        for distance in (-0.0625, 1.0, -0.0625):
-            session.send(DISTANCE(distance=distance), sender_stamp=2)
-        assert service.line() == {"dodo": "paused", "seconds": 0.062}
-        session.send(DISTANCE(distance=-0.5), sender_stamp=2)
-        assert service.line() == {"dodo": "paused", "seconds": 0.5}
-        service.stop()
-        assert service.end() == (0, "", "")
-
-
 def test_messages_come_with_their_sample_time_and_from_the_right_sender(start: Start, cid: int) -> None:
     with Session(cid) as session:
         assert start("--role=echo", "--freq=20").line() == READY
@@ -108,15 +98,8 @@ def test_a_message_decides(start: Start, cid: int) -> None:
 
 def test_what_was_judged_comes_before_the_verdict_and_without_one(start: Start, cid: int, tmp_path: Path) -> None:
     """In a test, whose folder the service has; else, as above, nobody reads it."""
-    about = {
-        "series": "Distance",
-        "unit": "m",
-        "exclusive": False,
-        "low": None,
-        "high": 1,
-        "distance": None,
-        "band": None,
-    }
+    about = {"series": "Distance", "unit": "m", "exclusive": False, "high": 1}
+    about |= dict.fromkeys(("low", "distance", "band"))
     with Session(cid) as session:
         service = start("--role=judge", DODO_CHANNEL=str(tmp_path))
         assert service.line() == READY
@@ -234,21 +217,89 @@ def test_memory_that_another_process_has(start: Start) -> None:
         assert Path("/tmp", name).exists()
 
 
-@pytest.mark.thorough
-def test_the_example_of_the_help_runs(start: Start) -> None:
-    text = start("--help").end()
-    assert text[0] == 0
-    title, *_, example = text[1].rstrip("\n").split("\n")
-    assert title == "tiny-service: Does a little of everything that services do."
-    assert "  --freq  (number Hz, 1 to 1000, default 50)" in text[1]
-    command = shlex.split(example.removeprefix("example: "))
-    service = Process([sys.executable, *command[1:]])
-    assert service.line() == READY
-    service.stop()
-    assert service.end()[0] == 0
-
-
 def test_starting_up_is_light() -> None:
     code = "import sys, services.base; print(sorted({'numpy', 'cv2', 'jsonschema'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def raised(work: Callable[[], object]) -> Exception:
+    try:
+        work()
+    except Exception as error:  # noqa: BLE001  (whatever the work raises)
+        return error
+    raise AssertionError("nothing was raised")
+
+
+def test_the_innermost_place_of_its_own_code(tmp_path: Path) -> None:
+    """Also in a neighbour that several services share, and not in a library below it."""
+    shared, names = tmp_path / "my_services/shared.py", {}
+    shared.parent.mkdir()
+    shared.write_text("import json\n\ndef load(text):\n    return json.loads(text)\n")
+    exec(compile(shared.read_text(), shared, "exec"), names)
+    error = raised(lambda: names["load"]("["))
+    place = "my_services/shared.py:4, in load"
+    assert sentence(error, shared.parent / "judge").endswith(f"Expecting value: line 1 column 2 (char 1) ({place})")
+    assert short_traceback(error, shared.parent / "judge") == (
+        "Traceback without libraries (most recent call last):\n"
+        '  File "my_services/shared.py", line 4, in load\n    return json.loads(text)'
+    )
+
+
+def test_what_the_base_cannot_use_is_shown_there(tmp_path: Path) -> None:
+    error = raised(lambda: Check("step", 1.0, "deg").as_json())  # type: ignore[arg-type]
+    told = sentence(error, tmp_path / "my_services/judge")
+    assert told.startswith("AttributeError: 'str' object has no attribute 'items' (services/base/service.py:")
+    assert told.endswith(", in as_json)")
+
+
+LOG = "opendlv.system.LogMessage"
+LAST = "the last line of this test"
+
+
+@pytest.fixture
+def sessions(cid: int) -> Iterator[tuple[Session, Session]]:
+    with Session(cid) as ours, Session(cid) as theirs:
+        yield ours, theirs
+
+
+def logged(session: Session, sender_stamp: int = 3) -> list[tuple[int, str]]:
+    """Severities and texts up to the last line."""
+    lines = []
+    while not lines or lines[-1][1] != LAST:
+        message = receive(session, LOG, sender_stamp)[1]
+        lines.append((message.level, message.description))
+    return lines[:-1]
+
+
+def test_each_line_with_its_severity(sessions: tuple[Session, Session]) -> None:
+    ours, theirs = sessions
+    log = logging.getLogger("published")
+    log.setLevel(logging.DEBUG)
+    with published(ours, 3):
+        log.debug("a %s", "detail")
+        log.info("a fact")
+        log.warning("odd\nthing")
+        log.error("x" * 2 * LONGEST)
+        log.warning(LAST)
+    log.warning("nobody is told of this")
+    assert logged(theirs) == [(7, "a detail"), (6, "a fact"), (4, "odd thing"), (3, "x" * LONGEST)]
+    assert theirs.receive(0.0) is None
+
+
+def test_the_error_that_ends_it(sessions: tuple[Session, Session]) -> None:
+    ours, theirs = sessions
+    with pytest.raises(ValueError, match="lost"), published(ours, 0):
+        raise ValueError("the rig is lost")
+    message = receive(theirs, LOG)[1]
+    assert (message.level, message.description) == (2, "the rig is lost")
+
+
+def test_a_service_says_on_the_bus_what_it_logs_where_it_is_asked_to(start: Start, cid: int) -> None:
+    with Session(cid) as session:
+        assert start("--role=broken").end()[0] == 1
+        service = start("--role=broken", "--log-id=9")
+        message = receive(session, LOG, 9)[1]
+        assert (message.level, message.description) == (2, "a model went wrong")
+        assert service.end()[0] == 1
+        assert session.receive(0.0) is None

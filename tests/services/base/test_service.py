@@ -1,12 +1,15 @@
+import json
+import math
 import os
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.base.flags import Flags
-from services.base.service import Context, Service, period_of
+from services.base.service import Check, Context, Verdict, period_of, undeclared_checks
 
 
 @pytest.mark.parametrize(("slow", "fast"), [(30.0, 60.0), (15.0, 60.0), (12.0, 24.0), (29.97, 59.94), (0.3, 0.9)])
@@ -30,8 +33,49 @@ def test_memory_is_removed_with_the_resources() -> None:
         SharedMemory.attach(name)
 
 
-def test_a_service_needs_nothing_of_its_own() -> None:
-    service = Service()
-    service.begin(1)
-    service.end_of_input(2)
-    assert (tuple(service.update(1)), service.verdict, service.finished, service.drive) == ((), None, False, None)
+def test_the_line() -> None:
+    verdict = Verdict(
+        "passed",
+        "reached finish after 3.20 s",
+        (Check("time-to-goal", 3.2, {"max": 40}, "s", True), Check("count", 3, {"min": 1, "max": 5})),
+    )
+    assert verdict.line() == (
+        '{"dodo": "verdict", "outcome": "passed", "reason": "reached finish after 3.20 s", "checks": ['
+        '{"name": "time-to-goal", "value": 3.2, "limit": {"max": 40}, "unit": "s", "ok": true}, '
+        '{"name": "count", "value": 3, "limit": {"min": 1, "max": 5}, "unit": "", "ok": true}]}'
+    )
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None, np.float32("nan")])
+def test_no_finite_value_is_null(value: float) -> None:
+    (check,) = json.loads(Verdict("failed", "", (Check("x", value, {"min": math.inf, "max": 1}, ok=False),)).line())[
+        "checks"
+    ]
+    assert check == {"name": "x", "value": None, "limit": {"max": 1}, "unit": "", "ok": False}
+
+
+def test_numbers_of_numpy_and_any_text() -> None:
+    reason = 'a "quoted" line\nand an ö'
+    line = Verdict("passed", reason, (Check("x", np.float32(0.5), {"max": np.float64(1)}, "m", np.bool_(True)),)).line()
+    assert "\n" not in line and line.isascii()
+    found = json.loads(line)
+    assert found["reason"] == reason
+    assert found["checks"][0]["value"] == 0.5 and found["checks"][0]["ok"] is True
+
+
+def test_evidence_is_in_the_line_where_there_is_some() -> None:
+    evidence = {"time": np.float64(0.5), "sample-time": 1_700_000_000_100_000, "obstacle": "left", "x": math.nan}
+    assert json.loads(Verdict("failed", "hit", evidence=evidence).line())["evidence"] == {
+        "time": 0.5, "sample-time": 1_700_000_000_100_000, "obstacle": "left", "x": None,
+    }  # fmt: skip
+    assert json.loads(Verdict("failed", "hit", silent=True).line())["silent"] is True
+    assert not {"evidence", "silent"} & json.loads(Verdict("failed", "hit").line()).keys()
+
+
+def test_checks_that_the_manifest_does_not_declare() -> None:
+    verdict = Verdict("passed", "", tuple(Check(name, 1.0) for name in ("recall", "recall-cone", "largest-step", "x")))
+    where = "the 'checks' of its service.yml (recall, recall-*)"
+    text = f"checks 'largest-step', 'x' are not among {where}, so no goal can name them"
+    assert undeclared_checks(verdict, {"recall": "", "recall-*": ""}) == text
+    assert undeclared_checks(verdict, {"*": ""}) == ""
+    assert undeclared_checks(verdict, None) == ""

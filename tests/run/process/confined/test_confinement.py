@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl.run.process import confinement as module
+from dodo_dsl.run.process import seccomp_filter
 from dodo_dsl.run.process.confinement import Confinement, as_data, confinement, sandbox_words
 from dodo_dsl.run.process.places import Places
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -110,3 +111,19 @@ def test_what_may_be_read_in_the_folder_of_others_is_shown_and_nothing_else_ther
     assert before == ["--bind", "--tmpfs", "--tmpfs"]
     assert [words.index(str(path)) for path in places] == sorted(words.index(str(path)) for path in places)
     assert words[words.index(str(venv)) - 1] == "--ro-bind-try"
+
+
+@pytest.fixture(autouse=True)
+def afresh() -> None:
+    seccomp_filter.program.cache_clear()
+
+
+def test_it_is_a_program_for_the_kernel() -> None:
+    assert len(seccomp_filter.program()) % 8 == 0
+    assert len(seccomp_filter.program()) > 8 * len(seccomp_filter._REFUSED)
+
+
+def test_a_call_that_cannot_be_filtered_is_an_error_and_not_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(seccomp_filter, "_REFUSED", ("mount", "call_of_the_future"))
+    with pytest.raises(seccomp_filter.NoSeccomp, match="does not know the system call call_of_the_future"):
+        seccomp_filter.program()

@@ -11,10 +11,7 @@ from services.base import Check, Context, Judged, Output, Service, UnjudgeableEr
 
 
 class Echo(Service):
-    """Says the last distance as a pedal position, and since when the test runs as an angle.
-
-    What it emulates stood still for as long as a distance was negative.
-    """
+    """Says the last distance as a pedal position, and since when the test runs as an angle."""
 
     def __init__(self, context: Context) -> None:
         self.period = period_of(context.flags["freq"])
@@ -27,7 +24,6 @@ class Echo(Service):
 
     def take(self, message: Any, sample_time: int) -> None:
         self.distance, self.sampled = message.distance, sample_time
-        self.paused = max(self.paused, -message.distance)
 
     def update(self, now: int) -> Iterable[Any]:
         yield self.messages.type("opendlv.proxy.PedalPositionRequest")(position=self.distance)

@@ -1,0 +1,98 @@
+"""What a service's loop says of stamps, losses, pauses and late updates."""
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.opendlv.envelope import Envelope
+from dodo_dsl.opendlv.session import Session
+from services.base.clock import RealTimeClock
+from services.base.loop import HeardStamps, Lateness, Loop, with_strangers
+from services.base.service import Service
+
+STEER, PEDAL = 1090, 1086
+INPUTS = {(STEER, 0): "opendlv.proxy.GroundSteeringRequest", (STEER, 9): "opendlv.proxy.GroundSteeringRequest"}
+stamps = st.lists(st.sampled_from([0, 1, 9, 99]), max_size=12)
+
+
+def heard(*those: tuple[int, int]) -> HeardStamps:
+    counts = HeardStamps({**INPUTS, (PEDAL, None): "opendlv.proxy.PedalPositionRequest"})
+    for kind, stamp in those:
+        counts.take(Envelope(kind, b"", 0, 0, 0, stamp))
+    return counts
+
+
+def test_what_came_under_another_stamp_is_named() -> None:
+    assert heard(*[(STEER, 99)] * 120, (STEER, 9), (STEER, 3), (PEDAL, 5)).strangers() == [
+        "no opendlv.proxy.GroundSteeringRequest/0 came, but 1 with sender stamp 3 and 120 with sender stamp 99"
+    ]
+
+
+@given(stamps)
+def test_only_a_stamp_that_never_came_is_told_and_only_beside_strangers(those: list[int]) -> None:
+    told = heard(*((STEER, stamp) for stamp in those)).strangers()
+    unheard = [stamp for stamp in (0, 9) if stamp not in those]
+    has_strangers = any(stamp not in (0, 9) for stamp in those)
+    assert [int(text.split("/")[1].split()[0]) for text in told] == (unheard if has_strangers else [])
+
+
+def test_the_reason_goes_on_with_them() -> None:
+    assert with_strangers("no sample came", ["no X/0 came, but 1 with sender stamp 2"]) == (
+        "no sample came; no X/0 came, but 1 with sender stamp 2"
+    )
+    assert with_strangers("no sample came", []) == "no sample came"
+
+
+class Losing(Session):
+    """A session that loses messages as the last ones are read."""
+
+    def receive(self, timeout: float | None = 0.0) -> Envelope | None:
+        self.lost += 7
+        return None
+
+
+def test_losses_and_pauses_are_told_to_the_last_one(cid: int, capsys: pytest.CaptureFixture[str]) -> None:
+    service = Service()
+    service.paused = 0.0625
+    service.observe = lambda _: None
+    with Losing(cid) as session:
+        Loop("recorder", service, session, RealTimeClock(), 0).run(lambda: True)
+        lost = f'{{"dodo": "lost", "messages": {session.lost}}}'
+    assert capsys.readouterr().out.splitlines() == [lost, '{"dodo": "paused", "seconds": 0.062}']
+
+
+PERIOD = 100_000
+
+
+def test_updates_that_end_late_are_counted_from_the_begin_of_the_test() -> None:
+    lateness = Lateness(PERIOD, None)
+    lateness.add(0, 90_000)
+    assert lateness.news() is None, "the test has not begun"
+    lateness.begin()
+    lateness.add(PERIOD, PERIOD + 50_000)
+    assert lateness.news() is None
+    lateness.add(2 * PERIOD, 2 * PERIOD + 50_001)
+    assert lateness.news() == {"updates": 2, "late": 1, "worst_s": 0.05}
+    assert lateness.news() is None, "it is reported once"
+    lateness.add(3 * PERIOD, 3 * PERIOD + 70_000)
+    assert lateness.news() == {"updates": 3, "late": 2, "worst_s": 0.07}
+
+
+def test_updates_that_were_skipped_are_late() -> None:
+    lateness = Lateness(Fraction(1_000_000, 60), None)
+    lateness.begin()
+    lateness.add(0, 0)
+    lateness.add(16_667, 16_667)
+    lateness.add(1_000_000, 1_000_000)
+    assert lateness.news() == {"updates": 61, "late": 58, "worst_s": 0.0}
+
+
+def test_a_short_period_or_another_limit() -> None:
+    for lateness, most in ((Lateness(1000, None), 10_000), (Lateness(1000, 25_000.0), 25_000)):
+        lateness.begin()
+        lateness.add(0, most)
+        assert lateness.news() is None
+        lateness.add(1000, 1001 + most)
+        assert lateness.news() is not None
