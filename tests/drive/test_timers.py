@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.drive.applications import ROOT, dodo, program, results
+from tests.drive.applications import ROOT, dodo, kiwi, program, results
 
 pytestmark = pytest.mark.slow
 
@@ -30,6 +30,42 @@ def test_one_who_acts_by_timers_drives_the_same_each_time(tmp_path: Path) -> Non
     assert (first["outcome"], first["clock"]) == ("passed", "lockstep")
     assert first["checks"] == second["checks"]
     assert first["sim_s"] > 4.0
+
+
+SINCE_ITS_START = """\
+import sys, time
+from dodo_dsl.opendlv import Session
+with Session(int(next(word[6:] for word in sys.argv if word.startswith("--cid=")))) as session:
+    names = ("GroundSteering", "PedalPosition")
+    steering, pedal = (session.messages.type(f"opendlv.proxy.{name}Request") for name in names)
+    begin = time.time()
+    while True:
+        session.send(steering(groundSteering=0.0))
+        session.send(pedal(position=0.1 if time.time() - begin < 0.5 else 0.0))
+        time.sleep(0.05)
+"""
+
+
+def test_what_acts_by_the_time_since_its_start_does_so_in_the_test(tmp_path: Path) -> None:
+    (tmp_path / "ramp.py").write_text(SINCE_ITS_START)
+    test = drive(program(tmp_path, "python", "ramp.py", **{"x-dodo": {"in": [], "out": OUT}}), 1)
+    (distance,) = (check["value"] for check in test["checks"] if check["name"] == "distance")
+    assert 0.1 < distance < 1.0, "it went for half a second and then stood"
+    assert "no program of the application waited for a frame of 'camera'" in test["notes"][0]
+
+
+def test_who_cannot_load_the_library_is_stepped_by_answers_to_the_same_values(tmp_path: Path) -> None:
+    compose = kiwi(tmp_path / "kiwi")
+    loaded = drive(compose)
+    subprocess.run(
+        ["cc", "-static", "-o", compose.parent / "start", "-xc", "-"], check=True, text=True,
+        input="#include <unistd.h>\nint main(int n, char **words) { return execvp(words[n > 0], words + 1); }",
+    )  # fmt: skip
+    compose.write_text(compose.read_text().replace("- python\n", "- ./start\n    - python\n"))
+    found = drive(compose)
+    assert (found["checks"], found["response"]) == (loaded["checks"][:-1], None)
+    assert found["notes"][0].startswith("lockstep by answers: service 'perception' starts ")
+    assert "clock: lockstep by answers: " in dodo("explain", STRAIGHT, "--application", str(compose), code=0)
 
 
 @pytest.mark.proof
