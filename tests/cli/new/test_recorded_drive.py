@@ -110,7 +110,7 @@ def test_a_recording_that_is_there_is_not_copied(empty: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_a_recording_without_pictures_is_played_in_real_time(empty: Path) -> None:
+def test_a_recording_without_pictures_is_played_in_lockstep(empty: Path) -> None:
     """The preferred message with enough samples is judged, and others of it are named."""
     streams = [(STEERING, 3, [0.1] * 5), ("opendlv.proxy.PedalPositionRequest", 4, [0.1, 0.3] * 20)]
     write(empty / "drive.rec", *streams, ("opendlv.proxy.PedalPositionRequest", 7, [0.1] * 12))
@@ -120,7 +120,7 @@ def test_a_recording_without_pictures_is_played_in_real_time(empty: Path) -> Non
     assert "judged: position of opendlv.proxy.PedalPositionRequest/4, 40 values from 0.1 to 0.3\n" in out
     assert "other sender stamps of it are 7: change 'target-sender' for them\n" in out
     found = spec(empty, "mine")
-    assert (found["clock"], found["align"], found["sample-times"]) == (None, "begin", "test")
+    assert (found["clock"], found["align"], found["sample-times"]) == ("lockstep", "begin", "test")
     assert (found["max-mean"], found["max-distance"], found["target-sender"]) == (0.020, 0.10, 4)
     assert dodo("compile", "--check")[0] == 0
 
