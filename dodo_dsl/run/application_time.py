@@ -4,6 +4,7 @@ It is a library that is preloaded into the application's processes, and an agent
 sources are in ``services/clock/native``.
 """
 
+import contextlib
 import fcntl
 import functools
 import hashlib
@@ -13,7 +14,7 @@ import shutil
 import stat
 import struct
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,8 +106,8 @@ def _build(sources: Path, folder: Path) -> None:
         raise BackendError(f"DoDo's library cannot be built: {said[0]}")
 
 
-_INTERPRETER = 3
-"""The type of a program header that names the dynamic linker (elf(5), PT_INTERP)."""
+_INTERPRETER, _NOTE = 3, 4
+"""Types of program headers: one that names the dynamic linker, and one with notes (elf(5))."""
 _LONGEST_CHAIN = 4
 HEAD_SIZE = 1 << 16
 
@@ -161,19 +162,18 @@ def _unreachable(mode: int, head: bytes) -> str:
         return ""
     if _machine(head) != _machine(_head(Path("/proc/self/exe"), HEAD_SIZE)):
         return "a program for another processor than DoDo's own"
-    return "" if _has_linker(head) else "a statically linked program"
+    headers = [*_headers(head)]
+    if any(kind == _NOTE and shown[12:15] == b"Go\0" for kind, shown in headers):
+        return "a program of Go, which asks the kernel itself"
+    return "" if any(kind == _INTERPRETER for kind, _ in headers) else "a statically linked program"
 
 
-def _has_linker(head: bytes) -> bool:
-    """Whether a 64-bit ELF file names a dynamic linker. Its beginning holds the program headers."""
+def _headers(head: bytes) -> Iterator[tuple[int, bytes]]:
+    """The kinds of the program headers of a 64-bit ELF file, and the beginning of what each shows."""
     order = "<" if head[5:6] == b"\x01" else ">"
-    try:
+    with contextlib.suppress(struct.error, ValueError):
         (offset,) = struct.unpack_from(f"{order}Q", head, 32)
         size, count = struct.unpack_from(f"{order}HH", head, 54)
         for start in range(offset, offset + size * count, size):
-            (kind,) = struct.unpack_from(f"{order}I", head, start)
-            if kind == _INTERPRETER:
-                return True
-    except (struct.error, ValueError):
-        pass
-    return False
+            kind, place = struct.unpack_from(f"{order}I4xQ", head, start)
+            yield kind, head[place : place + 16]

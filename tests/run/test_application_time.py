@@ -90,6 +90,7 @@ def program(folder: Path, content: bytes, mode: int = 0o755) -> Path:
         (lambda elf: elf[:18] + b"\xf3\0" + elf[20:], "a program for another processor"),
         (lambda elf: elf[:56] + b"\0\0" + elf[58:], "a statically linked program"),
         (lambda elf: elf[:70], "a statically linked program"),
+        (lambda elf: elf.replace(b"GNU\0", b"Go\0\0", 1), "a program of Go"),
         (lambda elf: elf, ""),
         (lambda _: b"#!/bin/true\n", ""),
         (lambda _: b"#!\n", ""),
