@@ -317,8 +317,8 @@ class RestingApplication:
         missing = [name for number, name in enumerate(self._names) if number not in report.services]
         if missing and not self.frames:
             raise ServiceSilent(
-                f"service '{missing[0]}' never loaded DoDo's clock, as programs do not that are statically linked or "
-                "of another C library: run the test with --clock realtime"
+                f"service '{missing[0]}' never loaded DoDo's clock, as statically linked programs do not: "
+                "run the test with --clock realtime"
             )
         if not report.repeatable:
             self._note_once("not all services began at once, so the time before the test may differ from run to run")
