@@ -203,7 +203,7 @@ class Engine:
     async def _execute(self) -> None:
         began = self.state.began = self._now()
         await self._begin()
-        self.say("running")
+        self.say("running in lockstep by answers" if self.plan.lockstep and self.backend.by_answers else "running")
         self.stands(standing(self.state))
         lockstep = self.plan.lockstep
         deadline = began + (lockstep.wall_timeout_s if lockstep else self.plan.timeout_s)
