@@ -163,7 +163,7 @@ def _sandbox_command(plan: Plan) -> tuple[str, ...]:
     """It sleeps, or gives the application the test's time."""
     if plan.lockstep is None:
         return ("sleep", "infinity")
-    return (f"{TIME_MOUNT}/{TIME}", *agent_flags(len(plan.application.services), plan.seed))
+    return (f"{TIME_MOUNT}/{TIME}", *agent_flags(plan.application.services, plan.seed))
 
 
 def render_plan(plan: Plan, defaults: Defaults = NO_DEFAULTS) -> list[File]:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from dodo_dsl.application.model import Declared
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, Wiring, answers, cameras_of, other_inputs, rates, step_hz
-from dodo_dsl.plan.model import Flag, Lockstep, PlannedService
+from dodo_dsl.plan.model import STARTED, ApplicationService, Flag, Lockstep, PlannedService
 from dodo_dsl.spec.arguments import ResolvedService
 from dodo_dsl.spec.manifest import Manifest
 from dodo_dsl.spec.model import NEVER, ON_FAILURE, Spec
@@ -50,10 +50,17 @@ _POOLS = ("OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Threads of the application run one at a time, so that pools of them only cost time."""
 
 
-def agent_flags(services: int, seed: int, folder: str = OWN_TIME) -> tuple[str, ...]:
-    """The flags of what gives an application of so many ``services`` the test's time."""
+_PATIENCE_S, _MOST_PATIENCE_S = 3, 40
+"""How long time waits for services that have not begun: shortly where one waits for what another has to do before."""
+
+
+def agent_flags(services: Sequence[ApplicationService], seed: int, folder: str = OWN_TIME) -> tuple[str, ...]:
+    """The flags of what gives the ``services`` of an application the test's time."""
     start = _EPOCH_S * _SECOND
-    return (f"--folder={folder}", f"--services={services}", f"--start={start}", f"--begin={start}", f"--seed={seed}")
+    waits = any(how != STARTED for service in services for how in service.after.values())
+    own = {"folder": folder, "services": len(services), "start": start, "begin": start, "seed": seed}
+    own["patience"] = _PATIENCE_S if waits else _MOST_PATIENCE_S
+    return tuple(f"--{name}={value}" for name, value in own.items())
 
 
 def time_variables(

@@ -44,7 +44,7 @@ class ApplicationTime:
     def words(self, plan: Plan, folder: str, *, on_host: bool) -> tuple[str, ...]:
         """The agent's command, for a sandbox whose applications have their own process namespaces."""
         others = ("--by-environment",) if on_host else ()
-        flags = agent_flags(len(plan.application.services), plan.seed, folder)
+        flags = agent_flags(plan.application.services, plan.seed, folder)
         return (str(self.agent), *flags, "--nested", *others)
 
     def variables(self, given: Mapping[str, str], plan: Plan, service: str, folder: str) -> dict[str, str]:

@@ -97,7 +97,7 @@ def repository(folder: Path, attacks: Mapping[str, tuple[list[str], list[str]]],
 def looks(team: Path, backend: str, before: Sequence[str]) -> list[str]:
     """What the services of one test saw."""
     own = {"PYTHONPATH": str(ROOT), "DODO_LEASES": str(team / "leases"), "DATABASE_URL": "x://a:s3cr3t@b"}
-    words = ["run", TEST, "--backend", backend, "-q", "--report", str(team / "report")]
+    words = ["run", TEST, "--backend", backend, "--clock", "realtime", "-q", "--report", str(team / "report")]
     if backend == "mixed" and before:
         words += ["--isolation", "host"]
     command = [*before, sys.executable, "-m", "dodo_dsl", *words]

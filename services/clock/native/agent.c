@@ -32,7 +32,6 @@ enum {
     FREE_IN_A_ROW = 64,   /* slots are taken from the first on: behind so many free ones there is none */
     END_MS = 100,         /* between looks whether the test is over */
     REPORT_MS = 500,      /* between reports on a busy thread */
-    START_PATIENCE_S = 3, /* for services that have not begun yet, since the last one did */
     START_MOST_S = 40,    /* then the clock says which did not */
     UNSEEN_WAIT_MS = 1000, /* that all must sleep, if one of them does not wait in the library and it is not known where */
     SHORTEST_NAP_US = 20,
@@ -44,9 +43,10 @@ static struct options {
     const char *folder;
     unsigned services;
     int64_t start_ns, begin_ns;
+    int64_t patience_s; /* for services that have not begun yet, since the last one did */
     uint64_t seed;
     bool nested, by_environment;
-} options = {.services = 1};
+} options = {.services = 1, .patience_s = 3};
 
 static struct time_page *page;
 static int folder_file = -1, command_file = -1, reply_file = -1, wakers[TIME_SLOTS];
@@ -457,7 +457,7 @@ static void start(void)
             known = begun_services();
             since = wall_ns();
         }
-        int64_t late = wall_ns() - since - START_PATIENCE_S * SECOND;
+        int64_t late = wall_ns() - since - options.patience_s * SECOND;
         if (known && late > 0) { /* others wait for what these do: time goes on as on the wall */
             is_repeatable = false;
             run(options.start_ns + late);
@@ -547,7 +547,7 @@ static void read_options(int count, char **words)
     static const struct option known[] = {
         {"folder", required_argument, NULL, 'f'}, {"services", required_argument, NULL, 'n'},
         {"start", required_argument, NULL, 's'}, {"begin", required_argument, NULL, 'b'},
-        {"seed", required_argument, NULL, 'r'},
+        {"seed", required_argument, NULL, 'r'}, {"patience", required_argument, NULL, 'w'},
         {"nested", no_argument, NULL, 'p'}, {"version", no_argument, NULL, 'v'}, {"by-environment", no_argument, NULL, 'e'}, {0}};
     for (int option; (option = getopt_long(count, words, "", known, NULL)) != -1;)
         switch (option) {
@@ -555,6 +555,7 @@ static void read_options(int count, char **words)
         case 'n': options.services = (unsigned)strtoul(optarg, NULL, 10); break;
         case 's': options.start_ns = strtoll(optarg, NULL, 10); break;
         case 'b': options.begin_ns = strtoll(optarg, NULL, 10); break;
+        case 'w': options.patience_s = strtoll(optarg, NULL, 10); break;
         case 'r': options.seed = strtoull(optarg, NULL, 10); break;
         case 'p': options.nested = true; break;
         case 'e': options.by_environment = true; break;
@@ -562,7 +563,7 @@ static void read_options(int count, char **words)
         default: exit(2);
         }
     if (!options.folder || options.services < 1 || options.services > TIME_SERVICES || options.begin_ns < options.start_ns) {
-        fprintf(stderr, "dodo-time: expected --folder=F --services=1..64 --start=NS --begin=NS [--seed=N] "
+        fprintf(stderr, "dodo-time: expected --folder=F --services=1..64 --start=NS --begin=NS [--patience=S] [--seed=N] "
                         "[--nested [--by-environment]]\n");
         exit(2);
     }
