@@ -286,7 +286,7 @@ class RestingApplication:
 
     def _has_lines(self, until: int) -> bool:
         """Whether all that it has printed in this step is taken, and it still rests."""
-        is_shown_next = until in (self._shown_at, self._shown_at + EXPOSED_US)
+        is_shown_next = self.frames > 0 and until in (self._shown_at, self._shown_at + EXPOSED_US)
         return is_shown_next or self.lines is None or self.lines.are_complete(self._shown_at, self._link)
 
     @property

@@ -23,6 +23,7 @@ from services.clock import resting
 from services.clock.agent import TimeAgent
 from services.clock.answers import filters
 from services.clock.exchange import ApplicationFloods, ApplicationSilent, Patience, ServiceLink, ServiceSilent
+from services.clock.printed_lines import PrintedLines
 from services.clock.resting import ResponseTimes, RestingApplication, SentMessages
 from tests.services.clock.toys import STEER, STEP, Toys
 
@@ -169,6 +170,24 @@ def test_it_goes_on_only_when_the_time_is_reached(tmp_path: Path) -> None:
             driven.show((), EPOCH + step * STEP)
             driven.await_answer(EPOCH + (step + 1) * STEP)
     assert driven.frames == 3
+
+
+def test_its_lines_are_of_the_test_from_the_start_on(tmp_path: Path) -> None:
+    """Until it is asked the first time, the runner sends them at the machine's time."""
+    asked: list[int] = []
+
+    def are_complete(now: int, _: object) -> bool:
+        asked.append(now)
+        return True
+
+    with agent(tmp_path) as time:
+        driven = application(time)
+        driven.lines = cast(PrintedLines, SimpleNamespace(are_complete=are_complete))
+        driven.start(EPOCH, ())
+        assert asked == [EPOCH]
+        driven.show((), EPOCH)
+        driven.await_answer(EPOCH + STEP)
+    assert asked == [EPOCH, EPOCH]
 
 
 def test_a_destroyed_page_fails_the_application_and_an_agent_that_ends_does_not(tmp_path: Path) -> None:
