@@ -35,6 +35,8 @@ WALL_FACTOR = 10.0
 """How many times as long as it may compute a thread may take of wall time: others may have the processor."""
 EXPOSED_US = 1
 """How long after its sample time a picture is shown, so that the time of now is none of a picture."""
+GONE_S = 1.0
+"""Wall time in s that the runner has to end a test of which a service has ended."""
 LOOK_US = 10_000
 """Test time between looks whether an application waits for its first picture."""
 _NS = 1000
@@ -178,6 +180,7 @@ class RestingApplication:
         self._shown_at = self._until = 0
         self._taken_s = 0.0
         """What it has computed in this step."""
+        self._gone: frozenset[int] = frozenset()
 
     def facts(self) -> dict[str, Any]:
         """What the clock reports of the answers at the end."""
@@ -276,6 +279,7 @@ class RestingApplication:
         if report.now is None:
             return False
         self._tell(report)
+        self._await_runner(report.gone)
         spent_s = time.monotonic() - began
         self._taken_s += spent_s if report.has_ended else min(report.ran_s, spent_s)
         if report.now < until * _NS:
@@ -283,6 +287,13 @@ class RestingApplication:
         if not (has_lines := self._has_lines(until)):
             self._agent.run(until)
         return has_lines
+
+    def _await_runner(self, gone: frozenset[int]) -> None:
+        """Where a service has ended, the runner says whether the test goes on, before more of it passes."""
+        end = time.monotonic() + GONE_S * bool(gone - self._gone)
+        self._gone |= gone
+        while time.monotonic() < end and not self._stopped():
+            time.sleep(SLICE_S)
 
     def _has_lines(self, until: int) -> bool:
         """Whether all that it has printed in this step is taken, and it still rests."""

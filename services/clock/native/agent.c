@@ -318,17 +318,22 @@ static int add_notes(char *text, size_t size)
 
 static void report_time(void)
 {
-    char line[4000], services[512] = "", notes[2800] = "";
-    int length = 0;
-    for (unsigned at = 0; at < options.services; at++)
+    char line[4000], services[512] = "", gone[512] = "", notes[2600] = "";
+    int length = 0, gone_length = 0;
+    struct used used = processes_used();
+    uint64_t live = used.one_has_ended ? processes_services() : UINT64_MAX;
+    for (unsigned at = 0; at < options.services; at++) {
         if (has_begun[at])
             length += snprintf(services + length, sizeof services - (size_t)length, "%s%u", length ? ", " : "", at);
+        if (has_begun[at] && !(live >> at & 1))
+            gone_length += snprintf(gone + gone_length, sizeof gone - (size_t)gone_length, "%s%u", gone_length ? ", " : "", at);
+    }
     add_notes(notes, sizeof notes);
-    struct used used = processes_used();
     snprintf(line, sizeof line,
-             "{\"now\": %lld, \"services\": [%s], \"repeatable\": %s, \"ran_s\": %.9f, \"has_ended\": %s, \"notes\": [%s]}\n",
-             (long long)now_ns, services, is_repeatable ? "true" : "false", used.seconds, used.one_has_ended ? "true" : "false",
-             notes);
+             "{\"now\": %lld, \"services\": [%s], \"gone\": [%s], \"repeatable\": %s, \"ran_s\": %.9f, \"has_ended\": %s, "
+             "\"notes\": [%s]}\n",
+             (long long)now_ns, services, gone, is_repeatable ? "true" : "false", used.seconds,
+             used.one_has_ended ? "true" : "false", notes);
     reply(line);
 }
 

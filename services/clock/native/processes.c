@@ -253,6 +253,24 @@ static char state_of(const struct thread *each)
     return end && end[1] ? end[2] : 'X';
 }
 
+uint64_t processes_services(void)
+{
+    uint64_t found = 0;
+    for (int at = 0; at < thread_count; at++) {
+        char path[64], text[1 << 15];
+        if (threads[at].pid != threads[at].tid || strchr("ZXx", state_of(&threads[at])))
+            continue;
+        snprintf(path, sizeof path, "/proc/%d/environ", threads[at].pid);
+        int length = read_file(path, text, sizeof text);
+        if (length <= 0)
+            return UINT64_MAX; /* of another user */
+        for (int word = 0; word < length; word += (int)strlen(text + word) + 1)
+            if (!strncmp(text + word, "DODO_TIME_SERVICE=", 18))
+                found |= UINT64_C(1) << strtoul(text + word + 18, NULL, 10) % 64;
+    }
+    return found;
+}
+
 static bool sleeps(struct thread *each)
 {
     char state = state_of(each);
@@ -386,6 +404,7 @@ struct used processes_used(void)
     for (int at = 0; at < thread_count; at++) {
         struct timespec now;
         clockid_t clock;
+        used.one_has_ended |= threads[at].has_ended && threads[at].pid == threads[at].tid;
         if (threads[at].pid != threads[at].tid || clock_getcpuclockid(threads[at].pid, &clock) || clock_gettime(clock, &now))
             continue;
         uint64_t ns = (uint64_t)now.tv_sec * UINT64_C(1000000000) + (uint64_t)now.tv_nsec;

@@ -34,6 +34,8 @@ bool processes_are_quiet(bool *is_off);
 /* The thread that was found busy at last. */
 struct busy_thread processes_busy(void);
 struct used processes_used(void);
+/* The services, as bits by their numbers, that have a process; all bits where nobody may know. */
+uint64_t processes_services(void);
 /* Whether nothing of the application is left. */
 bool processes_have_ended(void);
 

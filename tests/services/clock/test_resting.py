@@ -245,6 +245,21 @@ def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
     assert 1e-6 < facts["worst_s"] < 9.0, "no more than passed on the wall"
 
 
+def test_where_a_service_has_ended_the_runner_has_time_to_end_the_test(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slept: list[float] = []
+    monkeypatch.setattr(resting, "GONE_S", 0.05)
+    monkeypatch.setattr(resting.time, "sleep", lambda seconds: slept.append(seconds))
+    with agent(tmp_path, lambda until: [reached(until, gone=[1])]) as time:
+        driven = application(time)
+        driven.start(EPOCH, ())
+        assert slept
+        slept.clear()
+        driven.await_answer(EPOCH + STEP)
+    assert slept == [], "once for each"
+
+
 class Cameras(Link):
     """Their pictures are awaited from the n-th time on at which they are asked."""
 
