@@ -43,8 +43,8 @@ class ProgramNote(msgspec.Struct):
 class Report(msgspec.Struct):
     """All threads wait at ``now`` (ns of test time), one of them is ``busy``, or the page of the time is ``destroyed``.
 
-    ``services`` are those that have had a process, ``gone`` those of them that have none any more. ``ran_s`` is what the
-    application computed since the last time, ``has_ended`` whether processes of it have ended meanwhile, whose last
+    ``services`` are those that have had a process, ``gone`` those of them that have none any more. ``ran_s`` is what
+    the application computed since the last time, ``has_ended`` whether processes of it have ended meanwhile, whose last
     part that lacks.
     """
 

@@ -250,7 +250,7 @@ def test_where_a_service_has_ended_the_runner_has_time_to_end_the_test(
 ) -> None:
     slept: list[float] = []
     monkeypatch.setattr(resting, "GONE_S", 0.05)
-    monkeypatch.setattr(resting.time, "sleep", lambda seconds: slept.append(seconds))
+    monkeypatch.setattr(resting.time, "sleep", slept.append)
     with agent(tmp_path, lambda until: [reached(until, gone=[1])]) as time:
         driven = application(time)
         driven.start(EPOCH, ())
