@@ -3,7 +3,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 
@@ -169,15 +168,14 @@ def test_waiting_ends_with_the_timeout(cid: int) -> None:
         assert time.monotonic() - start >= 0.05
 
 
-def test_messages_gather_behind_one_that_came(cid: int) -> None:
+def test_messages_gather_behind_one_that_came(cid: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
     with Session(cid) as session, Session(cid) as other:
+        monkeypatch.setattr(time, "sleep", lambda seconds: (slept.append(seconds), other.send(STEERING())))
         session.gather(0.05)
         other.send(STEERING())
-        assert session.receive(5.0) is not None
-        threading.Timer(0.001, other.send, [STEERING()]).start()
-        start = time.monotonic()
-        assert session.receive(5.0) is not None
-        assert time.monotonic() - start >= 0.05
+        assert session.receive(5.0) is not None and slept == []
+        assert session.receive(5.0) is not None and slept == [0.05]
 
 
 @pytest.mark.parametrize("cid_", [0, 255, -1])
