@@ -27,9 +27,7 @@ def build(context: Context) -> Service:
     if flags["time-folder"] and not os.environ.get("DODO_ANSWERS"):
         own_time = OwnTime(TimeAgent(Path(flags["time-folder"])), tuple(flags["application"]))
         context.resources.callback(own_time.agent.close)
-        with suppress(
-            ServiceSilent
-        ):  # the test's first step says so; the application, which starts later, finds it no more
+        with suppress(ServiceSilent):  # the first step says so; it is opened before an application could find it
             own_time.agent.open(lambda: False)
         answers = SentMessages(answers.filters)
     roles = Roles(*(tuple(flags[name]) for name in ("advance", "sense", "judge", "watch")))

@@ -4,7 +4,7 @@ import contextlib
 import os
 import re
 import tarfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +77,18 @@ def _reason(error: Exception) -> str:
     return str(error)
 
 
-def refusal(client: Any, service: str, image: str, entrypoint: Sequence[str], command: Sequence[str]) -> str:
-    """Why a container's first program cannot have the test's time, as ``application_time.refusal``."""
+def refusal(
+    client: Any,
+    service: str,
+    image: str,
+    entrypoint: Sequence[str],
+    command: Sequence[str],
+    variables: Mapping[str, str],
+) -> str:
+    """Why a container's first program cannot have the test's time, as ``application_time.refusal``.
+
+    ``entrypoint``, ``command`` and ``variables`` are the compose file's, in place of the image's or beside them.
+    """
     from docker.errors import NotFound
 
     config = client.images.get(image).attrs["Config"]
@@ -86,7 +96,7 @@ def refusal(client: Any, service: str, image: str, entrypoint: Sequence[str], co
         *(entrypoint or config.get("Entrypoint") or ()),
         *(command or (not entrypoint and config.get("Cmd")) or ()),
     ]
-    environment = dict(each.partition("=")[::2] for each in config.get("Env") or ())
+    environment = {**dict(each.partition("=")[::2] for each in config.get("Env") or ()), **variables}
     container = client.api.create_container(image, ["-"], entrypoint=["-"])["Id"]
 
     def look(path: Path) -> tuple[int, bytes] | None:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import functools
 import signal
 import threading
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -14,7 +13,7 @@ from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.model import FILES, SANDBOX
 from dodo_dsl.plan.added_services import RECORDER
 from dodo_dsl.plan.model import HEALTHY, READY_S
-from dodo_dsl.run.application_time import PAGE_DESTROYED
+from dodo_dsl.run.application_time import PAGE_DESTROYED, POSIX_MEMORY
 from dodo_dsl.run.docker import beside_processes, shared_files
 from dodo_dsl.run.docker.cleanup import PROJECT_LABEL, SERVICE_LABEL, take_down, writers
 from dodo_dsl.run.docker.client import TOO_SLOW, engine_error, refusal
@@ -116,18 +115,20 @@ class ContainerSide:
         for name, service in self._compose.services.items():
             given = (service.get("entrypoint"), service.get("command"))
             words = [opendlv_flags.split(w) if isinstance(w, str) else tuple(map(str, w or ())) for w in given]
-            look = functools.partial(self._refusal, name, service["image"], *words)
-            why = await self._pulls.once(f"program {service['image']} {words}", look)
+            own = service.get("environment") or {}
+            variables = {key: str(own[key]) for key in ("PATH", POSIX_MEMORY) if own.get(key)}
+            look = partial(self._refusal, name, service["image"], *words, variables)
+            why = await self._pulls.once(f"program {name} {service['image']} {words} {variables}", look)
             if why and not self._watched.by_answers:
                 self._watched.await_answers(why)
         self._compose.by_answers = self._watched.by_answers
 
-    async def _refusal(self, name: str, image: str, entrypoint: Sequence[str], command: Sequence[str]) -> str:
+    async def _refusal(self, *words: Any) -> str:
         from docker.errors import DockerException
 
         try:
-            return await asyncio.to_thread(refusal, self._client, name, image, entrypoint, command)
-        except (DockerException, OSError):  # what is wrong is said when it is started
+            return await asyncio.to_thread(refusal, self._client, *words)
+        except (DockerException, OSError):  # the clock names a service that never loads the library
             return ""
 
     async def _start_watching(self) -> None:
