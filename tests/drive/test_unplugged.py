@@ -56,7 +56,7 @@ class Pose(NamedTuple):
 
 
 class Hardware:
-    """The emulator with a port at ``path``; it lives until the end, whoever uses the port."""
+    """The emulator with a port at ``path``; it runs until the end of the block."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

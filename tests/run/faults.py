@@ -1,4 +1,4 @@
-"""The faults around a test that scripts cause, with what they lead to, each on the backends that may differ in it."""
+"""Faults that tests cause by a script, and the outcome of each on the backends where it may differ."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence

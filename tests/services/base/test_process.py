@@ -282,7 +282,7 @@ def test_each_line_with_its_severity(sessions: tuple[Session, Session]) -> None:
         log.warning("odd\nthing")
         log.error("x" * 2 * LONGEST)
         log.warning(LAST)
-    log.warning("nobody is told of this")
+    log.warning("this is not reported to the runner")
     assert logged(theirs) == [(7, "a detail"), (6, "a fact"), (4, "odd thing"), (3, "x" * LONGEST)]
     assert theirs.receive(0.0) is None
 

@@ -224,7 +224,7 @@ def test_copied_sample_times_are_counted() -> None:
 
 
 def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
-    """By the agent, but by the wall clock where a process has ended: nobody knows its last part."""
+    """By the agent; by the wall clock where a process has ended, whose last part is not known."""
     sent = SentMessages(filters([STEER], IDS))
     ran = iter([(0.5, False), (0.0, False), (0.0, False), *[(1e-6, False)] * 2, (9.0, False), (0.0, True)])
 
