@@ -56,12 +56,21 @@ class Port:
 
 @dataclass(frozen=True)
 class End:
-    """A port of a service; ``layer`` is "application" for one of the application's."""
+    """A port of a service; ``layer`` is "application" for one of the application's.
+
+    One that is ``instead`` stands for all others that the service requires of the application.
+    """
 
     service: str
     layer: str
     port: Port
     span: Span
+    instead: bool = False
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether it is a message that only the application could send."""
+        return self.port.kind == "message" and self.port.can_be_required
 
 
 @dataclass(frozen=True)
@@ -70,7 +79,8 @@ class Wiring:
 
     ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are the messages that
     they declare to complete a frame in lockstep, ``printed`` those that are lines of theirs. ``unsent`` are services
-    that may send anything by their manifests, and messages that they cannot send.
+    that may send anything by their manifests, and messages that they cannot send. ``alternatives`` are messages that
+    stand for others, consumed only if the application declares that it sends them.
     """
 
     produced: tuple[End, ...]
@@ -83,6 +93,7 @@ class Wiring:
     done: str = ""
     unsent: frozenset[tuple[str, str]] = frozenset()
     printed: tuple[End, ...] = ()
+    alternatives: tuple[End, ...] = ()
 
     def producers(self, port: Port) -> list[End]:
         """The test's services that produce what a port consumes."""
@@ -119,8 +130,23 @@ def wire(services: Iterable[ResolvedService], declared: Mapping[str, Declared | 
         kinds: tuple[tuple[Kind, Ports], ...] = (("message", service.messages), ("memory", manifest.memory))
         for kind, ports in kinds:
             produced += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, service, 0)]
-            consumed += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.inputs, service, None)]
-    return _with_application(Wiring(tuple(produced), tuple(consumed)), declared)
+            inputs = _ports(kind, ports.inputs, service, None)
+            consumed += [End(use.name, use.layer, p, use.span, p.name in manifest.instead) for p in inputs]
+    return _with_alternatives(_with_application(Wiring(tuple(produced), tuple(consumed)), declared))
+
+
+def _with_alternatives(wiring: Wiring) -> Wiring:
+    """Without alternatives that the application does not declare; what those that it declares stand for is optional."""
+    sent = [end.port for end in wiring.application_produces]
+    alternatives = tuple(end for end in wiring.consumed if end.instead)
+    declared = {end for end in alternatives if any(map(end.port.consumes, sent))}
+    freed = {end.service for end in declared}
+    consumed = (
+        replace(end, port=replace(end.port, optional=True)) if end.service in freed and end.is_asked else end
+        for end in wiring.consumed
+        if not end.instead or end in declared
+    )
+    return replace(wiring, consumed=tuple(consumed), alternatives=alternatives)
 
 
 def _ports(kind: Kind, written: Sequence[str], service: ResolvedService, stamp: int | None) -> Iterator[Port]:

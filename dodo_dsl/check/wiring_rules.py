@@ -60,7 +60,9 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
-        hint = "list it under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
+        others = [str(each.port) for each in wiring.alternatives if each.service == end.service]
+        what = ", or ".join(["list it", *(f"{other} instead" for other in others)]) + "," * bool(others)
+        hint = f"{what} under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
         hint = _who_could(context, wiring, end)

@@ -184,19 +184,22 @@ def _shown(ends: Iterable[End]) -> list[str]:
 
 
 def _asked(wiring: Wiring) -> Iterator[dict[str, Any]]:
-    """What the application must produce, or may produce if it is not required."""
+    """What the application must produce, or may produce if it is not required; alternatives come last."""
     by_port: dict[tuple[str, str], list[End]] = {}
-    for end in wiring.required():
+    for end in (*(e for e in wiring.required() if not e.instead), *wiring.alternatives):
         if end.port.can_be_required:
             by_port.setdefault((end.port.kind, str(end.port)), []).append(end)
     for (kind, name), ends in by_port.items():
         declared = (end.service for end in wiring.application_produces if ends[0].port.consumes(end.port))
         required = any(not end.port.optional for end in ends)
+        services = {end.service for end in ends if end.instead}
+        others = (e.port for e in wiring.consumed if e.service in services and e.is_asked and not e.instead)
         yield {
             "kind": kind,
             "port": name,
             "needed_by": [end.service for end in ends],
             "required": required,
+            "instead_of": list(dict.fromkeys(map(str, others))),
             "declared_by": list(dict.fromkeys(declared)),
         }
 
@@ -252,7 +255,7 @@ def _wiring(one: Explanation) -> str:
     parts = ["producers and consumers\n" + _table(rows, "  ")]
     for title, required in (("the application must provide", True), ("the application may provide", False)):
         wanted = [each for each in one["asked"] if each["required"] is required]
-        rows = [[_port(each), f"to {', '.join(each['needed_by'])}", _declared(each, one)] for each in wanted]
+        rows = [[_port(each), _needed(each), _declared(each, one)] for each in wanted]
         parts += [f"{title}\n" + _table(rows, "  ")] if rows else []
     words = told_in_words(one["told"])
     return "\n".join([*parts, f"{words}\n"] if words else parts)
@@ -260,6 +263,11 @@ def _wiring(one: Explanation) -> str:
 
 def _port(line: dict[str, Any]) -> str:
     return f"memory {line['port']}" if line["kind"] == "memory" else str(line["port"])
+
+
+def _needed(asked: dict[str, Any]) -> str:
+    instead = f", instead of {' and '.join(asked['instead_of'])}" if asked["instead_of"] else ""
+    return f"to {', '.join(asked['needed_by'])}{instead}"
 
 
 def _declared(asked: dict[str, Any], one: Explanation) -> str:

@@ -188,7 +188,8 @@ class Manifest:
 
     A test gives at least one parameter of each group in ``one_of``. ``checks`` are the units of an evaluator's checks
     by patterns of their names, empty if it does not declare them. ``messages`` are those that it has whatever its
-    parameters are, ``cases`` the others. DoDo adds an ``automatic`` one to tests itself.
+    parameters are, ``cases`` the others; an application that sends one of ``instead`` need not send what else it
+    requires. DoDo adds an ``automatic`` one to tests itself.
     """
 
     folder: Path
@@ -205,6 +206,7 @@ class Manifest:
     one_of: tuple[tuple[str, ...], ...] = ()
     checks: dict[str, str] = field(default_factory=dict)
     cases: tuple[Case, ...] = ()
+    instead: tuple[str, ...] = ()
     automatic: bool = False
 
     def messages_with(self, texts: Map[str, str]) -> Ports:
@@ -251,7 +253,9 @@ def _manifest(folder: Path, raw: dict[str, Any]) -> Manifest:
     parameters = {name: _read(name, about) for name, about in raw.pop("parameters", {}).items()}
     cases = tuple(Case(_when(case["when"]), _ports(case)) for case in messages.get("cases", ()))
     facts = {key.replace("-", "_"): _fixed(value) for key, value in raw.items()}
-    return Manifest(folder, **facts, parameters=parameters, messages=_ports(messages), memory=memory, cases=cases)
+    facts |= {"parameters": parameters, "memory": memory, "cases": cases, "instead": tuple(messages.get("instead", ()))}
+    ports = _ports(messages) + Ports(tuple(f"{name}?" for name in facts["instead"]))
+    return Manifest(folder, **facts, messages=ports)
 
 
 def _fixed(value: Any) -> Any:

@@ -43,11 +43,19 @@ class TwoWheels:
     """Share by which the right wheel turns faster than the left one with the same request"""
     friction: float
     """Coefficient between wheels and ground"""
+    slip: float = 0.0
+    """Share of what the wheels roll that the body does not move"""
+    max_speed: float = math.inf
+    """m/s, of a request of motion"""
+    max_yaw_rate: float = math.inf
+    """rad/s, of a request of motion"""
+    max_acceleration: float = math.inf
+    """m/s2, of a wheel on the ground"""
 
 
 @dataclass
 class DifferentialDrive:
-    """Two wheels by pedals, or by angular velocities with ``by_axle``."""
+    """Two wheels by pedals, or by angular velocities with ``by_axle``; by requests of motion always."""
 
     car: TwoWheels
     by_axle: bool = False
@@ -64,7 +72,18 @@ class DifferentialDrive:
         """The speed in rad/s at which the wheel will turn, for a pedal or an angular velocity in rad/s."""
         top = self.car.top_wheel_speed * self.power
         speed = limited(request, top) if self.by_axle else top * self._beyond_dead_zone(limited(request, 1.0))
-        return speed * (1 + (self.car.wheel_offset if actuator == RIGHT else -self.car.wheel_offset) / 2)
+        return self._uneven(actuator, speed)
+
+    def following(self, motion: BodyMotion) -> Mapping[str, float]:
+        """The wheels' speeds in rad/s; where one would be too fast, both are slower, and the radius stays."""
+        car, top = self.car, self.car.top_wheel_speed * self.power
+        vx, rim = limited(motion.vx, car.max_speed), limited(motion.yaw_rate, car.max_yaw_rate) * car.track / 2
+        wheels = {LEFT: (vx - rim) / car.wheel_radius, RIGHT: (vx + rim) / car.wheel_radius}
+        share = min(1.0, top / max(map(abs, (top, *wheels.values()))))
+        return {name: self._uneven(name, speed * share) for name, speed in wheels.items()}
+
+    def _uneven(self, wheel: str, speed: float) -> float:
+        return speed * (1 + (self.car.wheel_offset if wheel == RIGHT else -self.car.wheel_offset) / 2)
 
     def _beyond_dead_zone(self, pedal: float) -> float:
         dead = self.car.dead_zone
@@ -73,10 +92,12 @@ class DifferentialDrive:
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         car = self.car
         share = -math.expm1(-dt / car.motor_lag) if car.motor_lag > 0 else 1.0
-        self.left += share * (asked[LEFT] - self.left)
-        self.right += share * (asked[RIGHT] - self.right)
-        rolling = car.wheel_radius * (self.left + self.right) / 2
-        turning = car.wheel_radius * (self.right - self.left) / car.track
+        most = car.max_acceleration * dt / car.wheel_radius
+        self.left += limited(share * (asked[LEFT] - self.left), most)
+        self.right += limited(share * (asked[RIGHT] - self.right), most)
+        radius = car.wheel_radius * (1 - car.slip)
+        rolling = radius * (self.left + self.right) / 2
+        turning = radius * (self.right - self.left) / car.track
         ground = car.friction * GRAVITY
         if abs(motion.vx * turning) > ground:
             turning = math.copysign(ground / abs(motion.vx), turning)
@@ -144,7 +165,10 @@ _SETTLING = 0.05
 
 @dataclass
 class BicycleDrive:
-    """A car by steering and speed, or by steering and acceleration unless it is ``by_speed``."""
+    """A car by steering and speed, or by steering and acceleration unless it is ``by_speed``.
+
+    By requests of motion it has steering and speed.
+    """
 
     car: SingleTrack
     has_tyres: bool = False
@@ -166,6 +190,12 @@ class BicycleDrive:
         if actuator == STEERING:
             return limited(request, self.car.max_steering) + self.offset
         return limited(request, self.car.top_speed) if self.by_speed else request
+
+    def following(self, motion: BodyMotion) -> Mapping[str, float]:
+        """The speed, and the angle of the wheel that rolls on the circle; a car that stands cannot turn."""
+        vx = limited(motion.vx, self.car.top_speed)
+        wheel = math.atan(self.car.wheel_base * motion.yaw_rate / vx) if vx else 0.0
+        return {SPEED: vx, STEERING: limited(wheel, self.car.max_steering) + self.offset}
 
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         steps = self._steps(motion.vx, dt) if self.has_tyres else 1
@@ -189,14 +219,16 @@ class BicycleDrive:
 
     def _step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         """One step of the Runge-Kutta method of fourth order; the wheel turns meanwhile."""
-        driving, angles = asked[self._driving], [self._turned(asked[STEERING], part * dt) for part in (0.0, 0.5, 1.0)]
-        first = self._derivative(motion, angles[0], driving)
-        second = self._derivative(_moved(motion, first, dt / 2), angles[1], driving)
-        third = self._derivative(_moved(motion, second, dt / 2), angles[1], driving)
-        fourth = self._derivative(_moved(motion, third, dt), angles[2], driving)
+        by_speed = SPEED in asked
+        driving = asked[SPEED if by_speed else ACCELERATION]
+        angles = [self._turned(asked[STEERING], part * dt) for part in (0.0, 0.5, 1.0)]
+        first = self._derivative(motion, angles[0], driving, by_speed)
+        second = self._derivative(_moved(motion, first, dt / 2), angles[1], driving, by_speed)
+        third = self._derivative(_moved(motion, second, dt / 2), angles[1], driving, by_speed)
+        fourth = self._derivative(_moved(motion, third, dt), angles[2], driving, by_speed)
         mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(first, second, third, fourth, strict=True)]
         self.wheel, moved = angles[2], _moved(motion, mean, dt)
-        if not self.by_speed:  # brakes end at a standstill
+        if not by_speed:  # brakes end at a standstill
             moved = BodyMotion(limited(max(moved.vx, 0.0), self.car.top_speed), moved.vy, moved.yaw_rate)
         return moved if self.has_tyres else self._rolling(moved.vx, self.wheel)
 
@@ -211,16 +243,18 @@ class BicycleDrive:
             yaw_rate = math.copysign(self.car.friction * GRAVITY / abs(vx), yaw_rate)
         return BodyMotion(vx, self.car.rear * yaw_rate, yaw_rate)
 
-    def _acceleration(self, vx: float, driving: float) -> float:
+    def _acceleration(self, vx: float, driving: float, by_speed: bool) -> float:
         """Along the body, in m/s2, as motor, brakes and friction give it."""
-        asked = (driving - vx) / self.car.speed_lag if self.by_speed else driving
-        pushes = asked * vx >= 0 and not (asked < 0 and not self.by_speed)
+        asked = (driving - vx) / self.car.speed_lag if by_speed else driving
+        pushes = asked * vx >= 0 and not (asked < 0 and not by_speed)
         most = self.car.max_acceleration if pushes else self.car.max_braking
         given = limited(asked, most) * (self.power if pushes else 1.0)
         return limited(given, self.car.friction * GRAVITY)
 
-    def _derivative(self, motion: BodyMotion, wheel: float, driving: float) -> tuple[float, float, float]:
-        along = self._acceleration(motion.vx, driving)
+    def _derivative(
+        self, motion: BodyMotion, wheel: float, driving: float, by_speed: bool
+    ) -> tuple[float, float, float]:
+        along = self._acceleration(motion.vx, driving, by_speed)
         if not self.has_tyres:
             return along, 0.0, 0.0
         rolling = self._rolling(motion.vx, wheel)

@@ -109,6 +109,9 @@ class Drive(Protocol):
     def accepted(self, actuator: str, request: float) -> float:
         """What an actuator makes of a request: scaled and limited."""
 
+    def following(self, motion: BodyMotion) -> Mapping[str, float]:
+        """What its actuators are asked for so that the body moves so, as far as the drive can."""
+
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         """The motion `dt` seconds later, with the actuators asked for the same all the time."""
 
@@ -153,6 +156,18 @@ class KiwiDrive:
             return wheel_angle(request, self.car) + self.offset
         return pedal_position(request, self.car)
 
+    def following(self, motion: BodyMotion) -> Mapping[str, float]:
+        """The pedal that holds the speed, and the wheel's angle of a steady turn."""
+        car = self.car
+        gain = car.gain_forward if motion.vx > 0 else car.gain_reverse
+        pedal = pedal_position(car.resistance * motion.vx / gain, car) if gain else 0.0
+        vx = gain * pedal / car.resistance
+        base = car.front + car.rear
+        gradient = car.mass * (car.rear / car.cornering_front - car.front / car.cornering_rear) / base
+        wheel = motion.yaw_rate * (base + gradient * vx * abs(vx)) / abs(vx) if vx else 0.0
+        wheel = max(-car.steering_limit, min(car.steering_limit, wheel))
+        return {STEERING: wheel + self.offset, PEDAL: pedal}
+
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         return step(motion, asked[STEERING], asked[PEDAL], dt, self.car)
 
@@ -172,21 +187,38 @@ class Vehicle:
         self.car = condition.of(car)
         self.drive: Drive = drive or KiwiDrive(self.car, condition.steering_offset)
         self._latency = round(condition.latency * MICROSECONDS)
-        self._coming: deque[tuple[int, str, float]] = deque()
-        """When a request takes effect (us), and what it asks of which actuator."""
+        self._coming: deque[tuple[int, bool, Mapping[str, float]]] = deque()
+        """When a request takes effect (us), whether it is one of motion, and what it asks of which actuators."""
         self._asked = dict(self.drive.rest)
+        self._follows = False
+        """Whether the last request was one of motion."""
         self._now: int | None = None
 
     def request(self, actuator: str, value: float) -> bool:
         """Take a request to an actuator of the drive; False, and nothing changes, when it is not finite."""
         if not math.isfinite(value):
             return False
-        accepted = self.drive.accepted(actuator, value)
-        if self._latency and self._now is not None:
-            self._coming.append((self._now + self._latency, actuator, accepted))
-        else:
-            self._asked[actuator] = accepted
+        self._take(False, {actuator: self.drive.accepted(actuator, value)})
         return True
+
+    def follow(self, motion: BodyMotion) -> bool:
+        """Take a request of motion for all actuators; False, and nothing changes, when it is not finite."""
+        if not all(map(math.isfinite, (motion.vx, motion.vy, motion.yaw_rate))):
+            return False
+        self._take(True, self.drive.following(motion))
+        return True
+
+    def _take(self, is_motion: bool, accepted: Mapping[str, float]) -> None:
+        if self._latency and self._now is not None:
+            self._coming.append((self._now + self._latency, is_motion, accepted))
+        else:
+            self._ask(is_motion, accepted)
+
+    def _ask(self, is_motion: bool, accepted: Mapping[str, float]) -> None:
+        """Of the two kinds the last one counts: nothing is left of what the other asked for."""
+        if is_motion != self._follows:
+            self._asked, self._follows = dict(self.drive.rest), is_motion
+        self._asked.update(accepted)
 
     def steer(self, request: float) -> bool:
         """Take a ground steering request in rad."""
@@ -206,7 +238,7 @@ class Vehicle:
         self.motion = BodyMotion()
         self._coming.clear()
         self.drive.reset()
-        self._asked = dict(self.drive.rest)
+        self._asked, self._follows = dict(self.drive.rest), False
 
     def update(self, now: int) -> BodyMotion:
         """Advance to `now` (microseconds) with the requests held; the first call only takes the time.
@@ -217,10 +249,10 @@ class Vehicle:
         if elapsed < 0:
             raise ValueError(f"time ran backwards by {-elapsed} us")
         while self._coming and self._coming[0][0] <= now:
-            due, actuator, accepted = self._coming.popleft()
+            due, is_motion, accepted = self._coming.popleft()
             self._advance(due - (now - elapsed))
             elapsed = now - due
-            self._asked[actuator] = accepted
+            self._ask(is_motion, accepted)
         self._advance(elapsed)
         self._now = now
         if not math.isfinite(self.motion.vx + self.motion.vy + self.motion.yaw_rate):

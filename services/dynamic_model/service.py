@@ -17,14 +17,17 @@ from services.dynamic_model.drives import (
     SingleTrack,
     TwoWheels,
 )
-from services.dynamic_model.model import PEDAL, STEERING, Condition, Drive, Vehicle
+from services.dynamic_model.model import PEDAL, STEERING, BodyMotion, Condition, Drive, Vehicle
 
 RESET = "reset"
+_CAR_ACCELERATION = 3.5
+"""m/s2, of a bicycle by default."""
 _PEDAL = ("opendlv.proxy.PedalPositionRequest", "position")
 _AXLE = ("opendlv.proxy.AxleAngularVelocityRequest", "axleAngularVelocity")
 _STEERING = ("opendlv.proxy.GroundSteeringRequest", "groundSteering")
 _SPEED = ("opendlv.proxy.GroundSpeedRequest", "groundSpeed")
 _ACCELERATION = ("opendlv.proxy.GroundAccelerationRequest", "groundAcceleration")
+_MOTION = "opendlv.proxy.GroundMotionRequest"
 _YAW_RATE = "opendlv.proxy.AngularVelocityReading"
 
 
@@ -42,7 +45,9 @@ class DynamicModel(Service):
         car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
         drive = _drive(flags, condition)
         self.vehicle = Vehicle(car, condition, drive)
-        self.inputs = {**self._requests(flags), ("opendlv.sim.Command", None): self._command}
+        own = {(_MOTION, None): self._follow, ("opendlv.sim.Command", None): self._command}
+        self.inputs = {**self._requests(flags), **own}
+        self._moves_sideways = False
         self._state = context.messages.type("opendlv.sim.KinematicState")
         self._frame_id = flags["frame-id"]
         self._yaw_rate_id: int | None = flags["yaw-rate-id"] if flags["odometry"] else None
@@ -77,6 +82,14 @@ class DynamicModel(Service):
 
         return take
 
+    def _follow(self, message: Any, _sample_time: int) -> None:
+        motion = BodyMotion(message.vx, message.vy, message.yawRate)
+        if not self.vehicle.follow(motion):
+            self._log.warning("ignored a GroundMotionRequest of %s, %s, %s", motion.vx, motion.vy, motion.yaw_rate)
+        elif motion.vy and not self._moves_sideways:
+            self._moves_sideways = True
+            self._log.warning("no drive moves sideways: vy of %g m/s, and of all others, has no effect", motion.vy)
+
     def _command(self, message: Any, _sample_time: int) -> None:
         if message.command == RESET:
             self.vehicle.reset()
@@ -95,6 +108,10 @@ def _drive(flags: Flags, condition: Condition) -> Drive | None:
             axle_offset=flags["axle-offset"],
             wheel_offset=flags["wheel-offset"],
             friction=friction,
+            slip=flags["slip"],
+            max_speed=flags["max-speed"],
+            max_yaw_rate=math.radians(flags["max-yaw-rate"]),
+            max_acceleration=flags["max-acceleration"] or math.inf,
         )
         return DifferentialDrive(wheels, flags["wheel-input"] == "axle", condition.power)
     if flags["drive"] != "bicycle":
@@ -110,7 +127,7 @@ def _drive(flags: Flags, condition: Condition) -> Drive | None:
         max_steering=math.radians(flags["max-steering"]),
         steering_rate=math.radians(flags["steering-rate"]),
         speed_lag=flags["speed-lag"],
-        max_acceleration=flags["max-acceleration"],
+        max_acceleration=flags["max-acceleration"] or _CAR_ACCELERATION,
         max_braking=flags["max-braking"],
         top_speed=flags["top-speed"],
         blend_speed=flags["blend-speed"],

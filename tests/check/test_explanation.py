@@ -50,6 +50,11 @@ services:
       lines: [{match: 'steer (?P<groundSteering>.+)', message: opendlv.proxy.GroundSteeringRequest}]
       out: [opendlv.proxy.PedalPositionRequest]
 """
+MOTION = """\
+# docker-compose.yml
+services:
+  driver: {image: driver, command: --cid=111, x-dodo: {out: [opendlv.proxy.GroundMotionRequest]}}
+"""
 VARY = """\
 vary:
   yaw: {from: 80 deg, to: 100 deg, nominal: 90 deg}
@@ -65,6 +70,7 @@ CASES = {
     "variables": VARIABLES,
     "declared": DECLARED,
     "printed": PRINTED,
+    "motion": MOTION,
 }
 
 

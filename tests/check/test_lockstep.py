@@ -18,8 +18,9 @@ from dodo_dsl.check.wiring import (
     rates_fit,
     step_hz,
 )
+from dodo_dsl.check.wiring_rules import check_producers
 from dodo_dsl.diagnostics import Span
-from tests.check.contexts import resolved
+from tests.check.contexts import context, resolved
 
 STEERING, PEDAL = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.PedalPositionRequest"
 
@@ -72,6 +73,29 @@ services:
     wiring = resolved(example, tmp_path).wiring
     assert answers(wiring) == [PEDAL]
     assert other_inputs(wiring) == [STEERING]
+
+
+MOTION = "opendlv.proxy.GroundMotionRequest"
+
+
+@pytest.mark.parametrize(
+    ("sent", "driving"),
+    [
+        ([MOTION], [MOTION]),
+        ([STEERING, PEDAL], [STEERING, PEDAL]),
+        ([STEERING, MOTION], [MOTION, STEERING]),
+        ([f"{MOTION}/3"], [MOTION]),
+        (["opendlv.proxy.GroundSpeedRequest"], [STEERING, PEDAL]),
+    ],
+)
+def test_one_message_stands_for_others(sent: list[str], driving: list[str], tmp_path: Path) -> None:
+    """Where the application declares it: nothing else is required of it then, nor does it complete an answer."""
+    compose = f"services: {{driver: {{image: driver, command: --cid=1, x-dodo: {{out: {sent}}}}}}}\n"
+    test = context(f"# docker-compose.yml\n{compose}", tmp_path)
+    assert answers(test.wiring) == driving
+    missing = [d.message.split()[2].rstrip(",") for d in check_producers(test) if "'vehicle'" in d.message]
+    assert missing == ([] if {MOTION, STEERING, f"{MOTION}/3"} & {*sent} else driving)
+    assert all(f", or {MOTION} instead, under x-dodo.out" in d.hint for d in check_producers(test) if missing)
 
 
 def test_what_is_judged_comes_last() -> None:
