@@ -55,6 +55,14 @@ struct attempt {
     bool is_begun;
 };
 
+/* Another thread has shut it down: a datagram socket then says at once to one that waits that it has 0 bytes. */
+static bool is_shut(int file)
+{
+    struct pollfd waited = {.fd = file, .events = POLLRDHUP};
+    struct timespec none = {0, 0};
+    return raw(SYS_ppoll, (long)&waited, 1, (long)&none, 0, 8, 0) > 0 && waited.revents & POLLRDHUP;
+}
+
 /* Whether to try again after `result`, which is then replaced by the error if not. */
 static bool tries_again(struct attempt *attempt, long *result)
 {
@@ -67,6 +75,9 @@ static bool tries_again(struct attempt *attempt, long *result)
         }
         attempt->is_begun = true;
         attempt->deadline_ns = deadline_of(attempt->file, attempt->events == POLLIN ? SO_RCVTIMEO : SO_SNDTIMEO);
+    } else if (attempt->events == POLLIN && is_shut(attempt->file)) {
+        *result = 0;
+        return false;
     }
     int error = await_file(attempt->file, attempt->events, attempt->deadline_ns);
     *result = error == ETIMEDOUT ? -EAGAIN : -error;

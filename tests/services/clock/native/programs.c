@@ -260,6 +260,13 @@ static void files(void)
     say("nothing", poll(NULL, 0, 10));
 }
 
+static void *shut_later(void *file)
+{
+    usleep(10000);
+    shutdown(*(int *)file, SHUT_RDWR);
+    return NULL;
+}
+
 static void datagrams(void)
 {
     struct sockaddr_in here = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
@@ -274,6 +281,8 @@ static void datagrams(void)
     say("got", recvfrom(in, &byte, 1, 0, NULL, NULL));
     say("stamped", ioctl(in, SIOCGSTAMP, &stamp));
     say("then", (long)(stamp.tv_sec * 1000 + stamp.tv_usec / 1000 - 1699999990000));
+    in_thread(shut_later, &in);
+    say("shut", recvfrom(in, &byte, 1, 0, NULL, NULL));
 }
 
 static mqd_t queue;

@@ -22,7 +22,7 @@ WAITS = {
     ),
     "queues": ("timed -1 at 20, received 1 at 30, sent 0 at 30, full -1 at 50, epoll 0 at 70, select 0 at 90"),
     "numbers": "fclose 0 at 0, dup 100000 at 0, dup2 0 at 0, range 0 at 0, timer 1 at 10",
-    "datagrams": "sent 1 at 7, got 1 at 7, stamped 0 at 7, then 7 at 7",
+    "datagrams": "sent 1 at 7, got 1 at 7, stamped 0 at 7, then 7 at 7, shut 0 at 17",
     "timers": (
         "read 8 at 15, count 1 at 15, left 5000 at 40, read 8 at 40, count 2 at 40, signal 14 at 60, sleep -1 at 60, "
         "create 0 at 60, signal 14 at 65, pause -1 at 65"
