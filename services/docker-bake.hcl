@@ -54,6 +54,7 @@ target "service" {
       { name = "rec-recorder", stage = "vision" },
       { name = "rec-replay", stage = "vision" },
       { name = "responds", stage = "geometry" },
+      { name = "ros-bridge", stage = "ros" },
       { name = "sandbox", stage = "base" },
       { name = "virtual-camera", stage = "vision" },
     ]

@@ -13,7 +13,7 @@ from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.diagnostics import did_you_mean, has_errors, shown_path
 from dodo_dsl.images import build_context, docker_command
 from dodo_dsl.images.docker_command import DockerError
-from dodo_dsl.images.names import BASE_ARGUMENT, DODO, PLATFORM, Series, base_of, dockerfiles, known
+from dodo_dsl.images.names import BASE_ARGUMENT, DODO, PLATFORM, Series, base_of, dockerfiles, is_for, known
 from dodo_dsl.spec.deployment import Deployment, build_command
 from dodo_dsl.spec.manifest import load_manifests
 
@@ -97,7 +97,7 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         return Exit.OK
     files = {name: _dockerfile(name, own[name], series) for name in names if name in own}
     for one in series.each(options.platform):
-        if of_dodo := [name for name in names if name not in own]:
+        if of_dodo := [name for name in names if name not in own and (options.name or is_for(name, one.platform))]:
             _build(options, of_dodo, one, stdout)
         for name, file in files.items():
             _build_own(name, file, one, stdout)

@@ -18,6 +18,7 @@ from dodo_dsl.images import docker_command
 BAKE = "services/docker-bake.hcl"
 LOCK = "locks/base.txt"
 """Versions of all packages, with the hashes of their wheels."""
+_EXTRAS, _OF_ROS, _LOCKED = "locks/extras.txt", "services/requirements/ros.txt", "services/requirements/locked"
 _DOCKERFILE = "services/Dockerfile"
 _PARTS = ("build/firmware", "build/time", "locks", "schemas", "services", "templates", "tests_registry")
 """What a checkout has beside the package. The emulated rig, and what gives the test's time, may not be built."""
@@ -87,15 +88,23 @@ def cache_folder() -> Path:
 
 
 def provide_wheels(python: Python, cache: Path) -> Path:
-    """A folder with a wheel for each package of the lock and nothing else, all with its hashes; raises WheelsError.
+    """A folder with a wheel for each package of the images and nothing else, all with its hashes; raises WheelsError.
 
     It is named after the lock, and appears only when it is complete.
     """
-    lock = package_data.root() / LOCK
-    folder = cache / hashlib.sha256(repr(python).encode() + lock.read_bytes()).hexdigest()[:16]
+    root = package_data.root()
+    locks = [(root / LOCK).read_text()]
+    if python.machine == "x86_64":
+        words = ("sh", root / _LOCKED, root / _OF_ROS, root / LOCK, root / _EXTRAS)
+        locks.append(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
+    folder = cache / hashlib.sha256((repr(python) + "".join(locks)).encode()).hexdigest()[:16]
     if not folder.is_dir():
         with contextlib.suppress(FileExistsError), atomic.new_folder(folder) as part:  # another build may be faster
-            _download(python, lock, part)
+            for number, lock in enumerate(locks):
+                file = part / f"{number}.lock"
+                file.write_text(lock)
+                _download(python, file, part)
+                file.unlink()
     return folder
 
 

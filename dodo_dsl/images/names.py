@@ -7,10 +7,13 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from platform import machine
 
 from dodo_dsl.spec.manifest import Manifest
 
 SANDBOX = "sandbox"
+_FOR_X86 = ("ros-bridge",)
+"""Those without what they need for other machines: there are no wheels of cyclonedds."""
 SHARED = ("base", "geometry", "vision")
 """What applications and services may use as base images."""
 DODO = "dodo"
@@ -43,11 +46,16 @@ class Series:
 
 
 def known(manifests: Iterable[Manifest]) -> tuple[str, ...]:
-    """The images of DoDo's: the sandbox, those of services, and those for applications.
+    """The images of DoDo's: the sandbox, those of services and of the ROS bridge, and those for applications.
 
     A manifest with a complete reference (``registry.example.org/team/radar:1``) uses an image from elsewhere.
     """
-    return (*SHARED, *sorted({SANDBOX, *(m.image for m in manifests if m.has_own_image)}))
+    return (*SHARED, *sorted({SANDBOX, *_FOR_X86, *(m.image for m in manifests if m.has_own_image)}))
+
+
+def is_for(name: str, platform: str) -> bool:
+    """Whether an image of DoDo's can be built for a platform, or for this machine without one."""
+    return name not in _FOR_X86 or (platform or machine()) in ("linux/amd64", "x86_64", "AMD64")
 
 
 def dockerfiles(manifests: Iterable[Manifest], shipped: Collection[str]) -> dict[str, Path | None]:
