@@ -137,12 +137,13 @@ def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
     if application.cid is not None:
         return
     without = [service for service in services if not slips[service.name] and not takes_cid(service)]
-    if len(without) == len(services):
+    if len(without) == len(services) and not application.speaks_ros:
         message = "no service takes a CID (--cid=, CID or OD4SESSION_CID), so every test runs with the built-in one"
         yield Diagnostic(without[0].span, "application-cid", message, _GIVE_CID, "warning")
         return
     for service in without:
-        if service.declared and (service.declared.inputs or service.declared.outputs):
+        own = service.declared
+        if own and not own.topics and (own.inputs or own.outputs):
             message = f"'{service.name}' has messages, but takes no CID (--cid=, CID or OD4SESSION_CID)"
             yield Diagnostic(service.span, "application-cid", message, _GIVE_CID, "warning")
 

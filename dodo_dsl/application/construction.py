@@ -41,7 +41,8 @@ class Setting:
 
     ``waits`` are the services of DoDo after which the application starts. Devices stay only with ``hil``, privileges
     only with ``privileged_allowed`` as well. ``limits`` is what a service gets that sets none, and ``given`` are
-    variables that the test sets. With a ``time_seed``, the application's own time is the test's.
+    variables that the test sets. With a ``time_seed``, the application's own time is the test's. ``bridge`` is the
+    image of what stands between the bus and the application's ROS graph, with its flags.
     """
 
     cid: int
@@ -53,6 +54,7 @@ class Setting:
     limits: SandboxLimits = field(default_factory=SandboxLimits)
     given: tuple[tuple[str, str], ...] = ()
     time_seed: int | None = None
+    bridge: tuple[str, ...] = ()
 
     @property
     def own_network(self) -> bool:

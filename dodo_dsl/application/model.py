@@ -16,6 +16,7 @@ from dodo_dsl.application.host_paths import HostPaths, repository
 from dodo_dsl.application.interpolation import literal
 from dodo_dsl.application.merge import NAMESPACES
 from dodo_dsl.application.opendlv_flags import split
+from dodo_dsl.application.ros_topics import RosTopic, Word, ros_topics
 from dodo_dsl.diagnostics import Diagnostic, Span
 from dodo_dsl.source import Node, Scalar
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
@@ -30,8 +31,6 @@ COMMANDS = ("x-dodo-process", "entrypoint", "command")
 _FALSE = ("false", "f", "0", "no", "n", "off", "")
 
 _ABOUT_NO_MESSAGES = {"tune", "cid", "display", "timed"}
-
-Word = tuple[str, Span]
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class PrintedLine:
 class Declared:
     """``x-dodo`` of a service; a message is ``name`` or ``name/senderStamp`` with its place. ``readers`` may be 0.
 
-    ``outputs`` are also those of ``lines``.
+    ``outputs`` are also those of ``lines``, and what topics of ``ros`` become.
     """
 
     inputs: tuple[Word, ...]
@@ -84,6 +83,7 @@ class Declared:
     readers: int
     span: Span
     lines: tuple[PrintedLine, ...] = ()
+    topics: tuple[RosTopic, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -209,8 +209,16 @@ class ApplicationSource:
 
     @property
     def declared(self) -> Mapping[str, Declared | None]:
-        """The declarations of each service, by its name."""
-        return {name: service.declared for name, service in self.services.items()}
+        """The declarations of each service, by its name; those of nodes without topics are empty."""
+        return {
+            name: service.declared or (Declared((), (), (), None, 0, service.span) if self.speaks_ros else None)
+            for name, service in self.services.items()
+        }
+
+    @property
+    def speaks_ros(self) -> bool:
+        """Whether services of it are ROS 2 nodes, so that it has the bridge beside them."""
+        return any(service.declared and service.declared.topics for service in self.services.values())
 
 
 def is_true(value: object) -> bool:
@@ -289,9 +297,12 @@ def declared(service: source.Mapping) -> Declared | None:
     readers = entry.value.get("readers")
     count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 0
     lines = tuple(printed_lines(entry.value.get("lines")))
+    topics = ros_topics(entry.value.get("ros"))
+    outputs += tuple(word for topic in topics if not topic.given for word in topic.messages)
     sent = {name.removesuffix("/0") for name, _ in outputs}
     printed = {line.port: (line.port, line.message_span) for line in lines if line.port not in sent}
-    return Declared(inputs, (*outputs, *printed.values()), answers, done[0] if done else None, count, entry.key, lines)
+    outputs += tuple(printed.values())
+    return Declared(inputs, outputs, answers, done[0] if done else None, count, entry.key, lines, topics)
 
 
 _LINE_KEYS = ("sample-time", "take")

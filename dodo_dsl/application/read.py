@@ -32,6 +32,7 @@ from dodo_dsl.application.model import (
     plain,
     with_entry,
 )
+from dodo_dsl.application.ros_topics import BRIDGE, bridge
 from dodo_dsl.application.variables import tunable_problems, with_values
 from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.source import Entry, Mapping, Node, Reader, Scalar, entries
@@ -112,7 +113,11 @@ def read_application(
     refused = {problem.span for problem in found}
     more = (*_withheld(application, files), *_empty(application, files))
     found = [*_explained(found, document, files), *(p for p in more if p.span not in refused)]
-    return (replace(application, shown=tuple(construction.shown)) if kept else None), found
+    if application.speaks_ros:
+        node = bridge()
+        raw = {"command": node.entries["command"].value}
+        kept = {**kept, BRIDGE: ComposeService(BRIDGE, node, node.span, None, (), raw)}
+    return (replace(application, services=kept, shown=tuple(construction.shown)) if kept else None), found
 
 
 def as_written(path: Path) -> ApplicationSource | None:

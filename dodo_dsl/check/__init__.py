@@ -31,6 +31,7 @@ RULES: tuple[Rule, ...] = (
     file_rules.check_input,
     spec_rules.check_goals,
     wiring_rules.check_producers,
+    wiring_rules.check_topics,
     wiring_rules.check_hidden_messages,
     wiring_rules.check_variables,
     wiring_rules.check_memories,

@@ -190,7 +190,8 @@ def resolve(
             if (manifest := manifests.get(use.uses.text)) is not None and use.layer in manifest.layers
         )
         services = tuple(_at_camera_rate(each, services) for each in services)
-        services, wiring = _driven(services, wire(services, declared), declared)
+        types = own_types(deployment.ros_types)
+        services, wiring = _driven(services, wire(services, declared, types), declared, types)
         if takes_old_frames(wiring, deployment.messages):
             services = tuple(_with_default(each, "true", lambda it: it.parameter.name == EULER) for each in services)
         if spec.timeout_s and any(service.ends_input for service in services):
@@ -198,6 +199,20 @@ def resolve(
             services = tuple(_with_default(each, f"{spec.timeout_s:g}", ending) for each in services)
         found.append(ResolvedTest(spec, rig, services, *replayed(wiring, services, deployment.messages)))
     return found
+
+
+@functools.cache
+def own_types(files: tuple[Path, ...]) -> Mapping[str, Collection[str]]:
+    """The fields of the deployment's own ROS types, by name; none if they cannot be read."""
+    if not files:
+        return {}
+    from dodo_dsl.opendlv.ros_codec import Codec, RosTypeError
+
+    try:
+        codec = Codec(files)
+    except RosTypeError:
+        return {}  # reported with the deployment
+    return {name: codec.fields(name) for name in codec.own}
 
 
 def _at_camera_rate(service: ResolvedService, others: Iterable[ResolvedService]) -> ResolvedService:
@@ -209,13 +224,16 @@ def _at_camera_rate(service: ResolvedService, others: Iterable[ResolvedService])
 
 
 def _driven(
-    services: tuple[ResolvedService, ...], wiring: Wiring, declared: Mapping[str, Declared | None] | None
+    services: tuple[ResolvedService, ...],
+    wiring: Wiring,
+    declared: Mapping[str, Declared | None] | None,
+    types: Mapping[str, Collection[str]],
 ) -> tuple[tuple[ResolvedService, ...], Wiring]:
     """Services and wiring where the messages that drive the vehicle have taken the place of defaults."""
     messages = ",".join(driving(wiring))
     is_driving = operator.attrgetter("parameter.driving")
     found = tuple(_with_default(each, messages, is_driving) for each in services) if messages else services
-    return (services, wiring) if all(map(operator.is_, found, services)) else (found, wire(found, declared))
+    return (services, wiring) if all(map(operator.is_, found, services)) else (found, wire(found, declared, types))
 
 
 def _with_default(service: ResolvedService, text: str, is_meant: Callable[[Argument], bool]) -> ResolvedService:

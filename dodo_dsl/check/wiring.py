@@ -4,13 +4,14 @@ Of it follow the rate of the steps of lockstep, and the messages that answer a f
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import product
 from typing import Literal
 
 from dodo_dsl.application.model import Declared
+from dodo_dsl.check.ros_topics import Resolved, Sources
 from dodo_dsl.diagnostics import Span
 from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.spec.arguments import ResolvedService
@@ -19,6 +20,8 @@ from dodo_dsl.spec.manifest import Ports
 Kind = Literal["message", "memory"]
 
 ANYTHING = "*"
+NO_TYPES: Mapping[str, Collection[str]] = {}
+_KINDS: tuple[Kind, ...] = ("message", "memory")
 
 _PARAMETER = re.compile(r"\{(?P<name>[^{}]+)\}")
 _STAMP = re.compile(r"[0-9]{1,10}")
@@ -80,7 +83,7 @@ class Wiring:
     ``undeclared`` names the application's services without x-dodo, ``answers`` and ``done`` are the messages that
     they declare to complete a frame in lockstep, ``printed`` those that are lines of theirs. ``unsent`` are services
     that may send anything by their manifests, and messages that they cannot send. ``alternatives`` are messages that
-    stand for others, consumed only if the application declares that it sends them.
+    stand for others, consumed only if the application declares that it sends them. ``topics`` are those of ROS nodes.
     """
 
     produced: tuple[End, ...]
@@ -93,6 +96,7 @@ class Wiring:
     done: str = ""
     unsent: frozenset[tuple[str, str]] = frozenset()
     printed: tuple[End, ...] = ()
+    topics: tuple[Resolved, ...] = ()
     alternatives: tuple[End, ...] = ()
 
     def producers(self, port: Port) -> list[End]:
@@ -121,8 +125,15 @@ class Wiring:
         return [end for end in self.consumed if not self.producers(end.port)]
 
 
-def wire(services: Iterable[ResolvedService], declared: Mapping[str, Declared | None] | None) -> Wiring:
-    """The wiring of one instance, as far as its arguments fit; ``declared`` is None without an application."""
+def wire(
+    services: Sequence[ResolvedService],
+    declared: Mapping[str, Declared | None] | None,
+    types: Mapping[str, Collection[str]] = NO_TYPES,
+) -> Wiring:
+    """The wiring of one instance, as far as its arguments fit; ``declared`` is None without an application.
+
+    ``types`` are ROS types of the team's own, each with its fields.
+    """
     produced: list[End] = []
     consumed: list[End] = []
     for service in services:
@@ -132,7 +143,9 @@ def wire(services: Iterable[ResolvedService], declared: Mapping[str, Declared | 
             produced += [End(use.name, use.layer, p, use.span) for p in _ports(kind, ports.outputs, service, 0)]
             inputs = _ports(kind, ports.inputs, service, None)
             consumed += [End(use.name, use.layer, p, use.span, p.name in manifest.instead) for p in inputs]
-    return _with_alternatives(_with_application(Wiring(tuple(produced), tuple(consumed)), declared))
+    made = {kind: tuple((str(e.port), e.service) for e in produced if e.port.kind == kind) for kind in _KINDS}
+    sources = Sources(tuple(services), made["memory"], made["message"], types)
+    return _with_alternatives(_with_application(Wiring(tuple(produced), tuple(consumed)), declared, sources))
 
 
 def _with_alternatives(wiring: Wiring) -> Wiring:
@@ -174,9 +187,10 @@ def message(text: str, stamp: int | None, optional: bool = False, truth: bool = 
     return Port("message", name, int(number) if _STAMP.fullmatch(number) else stamp, optional, truth)
 
 
-def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | None) -> Wiring:
+def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | None, sources: Sources) -> Wiring:
     if declared is None:
         return wiring
+    topics = sources.resolve(declared)
     produced: list[End] = []
     consumed: list[End] = []
     answers: list[End] = []
@@ -184,6 +198,11 @@ def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | 
         for ends, names in ((produced, own.outputs), (consumed, own.inputs), (answers, own.answers)) if own else ():
             stamp = 0 if ends is produced else None
             ends += [End(service, "application", message(name, stamp), span) for name, span in names]
+    for topic in topics:
+        kind: Kind = "memory" if topic.is_picture else "message"
+        for name in topic.bus if topic.written.given else ():
+            port = Port(kind, name) if topic.is_picture else message(name, None)
+            consumed.append(End(topic.service, "application", port, topic.written.span))
     printed = (
         End(service, "application", message(line.port, 0), line.message_span)
         for service, own in declared.items()
@@ -199,6 +218,7 @@ def _with_application(wiring: Wiring, declared: Mapping[str, Declared | None] | 
         undeclared=tuple(s for s, own in declared.items() if own is None),
         has_application=True,
         printed=tuple(printed),
+        topics=topics,
     )
 
 

@@ -9,10 +9,12 @@ from dodo_dsl.application.interpolation import RequiredVariable, interpolate
 from dodo_dsl.application.model import ApplicationSource, ComposeService, image_variable
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES
 from dodo_dsl.application.variables import owner, split_by, with_variables
+from dodo_dsl.check import ros_topics
 from dodo_dsl.check.resolve import IMAGE, RuleContext, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
 from dodo_dsl.check.wiring import ANYTHING, End, Wiring
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
+from dodo_dsl.opendlv.ros_types import SENT
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.manifest import Manifest
 
@@ -39,6 +41,12 @@ def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
     yield from _unsatisfied_application(context, wiring)
 
 
+def check_topics(context: RuleContext) -> Iterator[Diagnostic]:
+    """``ros-topic``, ``ros-type`` and ``ros-source``."""
+    if context.test.is_complete:
+        yield from ros_topics.problems(context.wiring.topics)
+
+
 def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
     """``true-pose``: the application takes what only a simulation knows, and the test hides that."""
     if context.spec.pose != HIDDEN:
@@ -60,9 +68,12 @@ def _unsatisfied(context: RuleContext, wiring: Wiring, end: End) -> Diagnostic:
     what = f"{end.port.kind} {end.port}" if end.port.kind == "memory" else str(end.port)
     if end.port.can_be_required:
         message = f"'{end.service}' needs {what}, which no service of the test or the application sends"
-        others = [str(each.port) for each in wiring.alternatives if each.service == end.service]
+        others = [each.port.name for each in wiring.alternatives if each.service == end.service]
         what = ", or ".join(["list it", *(f"{other} instead" for other in others)]) + "," * bool(others)
         hint = f"{what} under x-dodo.out of the application's service that sends it, or x-dodo.lines if that prints it"
+        types = [name for name, messages in SENT.items() if {end.port.name, *others}.intersection(messages)]
+        if wiring.topics and types:
+            hint = f"a topic of type {' or '.join(types)} under ros.out of the node becomes it"
     else:
         message = f"'{end.service}' needs {what}, which no service of the test sends"
         hint = _who_could(context, wiring, end)

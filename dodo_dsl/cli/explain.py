@@ -11,6 +11,7 @@ from typing import Any, TextIO
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import catalogue
 from dodo_dsl.check.resolve import ResolvedTest
+from dodo_dsl.check.ros_topics import Resolved
 from dodo_dsl.check.senders import told, told_in_words
 from dodo_dsl.check.wiring import ANYTHING, End, Port, Wiring
 from dodo_dsl.cli import selection
@@ -101,6 +102,7 @@ def explain(test: ResolvedTest, application: ApplicationSource | None = None) ->
         "vary": vary,
         "wiring": list(_lines(wiring)),
         "asked": list(_asked(wiring)),
+        "topics": [*map(_topic, wiring.topics)],
         "told": list(dict.fromkeys(str(end.port) for end in told(wiring))),
         "has_application": wiring.has_application,
         "undeclared": list(wiring.undeclared),
@@ -165,6 +167,18 @@ def _lines(wiring: Wiring) -> Iterator[dict[str, Any]]:
             unsatisfied.setdefault((end.port.kind, str(end.port)), []).append(end)
     for (kind, name), ends in unsatisfied.items():
         yield {"kind": kind, "port": name, "says": [], "hears": _shown(ends)}
+
+
+def _topic(topic: Resolved) -> dict[str, Any]:
+    written = topic.written
+    direction = "in" if written.given else "out"
+    return {
+        "topic": written.name,
+        "type": written.type,
+        "direction": direction,
+        "node": topic.service,
+        "bus": list(topic.bus),
+    }
 
 
 def _is_alone(wiring: Wiring, port: Port) -> bool:
@@ -257,6 +271,16 @@ def _wiring(one: Explanation) -> str:
         wanted = [each for each in one["asked"] if each["required"] is required]
         rows = [[_port(each), _needed(each), _declared(each, one)] for each in wanted]
         parts += [f"{title}\n" + _table(rows, "  ")] if rows else []
+    rows = [
+        [
+            each["topic"],
+            each["type"],
+            "<-" if each["direction"] == "in" else "->",
+            ", ".join(each["bus"]) or "no source",
+        ]
+        for each in one["topics"]
+    ]
+    parts += ["ROS topics: /clock and these\n" + _table(rows, "  ")] if rows else []
     words = told_in_words(one["told"])
     return "\n".join([*parts, f"{words}\n"] if words else parts)
 

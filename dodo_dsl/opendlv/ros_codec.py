@@ -50,6 +50,8 @@ class Codec:
         own: dict[str, Any] = {}
         for path in own_files:
             own.update(_definitions(path))
+        self.own = tuple(own)
+        """The names of one's own types."""
         shipped = {name: text for name, text in DEFINITIONS.items() if name not in own}
         for name, text in shipped.items():
             own.update(get_types_from_msg(text, name))

@@ -60,12 +60,33 @@ NUMBERS = ("std_msgs/msg/Float32", "std_msgs/msg/Float64")
 """Types of one number: they need ``from`` or ``to``, a message with one number."""
 
 
+FRAME_IDS: Mapping[str, str] = {
+    "sensor_msgs/msg/Image": "camera_optical_frame",
+    "sensor_msgs/msg/CompressedImage": "camera_optical_frame",
+    "sensor_msgs/msg/CameraInfo": "camera_optical_frame",
+    "sensor_msgs/msg/LaserScan": "laser",
+    "sensor_msgs/msg/Range": "range",
+    "sensor_msgs/msg/Imu": "imu",
+    "sensor_msgs/msg/NavSatFix": "gps",
+    "nav_msgs/msg/Odometry": "odom",
+    "geometry_msgs/msg/TwistStamped": "base_link",
+}
+"""The frame of what a test gives, by type (REP 103 and 105)."""
+
+
+NODE_ENVIRONMENT: Mapping[str, str] = {
+    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4?max_msg_size=65500&sockets_size=4194304",
+}
+"""What gives nodes receive buffers that hold a picture."""
+
+
 class CameraView(msgspec.Struct, frozen=True, kw_only=True):
-    """A camera's picture in pixels, and its vertical opening angle in degrees."""
+    """A camera's picture in pixels, its vertical opening angle in degrees (0 if unknown), and its memory's format."""
 
     width: int
     height: int
-    fovy: float
+    fovy: float = 0.0
+    format: str = ""
 
 
 class Topic(msgspec.Struct, frozen=True, kw_only=True, rename="kebab", omit_defaults=True):
@@ -104,12 +125,14 @@ class StaticFrame(msgspec.Struct, frozen=True, kw_only=True):
 class RosGraph(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """All topics between a test and its application: ``given`` to it and ``sent`` by it.
 
-    ``services`` are those of the application that have each topic, by the topic's name; ``types`` are files of own
-    types.
+    ``services`` are those of the application that have each topic, by the topic's name. ``types`` are the texts of the
+    team's own types, by the places of their files, such as ``lane_msgs/msg/Lane.msg``; ``messages`` is that of its own
+    messages (ODVD).
     """
 
     given: tuple[Topic, ...] = ()
     sent: tuple[Topic, ...] = ()
     frames: tuple[StaticFrame, ...] = ()
     services: dict[str, tuple[str, ...]] = {}
-    types: tuple[str, ...] = ()
+    types: dict[str, str] = {}
+    messages: str = ""

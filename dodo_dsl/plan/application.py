@@ -8,8 +8,10 @@ from typing import Any
 
 from dodo_dsl.application import opendlv_flags
 from dodo_dsl.application.construction import Construction, Setting
+from dodo_dsl.application.interpolation import escaped
 from dodo_dsl.application.merge import filled_node
-from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, Word, plain, references, text
+from dodo_dsl.application.model import KEYS, SANDBOX, ApplicationSource, ComposeService, plain, references, text
+from dodo_dsl.application.ros_topics import BRIDGE, Word, variables
 from dodo_dsl.application.variables import variables_with_cid
 from dodo_dsl.plan.added_services import TIME, TIME_MOUNT, time_variables
 from dodo_dsl.plan.model import DISPLAY_SERVER, STARTED, Application, ApplicationService, Line
@@ -51,6 +53,11 @@ def _container(construction: Construction, name: str, made: dict[str, Any]) -> d
     if service.declared and service.declared.lines:
         made["tty"] = True  # programs print each line at once to a terminal
         made["stdin_open"] = True  # the runner asks that terminal what was printed
+    if construction.application.speaks_ros:
+        made["environment"] = _in_graph(service, made.get("environment", {}), setting)
+    if name == BRIDGE:
+        image, *flags = setting.bridge
+        made.update(image=image, command=[*made["command"], *map(escaped, flags)])
     if setting.time_seed is not None and setting.own_network:
         given = {variable: value or "" for variable, value in made.get("environment", {}).items()}
         number = list(construction.application.services).index(name)
@@ -63,6 +70,13 @@ def _container(construction: Construction, name: str, made: dict[str, Any]) -> d
         mount = {"type": "volume", "source": TIME, "target": TIME_MOUNT, "read_only": True}
         made["volumes"] = [*(made.get("volumes") or []), mount]
     return made
+
+
+def _in_graph(service: ComposeService, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    """The variables of a service whose graph is the test's."""
+    set_, maybe = variables(setting.cid, own_network=setting.own_network)
+    own = {name: value for name, value in maybe.items() if name not in service.file_variables}
+    return {**own, **given, **set_}
 
 
 def _changes(application: ApplicationSource, made: dict[str, dict[str, Any]]) -> Iterator[str]:
@@ -89,7 +103,11 @@ def _process(
 
     written = plain(filled_node(service.raw["command"], known, is_late)) if "command" in service.raw else None
     command = opendlv_flags.split(written) if isinstance(written, str) else tuple(text(word) for word in written or ())
-    variables = variables_with_cid(service, known, is_late, dict(setting.given), cid)
+    own_variables = variables_with_cid(service, known, is_late, dict(setting.given), cid)
+    if application.speaks_ros:
+        own_variables = _in_graph(service, own_variables, setting)
+    if service.name == BRIDGE:
+        command = (*command, *map(escaped, setting.bridge[1:]))
     process = raw.get("x-dodo-process")
     command = opendlv_flags.arguments(list(map(str, process or ())), command)
     words = (*(process or ()), *command)
@@ -99,8 +117,8 @@ def _process(
         name=service.name,
         process=(*(DISPLAY_SERVER if service.has_display else ()), *map(str, process)) if process else None,
         command=opendlv_flags.with_cid(command, cid),
-        environment=variables,
-        takes_cid=opendlv_flags.takes_cid((*words, *(v for v in variables.values() if v)), variables),
+        environment=own_variables,
+        takes_cid=opendlv_flags.takes_cid((*words, *(v for v in own_variables.values() if v)), own_variables),
         takes_memory=opendlv_flags.takes_memory(words),
         env_files=tuple(file.path for file in service.env_files),
         raw_files=tuple(file.path for file in service.env_files if file.raw),

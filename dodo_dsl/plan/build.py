@@ -7,16 +7,21 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import msgspec
+
 from dodo_dsl import package_data
 from dodo_dsl.application import hidden_paths
 from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.ros_topics import BRIDGE_IMAGE
+from dodo_dsl.check import ros_topics
 from dodo_dsl.check import senders as check_senders
 from dodo_dsl.check.file_rules import MAP, needed
 from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.check.spec_rules import containers, resolved_goals
 from dodo_dsl.diagnostics import Span
+from dodo_dsl.opendlv.ros_types import RosGraph
 from dodo_dsl.plan import added_services, addresses
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.application import plan_application
@@ -186,6 +191,7 @@ class _Builder:
             limits=self.shared.limits,
             given=tuple(self.test.variables.items()),
             time_seed=spec.seed if spec.is_stepped and isolated == "network" else None,
+            bridge=(self._image(BRIDGE_IMAGE), *self._bridge()) if self.application.speaks_ros else (),
         )
         messages = self._messages()
         return Plan(
@@ -222,6 +228,22 @@ class _Builder:
             import_paths=self.shared.imports,
             source_map=self.places,
         )
+
+    def _bridge(self) -> Iterator[str]:
+        """The flags of what stands between the bus and the application's ROS graph."""
+        resolved, services = self.test.wiring.topics, self.test.services
+        topics = tuple(ros_topics.topics(resolved))
+        given = {each.written.name: each for each in resolved if each.written.given}
+        yield from (f"--name={each.bus[0]}" for each in topics if (one := given.get(each.topic)) and one.is_picture)
+        graph = RosGraph(
+            given=tuple(each for each in topics if each.topic in given),
+            sent=tuple(each for each in topics if each.topic not in given),
+            frames=tuple(ros_topics.frames(resolved, services)),
+            services=ros_topics.by_topic(resolved),
+            types=dict(map(_ros_type, self.deployment.ros_types)),
+            messages="\n".join(path.read_text(encoding="utf-8") for path in self.deployment.messages),
+        )
+        yield f"--topics={msgspec.json.encode(graph).decode()}"
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)
@@ -308,6 +330,14 @@ class _Builder:
         is_around = real(self.application.folder).is_relative_to(real(folder))
         self.named.update((real(path), real(folder) / MAP) if is_around else (real(folder), *found.values()))
         return Flag(parameter.name, path.relative_to(real(self.spec.location.root)).as_posix(), "path")
+
+
+def _ros_type(path: Path) -> tuple[str, str]:
+    """The place of a type of ROS below a folder, by which it is named, and its text."""
+    from dodo_dsl.opendlv.ros_codec import own_name
+
+    name = path.name if path.suffix == ".idl" else f"{own_name(path)}.msg"
+    return name, path.read_text(encoding="utf-8")
 
 
 def _leaving_out(flag: Flag, messages: Sequence[str]) -> Flag:

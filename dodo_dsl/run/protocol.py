@@ -75,6 +75,13 @@ class Noted(Struct, tag_field="dodo", tag="note", frozen=True):
     text: Sentence
 
 
+class GraphFinding(Struct, tag_field="dodo", tag="ros", frozen=True):
+    """What is wrong in the application's ROS graph, a sentence; a test that does not pass may be due to an error."""
+
+    finding: Sentence
+    severity: Literal["error", "warning"]
+
+
 class Foreign(Struct, tag_field="dodo", tag="foreign", frozen=True):
     """The application sent what only others may send; one sentence."""
 
@@ -205,7 +212,7 @@ class Unmatched:
     never: bool
 
 
-Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost
+Event = Message | VerdictEvent | Malformed | Exited | Unstartable | Lost | GraphFinding
 
 
 class Running(Protocol):

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.check.senders import told_in_words
 from dodo_dsl.outcome import ON_EMULATED, EndedService, MachineLoad, Outcome, Response, Result, ServiceUse
 from dodo_dsl.plan.added_services import CLOCK, RECORDER, TIME
@@ -32,6 +33,7 @@ from dodo_dsl.run.protocol import (
     Exited,
     Flooded,
     Foreign,
+    GraphFinding,
     InputEnded,
     Late,
     Lost,
@@ -51,6 +53,8 @@ from dodo_dsl.run.protocol import (
 )
 
 MOST_NOTES = 100
+_MOST_OF_GRAPH = 3
+"""What is said of a ROS graph in the reason of an outcome."""
 MEMORY_KILL = "the kernel ended a program of this machine for want of memory during the test"
 """A note where a service was killed: which program it was, and by whose limit, the kernel's count does not say."""
 _KILLED, _ASKED = ((-number, 128 + number) for number in (signal.SIGKILL, signal.SIGTERM))
@@ -82,6 +86,8 @@ class RunState:
     """Whether the application rests in lockstep."""
     response: Response | None = None
     notes: list[str] = field(default_factory=list)
+    graph: list[str] = field(default_factory=list)
+    """What is wrong in the application's ROS graph."""
     began: float | None = None
     finished: float | None = None
     setup_s: float | None = None
@@ -169,6 +175,10 @@ class RunState:
                 self.late[service] = event
             case Paused(service, seconds):
                 self.paused[service] = seconds
+            case GraphFinding(finding, "error") if len(self.graph) < MOST_NOTES:
+                self.graph.append(finding)
+            case GraphFinding(finding):
+                self._remember(Noted(finding))
             case Noted(text) if len(self.notes) < MOST_NOTES:
                 self.notes.append(text)
             case Noted() if len(self.notes) == MOST_NOTES:
@@ -193,6 +203,8 @@ class RunState:
         """Notes an end of the application's that decides nothing, unless it is a good one or by SIGTERM."""
         if self.layer_of.get(event.service) != "application" or event.code in (0, *_ASKED):
             return
+        if is_asked and BRIDGE in self.layer_of and event.code not in _KILLED:
+            return  # a node of rclpy that catches nothing ends so
         how = "did not end upon SIGTERM and was killed" if is_asked and event.code in _KILLED else _how(event)
         when = "as the test ended" if is_asked else "when all was judged"
         at = self._when() or (f"after {self.time.seconds:.1f} s of test time" if self.time else "")
@@ -202,6 +214,8 @@ class RunState:
         service, code, out_of_memory = event.service, event.code, event.out_of_memory
         layer, when = self.layer_of.get(service, "application"), self._when()
         ended = f"{_how(event)} {when}".rstrip()
+        if service == BRIDGE:
+            self.end("error", f"the bridge to the application's ROS graph {ended}", service)
         if layer == "application":
             is_done = (code == 0 and self.input_ended) or start_order.may_end(
                 self.plan.application.services, service, code
@@ -303,7 +317,8 @@ class RunState:
         findings = (*answers.findings, *use.findings)
         considered, load = consider(decide(self.facts, findings), self._load())
         found = self._explained(self._timed(considered))
-        finding = replace(found, reason="; ".join([found.reason, *self._details(found, backend.cid)]))
+        graph = [] if found.result == "passed" else self.graph[:_MOST_OF_GRAPH]
+        finding = replace(found, reason="; ".join([*graph, found.reason, *self._details(found, backend.cid)]))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
         return replace(
             outcome_of(plan, finding, backend.name, backend.cid),
@@ -317,6 +332,7 @@ class RunState:
             notes=(
                 *([ON_EMULATED] if plan.rig and not plan.is_real else []),
                 *self.notes,
+                *self.graph[len(graph) :],
                 *self._printed_notes(finding),
                 *self._shortage_notes(finding),
                 *losses,

@@ -11,11 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
+import msgspec
+
+from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.plan.model import ApplicationService, Plan, PlannedService
 from dodo_dsl.run.announce import begin_frame, hearers
 from dodo_dsl.run.machine_load.service_use import Snapshot
 from dodo_dsl.run.printed_lines import PrintedLines, Send
-from dodo_dsl.run.protocol import Event, Exited, Noted, Rested, Running, Unmatched, Unstartable
+from dodo_dsl.run.protocol import Event, Exited, GraphFinding, Noted, Rested, Running, Unmatched, Unstartable
 from dodo_dsl.run.service_output import ServiceOutput
 from dodo_dsl.run.service_protocol import Reports
 from dodo_dsl.run.start_order import Conditions, in_turn, one_off, optional
@@ -117,6 +120,8 @@ class WatchedServices:
         """
 
         def on_line(line: bytes) -> bool:
+            if name == BRIDGE:
+                return self._take_finding(line)
             return layer != APPLICATION and self.reports.take_line(name, line)
 
         if name in self.outputs:  # it is started once more
@@ -125,6 +130,14 @@ class WatchedServices:
         match = partial(self.lines.match, name) if self.prints(name) else None
         self.outputs[name] = ServiceOutput(log, take or on_line, match=match, **kind)
         return self.outputs[name]
+
+    def _take_finding(self, line: bytes) -> bool:
+        """Whether a line of the bridge's is about the application's ROS graph."""
+        try:
+            self.tell(msgspec.json.decode(line, type=GraphFinding))
+        except msgspec.MsgspecError:
+            return False
+        return True
 
     async def last_output(self, name: str, patience_s: float) -> None:
         """Returns when all is read that a service said and wrote, so that no verdict follows its end."""

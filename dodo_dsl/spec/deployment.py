@@ -24,6 +24,8 @@ from dodo_dsl.spec.slips import mended
 from dodo_dsl.spec.validation import schema_of_keys, valid_part, values
 
 _TAKEN = ("services", "dodo_dsl")
+_ROS = (".msg", ".idl")
+"""The suffixes of files with types of ROS."""
 _ODVD_PLACE = re.compile(r"(?P<file>.+?):((?P<line>\d+):(?P<column>\d+):)? (?P<text>.+)", re.DOTALL)
 FILE_NAME = "dodo.yml"
 SHIPPED = "dodo:"
@@ -60,6 +62,8 @@ class Declarations:
 class Deployment:
     """Where tests and application are; ``root`` is the folder of ``dodo.yml``, or the working folder without one.
 
+    ``messages`` are files of OpenDLV messages (ODVD), ``ros_types`` those of ROS types (.msg, .idl).
+
     ``environment`` names variables of DoDo's own environment that the application gets, ``paths`` are files and folders
     of the host that it may mount, and ``outside`` means that it may reach other networks than its test's. ``absent``
     are folders of the registry that do not exist.
@@ -71,6 +75,7 @@ class Deployment:
     absent: tuple[Path, ...] = ()
     services: tuple[Path, ...] = ()
     messages: tuple[Path, ...] = ()
+    ros_types: tuple[Path, ...] = ()
     application: tuple[Path, ...] = ()
     declarations: Declarations = field(default_factory=Declarations)
     image_prefix: str = "dodo"
@@ -146,6 +151,7 @@ class _Reading:
         about, named = self.node.entries.get("application"), self.node.get("application")
         named = named.get("files") if isinstance(named, Mapping) else named
         application, services = self._files(named), self._folders("services")
+        messages = self._files(self.node.get("messages"))
         registry = tuple(self._folders("registry", _NOT_YET))
         shipped = package_data.registry()
         missing = (path_of(self.root, item.text) for item in _texts(self.node.get("registry")) if item.text != SHIPPED)
@@ -155,7 +161,8 @@ class _Reading:
             registry=registry or (shipped,),
             absent=tuple(p for p in missing if p and not p.exists() and p.is_relative_to(self.root.resolve())),
             services=tuple(services),
-            messages=self._files(self.node.get("messages")),
+            messages=tuple(path for path in messages if path.suffix not in _ROS),
+            ros_types=tuple(path for path in messages if path.suffix in _ROS),
             application=application,
             declarations=Declarations.of(about, application),
             image_prefix=images.get("prefix", "dodo"),
@@ -170,6 +177,7 @@ class _Reading:
             sandbox=_sandbox(self.node.get("sandbox")),
         )
         self._check_messages(found.messages)
+        self._check_types(found.ros_types)
         self._check_services(services)
         return found
 
@@ -222,6 +230,16 @@ class _Reading:
             if place:
                 span, text = Span(place["file"], int(place["line"] or 1), int(place["column"] or 1)), place["text"]
             self._tell(span, "wrong-messages", text)
+
+    def _check_types(self, files: tuple[Path, ...]) -> None:
+        if not files:
+            return
+        from dodo_dsl.opendlv.ros_codec import Codec, RosTypeError
+
+        try:
+            Codec(files)
+        except RosTypeError as error:
+            self._tell(self.node.entries["messages"].key, "wrong-messages", str(error))
 
     def _check_services(self, folders: dict[Path, Scalar]) -> None:
         """Folders that are a service themselves, and that DoDo's packages hide."""

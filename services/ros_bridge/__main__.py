@@ -1,8 +1,9 @@
 """``python -m services.ros_bridge --cid=N --topics=JSON [--name=MEMORY...]``."""
 
 import argparse
-import os
 import sys
+import tempfile
+from pathlib import Path
 
 import msgspec
 
@@ -21,14 +22,18 @@ def main(arguments: list[str]) -> int:
     flags = parser.parse_args(arguments)
     try:
         require_ros()
-        from services.ros_bridge.bridge import Bridge, BridgeError, messages_of
+        from services.ros_bridge.bridge import Bridge, BridgeError, definitions
         from services.ros_bridge.graph import Graph, GraphError
     except RosTypeError as error:
         return _broken(str(error))
     try:
         topics = msgspec.json.decode(flags.topics, type=RosGraph)
-        with Session(flags.cid, messages_of(os.environ.get("DODO_ODVD", ""))) as session:
-            Bridge(session, Graph(), topics, flags.name).run()
+        with tempfile.TemporaryDirectory() as folder:
+            messages, types = definitions(topics, Path(folder))
+            session = Session(flags.cid, messages)
+            bridge = Bridge(session, Graph(), topics, types, flags.name)
+        with session:
+            bridge.run()
     except msgspec.DecodeError as error:
         return _broken(f"--topics is no graph: {error}")
     except (BridgeError, GraphError, MessageError, OdvdError, RosTypeError, SessionError) as error:

@@ -89,22 +89,29 @@ def memories_of(graph: RosGraph) -> tuple[str, ...]:
     return tuple(dict.fromkeys(topic.bus[0] for topic in graph.given if is_picture(topic)))
 
 
-def messages_of(paths: str) -> MessageSet:
-    """The standard messages and those of files, separated as in ``PATH``."""
-    return MessageSet.load(*(Path(path) for path in paths.split(os.pathsep) if path))
+def definitions(graph: RosGraph, folder: Path) -> tuple[MessageSet, list[Path]]:
+    """The messages of a graph's bus, and files with its own types, which are written into a folder."""
+    (folder / "own.odvd").write_text(graph.messages, encoding="utf-8")
+    files = [folder / name for name in graph.types]
+    for file, text in zip(files, graph.types.values(), strict=True):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+    return MessageSet.load(*([folder / "own.odvd"] if graph.messages else [])), files
 
 
 class Bridge:
     """Connects what was made for it; ``run`` never returns."""
 
-    def __init__(self, session: Session, graph: Graph, topics: RosGraph, names: Sequence[str] = ()) -> None:
+    def __init__(
+        self, session: Session, graph: Graph, topics: RosGraph, types: Sequence[Path] = (), names: Sequence[str] = ()
+    ) -> None:
         """``names`` are those of the memories as they are, where they differ; raises what any part of it raises."""
         self._session, self._graph, self._topics = session, graph, topics
         memories = memories_of(topics)
         if names and len(names) != len(memories):
             raise BridgeError(f"--name is given {len(names)} times for the memories {', '.join(memories) or 'of none'}")
         self._names = dict(zip(memories, names or memories, strict=True))
-        self._types = Types([Path(path) for path in topics.types], session.messages)
+        self._types = Types(types, session.messages)
         for topic in (*topics.given, *topics.sent):
             self._types.check(topic)
         self._seen = Discovered()
@@ -205,7 +212,7 @@ class Bridge:
         if camera is None:
             raise BridgeError(f"nothing says how large the pictures of {name} are")
         with _attached(self._names[name]) as memory:
-            format_ = name.rpartition(".")[2]
+            format_ = camera.format or name.rpartition(".")[2]
             if format_ not in _FORMATS.values() and format_ != "rgb":
                 format_ = _FORMATS.get(memory.size / (camera.width * camera.height), "bgr")
             self._ready.wait(START_PATIENCE)

@@ -20,7 +20,8 @@ MOST_BYTES = 64 << 20
 SMALL_BYTES = 16 << 20
 """Of a recording that is looked through even when what is needed has been found: it may be cut."""
 _BUFFER = 1 << 16
-_TYPE_FIELD, _STAMP_FIELD = 1, 6
+_TYPE_FIELD, _DATA_FIELD, _STAMP_FIELD = 1, 2, 6
+_IMAGE = 1055
 _TIMES = (5, 4, 3)
 """Fields of when a message was sampled, received and sent."""
 _FIRST, _OWN = 13, 2900
@@ -57,6 +58,17 @@ def look(path: Path, message: int, sender: int) -> LookedThrough:
                     collections.deque(() if found.is_whole else bodies, 0)
                     return found
     return found
+
+
+def picture_size(path: Path) -> tuple[int, int]:
+    """Width and height of the first picture, 0 and 0 without any, or of a file that cannot be read."""
+    try:
+        with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
+            bodies = _bodies(stream, LookedThrough(os.fstat(stream.fileno()).st_size))
+            image = next((first_message(body, _DATA_FIELD) for body in bodies if _type(body) == _IMAGE), b"")
+            return first_number(image, 2), first_number(image, 3)
+    except OSError:
+        return 0, 0
 
 
 def count(path: Path, message: int, sender: int, most: int) -> int | None:

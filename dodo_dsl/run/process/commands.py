@@ -9,6 +9,7 @@ from dodo_dsl import package_data
 from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, interpolate
 from dodo_dsl.application.model import OFFSCREEN
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
+from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, TIME, TIME_FOLDER
@@ -118,6 +119,7 @@ class Commands:
         pairs = ((word, interpolate(word, variables)) for word in service.command)
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.slot.cid), self.slot.memory_prefix)
+        own.update({"PYTHONPATH": package_path()} if service.name == BRIDGE else {})
         environment = {**_without_windows(argv, {**inherited, **own}), SLOT_VARIABLE: self.slot.name}
         if self.time is not None:
             environment = self.time.variables(environment, self.plan, service.name, self.time_folder)

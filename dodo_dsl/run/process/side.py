@@ -11,8 +11,9 @@ from typing import Any
 
 import msgspec
 
-from dodo_dsl import atomic
+from dodo_dsl import atomic, package_data
 from dodo_dsl.application.interpolation import EnvironmentProblem
+from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.opendlv.relay import BUS
 from dodo_dsl.plan.added_services import TIME
 from dodo_dsl.plan.model import LAYERS
@@ -199,6 +200,8 @@ class ProcessSide:
         limits = application.limits
         if self._commands.time is not None:
             limits = replace(limits, reads=(*limits.reads, str(self._commands.time.library)))
+        if command.name == BRIDGE:
+            limits = replace(limits, reads=(*limits.reads, str(package_data.services())))
         confined = confinement(command.folder, limits, hidden)
         confined = replace(confined, channels=str(Path(self._slot.channel).parent) if self._is_on_host else "")
         if self._gives_time:

@@ -31,7 +31,9 @@ def after(model: DynamicModel, end: float, begin: float = 0.0) -> BodyMotion:
 
 
 @pytest.mark.parametrize("flags", [{"drive": "differential"}, SMALL, {**SMALL, "tyres": "dynamic"}, {}], ids=str)
-@pytest.mark.parametrize(("vx", "yaw_rate"), [(0.5, 0.0), (0.6, 0.8), (0.6, -0.8), (-0.5, 0.0), (-0.4, 0.5), (0.0, 0.0)])
+@pytest.mark.parametrize(
+    ("vx", "yaw_rate"), [(0.5, 0.0), (0.6, 0.8), (0.6, -0.8), (-0.5, 0.0), (-0.4, 0.5), (0.0, 0.0)]
+)
 def test_the_body_moves_as_it_is_asked(flags: dict[str, Any], vx: float, yaw_rate: float) -> None:
     """Straight, on arcs of the radius v/w, in reverse, and not at all; vy is what the drive has beside it."""
     model = service(**flags)
@@ -141,9 +143,7 @@ def test_the_last_kind_of_request_counts(
 
 
 @pytest.mark.parametrize("drive", ["kiwi", "differential", "bicycle"])
-def test_what_is_no_number_is_ignored_and_no_drive_moves_sideways(
-    drive: str, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_is_no_number_is_ignored_and_no_drive_moves_sideways(drive: str, caplog: pytest.LogCaptureFixture) -> None:
     model = service(drive=drive)
     with caplog.at_level(logging.WARNING):
         for fields in ({"vx": math.nan}, {"vx": 1.0, "yawRate": math.inf}, {"vy": -math.inf}):
