@@ -191,6 +191,13 @@ def problems(topics: Iterable[Resolved]) -> Iterator[Diagnostic]:
                 yield Diagnostic(topic.span, "ros-topic", message, "remove one, or give it another message with 'to'")
 
 
+def wanted(topics: Iterable[Resolved], problem: Diagnostic) -> Iterator[str]:
+    """The messages of which a topic without a source could be made."""
+    for each in topics:
+        if problem in each.problems and problem.rule == "ros-source":
+            yield from (name for names in GIVEN.get(each.written.type, ()) for name in names)
+
+
 def by_topic(resolved: Iterable[Resolved]) -> dict[str, tuple[str, ...]]:
     """The services of each topic."""
     found: dict[str, tuple[str, ...]] = {}

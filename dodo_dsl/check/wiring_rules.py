@@ -43,8 +43,13 @@ def check_producers(context: RuleContext) -> Iterator[Diagnostic]:
 
 def check_topics(context: RuleContext) -> Iterator[Diagnostic]:
     """``ros-topic``, ``ros-type`` and ``ros-source``."""
-    if context.test.is_complete:
-        yield from ros_topics.problems(context.wiring.topics)
+    if not context.test.is_complete:
+        return
+    for problem in ros_topics.problems(context.wiring.topics):
+        wanted = ros_topics.wanted(context.wiring.topics, problem) if not problem.hint else ()
+        makers = (m.name for name in wanted for m in context.manifests.values() if _sends(m, name))
+        names = ", ".join(sorted(set(makers)))
+        yield replace(problem, hint=f"add a service that makes it: {names}") if names else problem
 
 
 def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
