@@ -56,6 +56,7 @@ target "service" {
       { name = "responds", stage = "geometry" },
       { name = "ros-bridge", stage = "ros" },
       { name = "sandbox", stage = "base" },
+      { name = "trajectory-error", stage = "geometry" },
       { name = "virtual-camera", stage = "vision" },
     ]
   }

@@ -14,6 +14,7 @@ from services.continuous_signal.measures import SignalLimits, SignalMeasures
 from services.coverage.model import CoverageEvaluator, CoverageGrid, Footprint
 from services.object_detection.score import Counts, CountsByClass, DetectionLimits, Score
 from services.responds.model import ResponseEvaluator, ResponseLimits, at_rate
+from tests.services.built import built
 
 SERVICES = Path(__file__).parents[2] / "services"
 
@@ -59,3 +60,8 @@ def test_responds() -> None:
 def test_object_detection() -> None:
     score = Score(CountsByClass({"yellow": Counts(1)}))
     compare("object_detection", score.checks(DetectionLimits()))
+
+
+def test_trajectory_error() -> None:
+    with built("trajectory_error", "--max-ate=1") as judge:
+        compare("trajectory_error", judge.checks({}))
