@@ -21,7 +21,7 @@ _NODE = f"""\
 image: {BRIDGE_IMAGE}
 network_mode: host
 ipc: host
-volumes: [/tmp:/tmp]
+volumes: [{{type: bind, source: /tmp, target: /tmp}}]
 command: [--cid=111]
 x-dodo-process: [python, -m, {BRIDGE_MODULE}]
 """

@@ -258,7 +258,7 @@ def frames(resolved: Iterable[Resolved], services: Sequence[ResolvedService]) ->
             continue
         place = {key: _first(maker.texts.get(key)) for key in ("x", "y", "z")}
         roll, pitch, yaw = (math.radians(_first(maker.texts.get(key))) for key in ("roll", "pitch", "yaw"))
-        angles = {"roll": roll, "pitch": -pitch, "yaw": yaw}  # pitch is positive downwards in REP 103
+        angles = {"roll": roll, "pitch": 0.0 - pitch, "yaw": yaw}  # pitch is positive downwards in REP 103
         if each.is_picture:
             body = child.removesuffix("_optical_frame") + "_link"
             known.setdefault(body, StaticFrame(parent=_ROBOT, child=body, **place, **angles))

@@ -83,6 +83,9 @@ def _changes(application: ApplicationSource, made: dict[str, dict[str, Any]]) ->
     """What differs from the compose file, for the first lines of the test's own one."""
     yield from (f"{name}: left out, {why}" for name, why in application.dropped.items())
     for name, service in application.services.items():
+        if name == BRIDGE:
+            yield f"{name}: added, between the test's bus and the application's ROS graph"
+            continue
         written = {key: each for key, each in plain(service.node).items() if key not in KEYS and each is not None}
         changed = sorted(key for key in written if key in made[name] and made[name][key] != written[key])
         gone = sorted(key for key in written if key not in made[name])
