@@ -263,7 +263,7 @@ class RunState:
     def _details(self, finding: Finding, cid: int) -> list[str]:
         """What helps to understand why a test ended so, behind the reason; ``cid`` is that of its bus."""
         details = []
-        if finding.silent:
+        if finding.silent and BRIDGE not in self.layer_of:
             details.append(f"the test is on CID {cid}")
             if others := sorted(self.buses - {cid}):
                 details.append(f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}")
