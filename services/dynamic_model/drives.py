@@ -165,10 +165,7 @@ _SETTLING = 0.05
 
 @dataclass
 class BicycleDrive:
-    """A car by steering and speed, or by steering and acceleration unless it is ``by_speed``.
-
-    By requests of motion it has steering and speed.
-    """
+    """A car by steering and speed, or by steering and acceleration unless it is ``by_speed``; by motion to speeds."""
 
     car: SingleTrack
     has_tyres: bool = False
@@ -178,13 +175,13 @@ class BicycleDrive:
     """rad, at the front wheel"""
 
     def __post_init__(self) -> None:
-        self._driving = SPEED if self.by_speed else ACCELERATION
+        self._to_speed = self.by_speed
         self.wheel = self.offset
         """Angle of the front wheel, in rad."""
 
     @property
     def rest(self) -> Mapping[str, float]:
-        return {STEERING: self.offset, self._driving: 0.0}
+        return {STEERING: self.offset, SPEED if self.by_speed else ACCELERATION: 0.0}
 
     def accepted(self, actuator: str, request: float) -> float:
         if actuator == STEERING:
@@ -198,7 +195,7 @@ class BicycleDrive:
         return {SPEED: vx, STEERING: limited(wheel, self.car.max_steering) + self.offset}
 
     def step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
-        steps = self._steps(motion.vx, dt) if self.has_tyres else 1
+        self._to_speed, steps = SPEED in asked, self._steps(motion.vx, dt) if self.has_tyres else 1
         for _ in range(steps):
             motion = self._step(motion, asked, dt / steps)
         return motion
@@ -219,16 +216,15 @@ class BicycleDrive:
 
     def _step(self, motion: BodyMotion, asked: Mapping[str, float], dt: float) -> BodyMotion:
         """One step of the Runge-Kutta method of fourth order; the wheel turns meanwhile."""
-        by_speed = SPEED in asked
-        driving = asked[SPEED if by_speed else ACCELERATION]
+        driving = asked[SPEED if self._to_speed else ACCELERATION]
         angles = [self._turned(asked[STEERING], part * dt) for part in (0.0, 0.5, 1.0)]
-        first = self._derivative(motion, angles[0], driving, by_speed)
-        second = self._derivative(_moved(motion, first, dt / 2), angles[1], driving, by_speed)
-        third = self._derivative(_moved(motion, second, dt / 2), angles[1], driving, by_speed)
-        fourth = self._derivative(_moved(motion, third, dt), angles[2], driving, by_speed)
+        first = self._derivative(motion, angles[0], driving)
+        second = self._derivative(_moved(motion, first, dt / 2), angles[1], driving)
+        third = self._derivative(_moved(motion, second, dt / 2), angles[1], driving)
+        fourth = self._derivative(_moved(motion, third, dt), angles[2], driving)
         mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(first, second, third, fourth, strict=True)]
         self.wheel, moved = angles[2], _moved(motion, mean, dt)
-        if not by_speed:  # brakes end at a standstill
+        if not self._to_speed:  # brakes end at a standstill
             moved = BodyMotion(limited(max(moved.vx, 0.0), self.car.top_speed), moved.vy, moved.yaw_rate)
         return moved if self.has_tyres else self._rolling(moved.vx, self.wheel)
 
@@ -243,18 +239,16 @@ class BicycleDrive:
             yaw_rate = math.copysign(self.car.friction * GRAVITY / abs(vx), yaw_rate)
         return BodyMotion(vx, self.car.rear * yaw_rate, yaw_rate)
 
-    def _acceleration(self, vx: float, driving: float, by_speed: bool) -> float:
+    def _acceleration(self, vx: float, driving: float) -> float:
         """Along the body, in m/s2, as motor, brakes and friction give it."""
-        asked = (driving - vx) / self.car.speed_lag if by_speed else driving
-        pushes = asked * vx >= 0 and not (asked < 0 and not by_speed)
+        asked = (driving - vx) / self.car.speed_lag if self._to_speed else driving
+        pushes = asked * vx >= 0 and not (asked < 0 and not self._to_speed)
         most = self.car.max_acceleration if pushes else self.car.max_braking
         given = limited(asked, most) * (self.power if pushes else 1.0)
         return limited(given, self.car.friction * GRAVITY)
 
-    def _derivative(
-        self, motion: BodyMotion, wheel: float, driving: float, by_speed: bool
-    ) -> tuple[float, float, float]:
-        along = self._acceleration(motion.vx, driving, by_speed)
+    def _derivative(self, motion: BodyMotion, wheel: float, driving: float) -> tuple[float, float, float]:
+        along = self._acceleration(motion.vx, driving)
         if not self.has_tyres:
             return along, 0.0, 0.0
         rolling = self._rolling(motion.vx, wheel)

@@ -162,8 +162,8 @@ class KiwiDrive:
         gain = car.gain_forward if motion.vx > 0 else car.gain_reverse
         pedal = pedal_position(car.resistance * motion.vx / gain, car) if gain else 0.0
         vx = gain * pedal / car.resistance
-        base = car.front + car.rear
-        gradient = car.mass * (car.rear / car.cornering_front - car.front / car.cornering_rear) / base
+        base, front, rear = car.front + car.rear, car.cornering_front, car.cornering_rear
+        gradient = car.mass * (car.rear / front - car.front / rear) / base if front and rear else 0.0
         wheel = motion.yaw_rate * (base + gradient * vx * abs(vx)) / abs(vx) if vx else 0.0
         wheel = max(-car.steering_limit, min(car.steering_limit, wheel))
         return {STEERING: wheel + self.offset, PEDAL: pedal}

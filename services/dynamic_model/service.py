@@ -45,8 +45,8 @@ class DynamicModel(Service):
         car = read_car(Path(flags["vehicle"])) if flags["vehicle"] else KIWI
         drive = _drive(flags, condition)
         self.vehicle = Vehicle(car, condition, drive)
-        own = {(_MOTION, None): self._follow, ("opendlv.sim.Command", None): self._command}
-        self.inputs = {**self._requests(flags), **own}
+        self.inputs = self._requests(flags)
+        self.inputs |= {(_MOTION, None): self._follow, ("opendlv.sim.Command", None): self._command}
         self._moves_sideways = False
         self._state = context.messages.type("opendlv.sim.KinematicState")
         self._frame_id = flags["frame-id"]

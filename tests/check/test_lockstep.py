@@ -83,8 +83,7 @@ MOTION = "opendlv.proxy.GroundMotionRequest"
     [
         ([MOTION], [MOTION]),
         ([STEERING, PEDAL], [STEERING, PEDAL]),
-        ([STEERING, MOTION], [MOTION, STEERING]),
-        ([f"{MOTION}/3"], [MOTION]),
+        ([STEERING, f"{MOTION}/3"], [MOTION, STEERING]),
         (["opendlv.proxy.GroundSpeedRequest"], [STEERING, PEDAL]),
     ],
 )
