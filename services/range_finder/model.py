@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from services.range_finder.outlines import Array, Cut, Outlines, Place
+from services.scene.outlines import Array, Cut, Outlines, Place
 
 Beyond = Literal["maximum", "zero", "silence"]
 

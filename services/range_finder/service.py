@@ -3,15 +3,13 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from services.base import Context, Flags, Output, Service, period_of
 from services.range_finder.model import Curve, Device, RangeFinder, Sensor
-from services.range_finder.outlines import Outlines, Place
-from services.scene.camera import body_pose
+from services.scene.outlines import Outlines
+from services.scene.places import Places
 
 DISTANCE, VOLTAGE = "opendlv.proxy.DistanceReading", "opendlv.proxy.VoltageReading"
-FRAME = "opendlv.sim.Frame"
 
 
 class RangeFinderService(Service):
@@ -20,34 +18,18 @@ class RangeFinderService(Service):
     def __init__(self, context: Context, model: RangeFinder, moving: tuple[int, ...]) -> None:
         flags = context.flags
         self.period = period_of(flags["freq"])
-        self._log, self._model, self._own = context.log, model, flags["frame-id"]
-        self._places: dict[int, Place] = {}
+        self._model, self.places = model, Places(flags["frame-id"], moving, context.log)
         self._type, self._field = context.messages.type(flags["message"]), flags["message"].split(".")[-1]
         self._field = self._field.removesuffix("Reading").lower()
-        self.rejected = 0
-        self.inputs = {(FRAME, stamp): self._taking(stamp) for stamp in (self._own, *moving)}
+        self.inputs = self.places.inputs
 
     def update(self, now: int) -> Iterator[Output]:
-        vehicle = self._places.get(self._own)
-        if vehicle is None:
+        if (vehicle := self.places.vehicle) is None:
             return
-        for sensor, value in zip(self._model.sensors, self._model.readings(vehicle, self._places), strict=True):
+        readings = self._model.readings(vehicle, self.places.known)
+        for sensor, value in zip(self._model.sensors, readings, strict=True):
             if value is not None:
                 yield Output(self._type(**{self._field: value}), sensor.stamp)
-
-    def _taking(self, stamp: int) -> Any:
-        def take(frame: Any, _sample_time: int) -> None:
-            try:
-                pose = body_pose(frame)
-            except ValueError as error:
-                self.rejected += 1
-                if self.rejected == 1:
-                    self._log.warning("refused a frame of %d, and will refuse all such: %s", stamp, error)
-                return
-            x, y, z = pose.position.tolist()
-            self._places[stamp] = Place(x, y, z, math.atan2(pose.rotation[1, 0], pose.rotation[0, 0]))
-
-        return take
 
 
 def build(context: Context) -> Service:

@@ -63,7 +63,7 @@ def ends_cleanly(process: "subprocess.Popen[str]") -> None:
 
 
 def test_all_services_are_tried() -> None:
-    assert len(FOLDERS) == 17
+    assert len(FOLDERS) == 19
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)

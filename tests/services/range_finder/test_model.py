@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.range_finder.model import Curve, CurveError, Device, RangeFinder, Sensor
-from services.range_finder.outlines import Cut, Outlines, Place
+from services.scene.outlines import Cut, Outlines, Place
 
 KIWI = "3.0,0.04;1.6,0.078;1.0,0.13;0.6,0.22;0.3,0.4"
 INFRARED = Device(near=0.04, far=0.4, curve=Curve.parse(KIWI))

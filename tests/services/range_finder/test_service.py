@@ -62,7 +62,7 @@ def test_silence_and_frames_that_are_none(folder: Path, caplog: pytest.LogCaptur
     with built("range_finder", f"--map-path={folder}", "--id=0", "--beyond=silence") as service:
         hand(service, FRAME, 0, 0, x=math.nan, qw=1.0)
         hand(service, FRAME, 0, 0)
-        assert service.rejected == 2 and len(caplog.records) == 1
+        assert service.places.rejected == 2 and len(caplog.records) == 1
         hand(service, FRAME, 0, 0, qw=1.0)
         assert read(service) == {}
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from services.range_finder.outlines import Cut, Outlines, Place, slice_mesh
+from services.scene.outlines import Cut, Outlines, Place, slice_mesh
 
 INSTANCE = [2.0, 0.0, 0.0, 0.0]
 COORDINATES = st.integers(-400, 400).map(lambda number: number / 100)

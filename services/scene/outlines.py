@@ -6,6 +6,7 @@ Lengths are in m, in the world's frame of reference. What a map has is cut once 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -32,6 +33,8 @@ EVERY = "*"
 """As a wall: all obstacles."""
 _SLACK = 1e-9
 """By how much of its length a segment counts as longer, so that no ray slips through between two of them."""
+_NEAR = 1e-6
+"""A point so near to a segment, by its length, is on it; rays so near to one, by their increment, are tried."""
 _HEIGHTS = 64
 """Heights whose cuts are kept."""
 
@@ -75,6 +78,16 @@ class Cut:
         first = np.cumsum(counts) - counts
         return cls(every[:, 0], every[:, 1] - every[:, 0], first, counts, centres, radii * (1 + _SLACK), solid)
 
+    @classmethod
+    def joined(cls, cuts: Sequence["Cut"]) -> "Cut":
+        """All bodies of some cuts."""
+        if len(cuts) == 1:
+            return cuts[0]
+        lengths = [len(cut.starts) for cut in cuts]
+        whole = {name: np.concatenate([getattr(cut, name) for cut in cuts]) for name in cls.__dataclass_fields__}
+        whole["first"] += np.repeat(np.cumsum(lengths) - lengths, [len(cut.first) for cut in cuts])
+        return cls(**whole)
+
     def moved(self, x: float, y: float, turn: float) -> "Cut":
         """Turned about the origin by rad counter-clockwise, and then moved."""
         rotation, place = _rotation(turn), np.array([x, y])
@@ -88,12 +101,34 @@ class Cut:
             return np.full(len(origins), np.inf)
         (ox, oy), (ux, uy) = origins.T[:, :, None], directions.T[:, :, None]
         (ax, ay), (ex, ey) = self.starts[segments].T, self.edges[segments].T
-        wx, wy = ax - ox, ay - oy
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = 1.0 / (ux * ey - uy * ex)
-            along, place = (wx * ey - wy * ex) * share, (wx * uy - wy * ux) * share
-            hit = (place >= -_SLACK) & (place <= 1 + _SLACK) & (along >= 0.0) & (along <= reach)
-        nearest: Array = np.where(hit, along, np.inf).min(axis=1)
+        nearest: Array = _along((ax - ox, ay - oy), (ex, ey), (ux, uy), reach).min(axis=1)
+        return nearest
+
+    def scan(self, origin: Array, directions: Array, increment: float, reach: float) -> Array:
+        """As ``distances`` (R,) from one origin (2,), 0 inside a solid body.
+
+        Each unit vector is turned from the one before by the increment (rad), all of them by a full turn at most, so
+        that each segment is tried with the rays alone that are within the angle at which it is seen.
+        """
+        if self.contains(origin[None])[0]:
+            return np.zeros(len(directions))
+        segments = self._segments(np.flatnonzero(np.hypot(*(self.centres - origin).T) - self.radii <= reach))
+        (wx, wy), (ex, ey) = (self.starts[segments] - origin).T, self.edges[segments].T
+        bx, by = wx + ex, wy + ey
+        turn, towards = wx * ey - wy * ex, wx * bx + wy * by
+        begin = np.where(turn >= 0.0, np.arctan2(wy, wx), np.arctan2(by, bx))
+        first = np.mod(begin - math.atan2(directions[0, 1], directions[0, 0]), math.tau) / increment
+        last = first + np.abs(np.arctan2(turn, towards)) / increment
+        touched = (towards <= 0.0) & (np.abs(turn) <= _NEAR * (ex * ex + ey * ey))
+        first[touched], last[touched] = 0.0, len(directions)
+        around = math.tau / increment  # what goes on beyond the last ray may meet the first ones again
+        low = np.maximum(np.ceil(np.concatenate([first, first - around]) - _NEAR), 0.0).astype(np.intp)
+        high = np.floor(np.concatenate([last, last - around]) + _NEAR).astype(np.intp)
+        counts = np.maximum(np.minimum(high, len(directions) - 1) - low + 1, 0)
+        ray = np.arange(counts.sum()) + np.repeat(low - np.cumsum(counts) + counts, counts)
+        tried = np.repeat(np.tile(np.arange(len(segments)), 2), counts)
+        nearest, seen = np.full(len(directions), np.inf), (self.starts[segments[tried]] - origin).T
+        np.minimum.at(nearest, ray, _along(seen, self.edges[segments[tried]].T, directions[ray].T, reach))
         return nearest
 
     def nearest(self, origins: Array, directions: Array, half: float, reach: float) -> Array:
@@ -156,6 +191,16 @@ class Cut:
         return numbers
 
 
+def _along(w: Iterable[Array], e: Iterable[Array], u: Iterable[Array], reach: float) -> Array:
+    """How far it is along unit vectors u to segments e that begin at w; inf where they are not met within reach."""
+    (wx, wy), (ex, ey), (ux, uy) = w, e, u
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = 1.0 / (ux * ey - uy * ex)
+        along, place = (wx * ey - wy * ex) * share, (wx * uy - wy * ux) * share
+        hit = (place >= -_SLACK) & (place <= 1 + _SLACK) & (along >= 0.0) & (along <= reach)
+    return np.where(hit, along, np.inf)
+
+
 def _rotation(turn: float) -> Array:
     c, s = math.cos(turn), math.sin(turn)
     return np.array([[c, -s], [s, c]])
@@ -206,6 +251,11 @@ class Mesh:
         """The segments (n, 2, 2) at a height."""
         return slice_mesh(self.vertices, self.triangles, height)
 
+    @lru_cache(maxsize=_HEIGHTS)  # noqa: B019 - meshes live as long as their service
+    def cut(self, height: float) -> Cut:
+        """It alone at a height."""
+        return Cut.of([(self.at(height), self.solid)])
+
 
 class Outlines:
     """All that stands in a map, and what moves in it: models at the frames of sender stamps."""
@@ -237,8 +287,7 @@ class Outlines:
         """The models that move, at a height, those of them whose places are known."""
         for stamp, mesh in self.moving.items():
             if place := places.get(stamp):
-                cut = Cut.of([(mesh.at(height - place.z), mesh.solid)])
-                yield cut.moved(place.x, place.y, place.yaw + FRAME_TURN)
+                yield mesh.cut(height - place.z).moved(place.x, place.y, place.yaw + FRAME_TURN)
 
     def _moving(self, own: int | None) -> Iterator[tuple[int, Mesh]]:
         for model in self._map.models:
