@@ -23,6 +23,7 @@ from dodo_dsl import package_data
 PACKAGES = {
     "lsp": ("pygls",),
     "mcap": ("foxglove-schemas-protobuf", "mcap", "mcap-protobuf-support"),
+    "ros": ("cyclonedds==11.0.1", "rosbags"),
     "search": ("scipy",),
     "storage": ("psycopg[binary]",),
 }
@@ -30,6 +31,7 @@ PACKAGES = {
 _LOADED = {
     "lsp": ("pygls.lsp.server", "lsprotocol.types"),
     "mcap": ("mcap.writer", "mcap_protobuf.schema", "foxglove_schemas_protobuf"),
+    "ros": ("rosbags.rosbag2", "cyclonedds.core"),
     "search": ("scipy",),
     "storage": ("psycopg",),
 }

@@ -81,12 +81,12 @@ def test_what_texts_name_exists() -> None:
 def test_extras_are_those_of_the_project() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     del extras["dev"]
-    assert {name: [re.split(r"[<>=]", one)[0] for one in extras[name]] for name in extras} == {
+    assert {name: [re.split(r"[<>;]", one)[0] for one in extras[name]] for name in extras} == {
         name: list(packages) for name, packages in advice.PACKAGES.items()
     }
     owners = metadata.packages_distributions()
     for extra, packages in advice.PACKAGES.items():
-        names = {package.partition("[")[0] for package in packages}
+        names = {re.split(r"[\[=]", package)[0] for package in packages}
         of_modules = {owner for module in advice._LOADED[extra] for owner in owners[module.partition(".")[0]]}
         assert of_modules & names, extra
         assert advice.missing(extra) == ""

@@ -83,6 +83,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
     from dodo_dsl.opendlv.odvd import OdvdError
     from dodo_dsl.opendlv.recording import RecordingError
     from dodo_dsl.opendlv.regular_file import NotAFile
+    from dodo_dsl.opendlv.ros_codec import RosTypeError
     from dodo_dsl.plan.test_files import FilesError
     from dodo_dsl.rec.coco import LabelError
     from dodo_dsl.rec.frames import FramesError
@@ -103,6 +104,7 @@ def _usage_errors() -> tuple[type[Exception], ...]:
         SplitError,
         TruthError,
         NotAFile,
+        RosTypeError,
         NotReplaceable,
     )
     return (*recordings, FilesError, ResultsError, NoChildJobs, RegistryError)

@@ -1,4 +1,4 @@
-"""dodo rec: inspect, cut and export recordings."""
+"""dodo rec: inspect, cut, export and import recordings."""
 
 import argparse
 import math
@@ -16,6 +16,8 @@ EXAMPLES = """examples:
   dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
   dodo rec export drive.rec --video -o drive.mp4                  what the camera saw
   dodo rec export drive.rec --mcap -o drive.mcap                  for Foxglove, Lichtblick or rerun
+  dodo rec export drive.rec --ros -o bag                          a bag of ROS 2, for RViz and ros2 bag play
+  dodo rec import bag -o drive.rec                                and back, by the types of its topics
 """
 _CUT = """examples:
   dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5
@@ -26,6 +28,7 @@ _EXPORT = """examples:
   dodo rec export drive.rec --frames -o pictures --pictures jpg
   dodo rec export drive.rec --video -o drive.mp4 --camera 0
   dodo rec export drive.rec --mcap -o drive.mcap
+  dodo rec export drive.rec --ros -o bag --storage sqlite3
   dodo rec export old.rec --csv -o tables --messages 0.9 --messages own.odvd
   dodo rec export drive.rec --coco -o labelled --labels 3 --pictures jpg
   dodo rec export desk.rec --coco -o labelled --truth desk.json
@@ -39,7 +42,12 @@ _FORMATS = {
     "frames": "write the camera's frames as images, named by sender stamp and sample time",
     "video": "write the camera's packets into an MP4, h264 as recorded and other formats encoded again",
     "mcap": "write an MCAP file for Foxglove, Lichtblick or rerun (needs DoDo's extra 'mcap')",
+    "ros": "write a bag of ROS 2, a topic for each message that has a type there (needs DoDo's extra 'ros')",
 }
+_IMPORT = """examples:
+  dodo rec import bag -o drive.rec
+  dodo rec import drive_0.mcap --lossy
+"""
 _INFO = """examples:
   dodo rec info drive.rec
   dodo rec info drive.rec --json --no-decode
@@ -79,9 +87,21 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="with --coco or --steering: folders train and validation, the latter with this share of the recordings",
     )  # fmt: skip
     export.add_argument("--seed", metavar="N", type=_stamp, default=0, help="chooses those recordings (default: 0)")
+    export.add_argument(
+        "--storage", choices=("mcap", "sqlite3"), default="mcap", help="storage of the bag for --ros (default: mcap)"
+    )
     export.add_argument("--all", action="store_true", help="with --coco: also export frames without a detection")
     for action in (cut, export):
         _selection(action)
+    text = "make a recording of a bag of ROS 2, by the types of its topics (needs DoDo's extra 'ros')"
+    imported = _action(actions, "import", text, _IMPORT)
+    imported.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, help="new recording (default: the bag's name with .rec)"
+    )
+    imported.add_argument(
+        "--lossy", action="store_true", help="smaller pictures, which look the same but are not; JPEG stays as it is"
+    )
+    imported.add_argument("--force", action="store_true", help="replace existing files")
 
 
 def _action(
@@ -94,6 +114,9 @@ def _action(
         action.add_argument(
             "files", metavar="FILE.rec", type=Path, nargs="+", help="--coco and --steering take several"
         )
+    elif name == "import":
+        action.add_argument("file", metavar="BAG", type=Path, help="folder of rosbag2, or its .mcap or .db3")
+        return action
     else:
         action.add_argument("file", metavar="FILE.rec", type=Path)
     action.add_argument(

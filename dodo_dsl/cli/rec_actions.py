@@ -114,6 +114,11 @@ def _place(problem: Diagnostic) -> str:
 
 def run(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> None:
     """Carries out one action; raises OSError and what else ``cli.errors`` has a sentence for."""
+    if options.action == "import":
+        from dodo_dsl.cli import rec_bag
+
+        rec_bag.import_bag(options, stdout, stderr)
+        return
     if options.action == "export":
         from dodo_dsl.cli import rec_export
 

@@ -159,12 +159,19 @@ def _mcap(job: RecJob) -> None:
     job.stdout.write(f"{output}: {written.messages} messages, and {written.converted} of them for Foxglove, too\n")
 
 
+def _ros(job: RecJob) -> None:
+    from dodo_dsl.cli import rec_bag
+
+    rec_bag.export_bag(job)
+
+
 EXPORTS: Mapping[str, Callable[[RecJob], None]] = {
     "csv": _csv,
     "coco": _coco,
     "frames": _frames,
     "video": _video,
     "mcap": _mcap,
+    "ros": _ros,
 }
 
 FORMATS = ("coco", "steering")

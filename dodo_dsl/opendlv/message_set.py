@@ -75,7 +75,9 @@ def _truncated(value: int, type_: str) -> int:
     return wire.unzigzag(wire.zigzag(value) & mask)
 
 
-OWN_IDS = range(2900, 3000)  # DoDo's
+_RESERVED = range(2900, 3000)
+OWN_IDS = frozenset(_RESERVED) - frozenset(range(2910, 2920))
+"""DoDo's, about a test. Beside them are messages of robots (``robot.*``), which are played and judged as all others."""
 
 
 class UnknownMessage(MessageError, KeyError):
@@ -187,7 +189,7 @@ def merged(paths: Iterable[Path]) -> list[Definition]:
     """The messages of ODVD files, each once; raises OdvdError."""
     by_key: dict[str | int, Definition] = {}
     for definition in (definition for path in paths for definition in odvd.load(path)):
-        if definition.id in OWN_IDS or definition.name.startswith("dodo."):
+        if definition.id in _RESERVED or definition.name.startswith("dodo."):
             raise OdvdError(f"{definition.place}: ids 2900 to 2999 and names that begin with 'dodo.' are DoDo's own")
         for key in (definition.name, definition.id):
             earlier = by_key.setdefault(key, definition)

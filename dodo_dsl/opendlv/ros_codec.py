@@ -30,7 +30,7 @@ def require_ros(*modules: str) -> None:
     """Raises RosTypeError where ``modules``, else all of DoDo's extra ``ros``, are not installed."""
     missing = [name for name in modules or ("rosbags", "cyclonedds") if importlib.util.find_spec(name) is None]
     if missing:
-        raise RosTypeError(f"ROS 2 needs {' and '.join(missing)}, which this Python lacks: pip install 'dodo-dsl[ros]'")
+        raise RosTypeError(f"ROS 2 needs {' and '.join(missing)} of DoDo's extra 'ros', which this Python lacks")
 
 
 class Codec:

@@ -81,8 +81,8 @@ class Types(Codec):
         if topic.type == CLOCK_TYPE:
             return {"clock": stamp_of(time_us)}
         if topic.type in (*PICTURES, CAMERA_INFO):
-            return self._header(topic, time_us) | picture_fields(topic, picture)
-        fields = _copied(CONSTANTS.get(topic.type, {})) | self._header(topic, time_us)
+            return self.given_header(topic, time_us) | picture_fields(topic, picture)
+        fields = _copied(CONSTANTS.get(topic.type, {})) | self.given_header(topic, time_us)
         names = [name for name, _ in _bus(topic)]
         for name in names:
             if name not in messages:
@@ -97,7 +97,9 @@ class Types(Codec):
         time = time or received_us
         if topic.type == DETECTIONS:
             return list(_detections(topic, fields, time))
-        return [BusMessage(name, stamp, time, self._values(topic, name, fields)) for name, stamp in _bus(topic)]
+        unknown = _not_measured(topic, fields)
+        bus = ((name, stamp) for name, stamp in _bus(topic) if name not in unknown)
+        return [BusMessage(name, stamp, time, self._values(topic, name, fields)) for name, stamp in bus]
 
     def frames(self, frames: Sequence[StaticFrame], time_us: int) -> Fields:
         """The message of ``/tf_static``."""
@@ -110,7 +112,8 @@ class Types(Codec):
             transforms.append({"header": header, "child_frame_id": frame.child, "transform": transform})
         return {"transforms": transforms}
 
-    def _header(self, topic: Topic, time_us: int) -> Fields:
+    def given_header(self, topic: Topic, time_us: int) -> Fields:
+        """The field ``header``, where the type has one."""
         if not self.has_header(topic.type):
             return {}
         frame_id = topic.frame_id or FRAME_IDS.get(topic.type, "")
@@ -241,11 +244,18 @@ def _completed(topic: Topic, fields: Fields, names: Sequence[str]) -> Fields:
         last = max(len(fields["ranges"]) - 1, 0)
         fields["angle_max"] = fields["angle_min"] + fields["angle_increment"] * last
         fields["scan_time"] = 1 / topic.rate if topic.rate else 0.0
-    if topic.type == IMU:
-        for name, quantity in (ANGULAR, "angular_velocity"), (ACCELERATION, "linear_acceleration"):
-            if name not in names:
-                fields[f"{quantity}_covariance"] = UNKNOWN
+    for name, covariance in _COVARIANCES.items():
+        if topic.type == IMU and name not in names:
+            fields[covariance] = UNKNOWN
     return fields
+
+
+_COVARIANCES = {ANGULAR: "angular_velocity_covariance", ACCELERATION: "linear_acceleration_covariance"}
+
+
+def _not_measured(topic: Topic, fields: Mapping[str, Any]) -> list[str]:
+    """The messages of which an Imu has nothing, as its covariances say."""
+    return [name for name, each in _COVARIANCES.items() if topic.type == IMU and fields[each][0] == -1]
 
 
 def _unit(found: Fields, topic: Topic) -> Fields:

@@ -24,8 +24,8 @@ _TYPE_FIELD, _DATA_FIELD, _STAMP_FIELD = 1, 2, 6
 _IMAGE = 1055
 _TIMES = (5, 4, 3)
 """Fields of when a message was sampled, received and sent."""
-_FIRST, _OWN = 13, 2900
-"""Ids below are of tools, and a hundred from here on are DoDo's: their times are not those of a drive."""
+_FIRST, _OWN = 13, frozenset({*range(2900, 2910), *range(2920, 3000)})
+"""Ids below are of tools, and some are DoDo's: their times are not those of a drive."""
 _DAY = 86_400_000_000
 _HINT = "expected an OpenDLV recording (.rec), as cluon-rec and rec-recorder write it"
 
@@ -117,12 +117,14 @@ def _fault(path: Path, _changed_ns: int) -> str:
         with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
             if not _is_doubtful(_bodies(stream, LookedThrough(0))):
                 return ""
+        import numpy as np
+
         from dodo_dsl.opendlv import recording_times
         from dodo_dsl.opendlv.recording import Recording, RecordingError
 
         with Recording(path) as recording:
-            types = recording.index["data_type"]
-            return recording_times.fault(recording, ((types < _OWN) | (types >= _OWN + 100)).nonzero()[0])
+            rows = [row for row, id_ in enumerate(recording.index["data_type"].tolist()) if id_ not in _OWN]
+            return recording_times.fault(recording, np.array(rows, np.int64))
     except (OSError, RecordingError):
         return ""  # reported where it is read
 
@@ -133,7 +135,7 @@ def _is_doubtful(bodies: Iterator[bytes]) -> bool:
     low, high = 1 << 63, 0
     for body in bodies:
         id_ = _type(body)
-        if id_ < _FIRST or _OWN <= id_ < _OWN + 100:
+        if id_ < _FIRST or id_ in _OWN:
             continue
         time = next((time for number in _TIMES if (time := _time(body, number))), 0)
         key = id_, first_number(body, _STAMP_FIELD)
