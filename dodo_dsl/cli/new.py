@@ -229,6 +229,7 @@ EXAMPLES = """examples:
   dodo new hil-my-curve --level hil                    the same on a rig, or emulated by dodo run --emulate
   dodo new sil-my-dark --extends sil-my-curve          a changed copy of another test
   dodo new dil-mine --level dil --rec drive.rec        your own recording, and its signal as the target
+  dodo new dil-bag --level dil --rec bag               the same of a bag of ROS 2
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --application --language cpp                the same in C++, on libcluon
@@ -266,7 +267,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--rec",
         metavar="FILE.rec",
         type=Path,
-        help="recording that a new dil test plays, with its target",
+        help="recording, or bag of ROS 2, that a new dil test plays, with its target",
     )
 
 
@@ -351,10 +352,11 @@ def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New]
 
         declared = application.declared.values() if application else ()
         sent = {name.partition("/")[0] for own in declared if own for name, _ in own.outputs}
-        drive = recorded_drive.look(wanted.rec, sent)
-        made, note = recorded_drive.files(wanted.name, wanted.rec, drive, place.registry, place.root, pictures)
-        note += pictures.note if drive.cameras else ""
-        return made, note + recorded_drive.unpassable(wanted.rec, drive, application, pictures)
+        with recorded_drive.recording_of(wanted.rec) as (rec, imported):
+            drive = recorded_drive.look(rec, sent)
+            made, note = recorded_drive.files(wanted.name, rec, drive, place.registry, place.root, pictures)
+        note = imported + note + (pictures.note if drive.cameras else "")
+        return made, note + recorded_drive.unpassable(rec, drive, application, pictures)
     if wanted.extends:
         note = f"copied, because '{wanted.extends}' ships with DoDo and a test extends only tests of its own registry\n"
         return _from_another(wanted.name, wanted.extends, tests, place, note)

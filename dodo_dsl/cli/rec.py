@@ -16,8 +16,8 @@ EXAMPLES = """examples:
   dodo rec export drive.rec --coco -o labelled                    frames and detections as a data set
   dodo rec export drive.rec --video -o drive.mp4                  what the camera saw
   dodo rec export drive.rec --mcap -o drive.mcap                  for Foxglove, Lichtblick or rerun
-  dodo rec export drive.rec --ros -o bag                          a bag of ROS 2, for RViz and ros2 bag play
-  dodo rec import bag -o drive.rec                                and back, by the types of its topics
+  dodo rec export drive.rec --ros -o bag                          a bag of ROS 2, for RViz and others
+  dodo rec import recorded -o drive-1.rec                         a recording of a bag, by the types of its topics
 """
 _CUT = """examples:
   dodo rec cut drive.rec -o curve.rec --start 4 --end 9.5
@@ -45,8 +45,8 @@ _FORMATS = {
     "ros": "write a bag of ROS 2, a topic for each message that has a type there (needs DoDo's extra 'ros')",
 }
 _IMPORT = """examples:
-  dodo rec import bag -o drive.rec
-  dodo rec import drive_0.mcap --lossy
+  dodo rec import recorded -o drive-1.rec
+  dodo rec import recorded/recorded.mcap --lossy
 """
 _INFO = """examples:
   dodo rec info drive.rec

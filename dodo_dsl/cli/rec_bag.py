@@ -42,12 +42,11 @@ def into(path: Path, place: Path, lossy: bool, problem: Callable[[str], None], s
         progress_bar(stderr, f"reading {path.name}", sum(found.counts.values())) as progress,
     ):
         result = import_bag(found, path, place, lossy, progress)
-    for (topic, type_), count in result.left_out.items():
-        problem(f"left out {topic} ({type_}), {_messages(count)}: a recording has none of that type")
     _tell_skipped(result.skipped, result.reasons, problem)
     lines = [f"{result.counts.total()} messages of {len(result.topics)} topics\n"]
     for each in result.topics.values():
         lines.append(f"  {each.topic} ({each.type}): {result.counts[each.topic]} -> {', '.join(each.bus)}\n")
+    lines += [f"  {topic} ({type_}): {count} -> left out\n" for (topic, type_), count in result.left_out.items()]
     return "".join(lines)
 
 
@@ -69,12 +68,13 @@ def export_bag(job: RecJob) -> None:
         result = export_bag(job.recording, job.messages, rows, writer, types, progress)
         if not writer.counts:
             raise NothingSelected(f"{job.recording.path} has no message that has a type of ROS 2")
-    for id_, count in sorted(result.left_out.items()):
-        name = job.messages.name(id_) if id_ in job.messages.ids() else f"messages with id {id_}"
-        job.tell(f"left out {name}, {_messages(count)}: no topic is made of it alone")
     _tell_skipped(result.skipped, result.reasons, job.tell)
-    lines = [f"  {topic} ({type_}): {count}\n" for (topic, type_), count in sorted(writer.counts.items())]
-    job.stdout.write(f"{folder}: {sum(writer.counts.values())} messages of {len(lines)} topics\n{''.join(lines)}")
+    lines = [f"{folder}: {sum(writer.counts.values())} messages of {len(writer.counts)} topics\n"]
+    lines += [f"  {topic} ({type_}): {count}\n" for (topic, type_), count in sorted(writer.counts.items())]
+    for id_, count in sorted(result.left_out.items()):
+        name = job.messages.name(id_) if id_ in job.messages.ids() else f"message {id_}"
+        lines.append(f"  {name}: {count} -> left out\n")
+    job.stdout.write("".join(lines))
 
 
 def _require_rosbags(what: str) -> None:

@@ -3,7 +3,10 @@
 import json
 import math
 import re
-from collections.abc import Collection
+import sys
+import tempfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +15,7 @@ from numpy.typing import NDArray
 
 from dodo_dsl.application.model import ApplicationSource
 from dodo_dsl.check import wiring_rules
+from dodo_dsl.cli import rec_bag
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
 from dodo_dsl.cli.existing_application import Pictures
 from dodo_dsl.cli.new_files import New, filled
@@ -34,6 +38,7 @@ SIGNALS = {
     "opendlv.proxy.GroundAccelerationRequest": "groundAcceleration",
     "opendlv.proxy.AxleAngularVelocityRequest": "axleAngularVelocity",
     "opendlv.proxy.AngleRequest": "angle",
+    "opendlv.proxy.GroundMotionRequest": "yawRate",
 }
 """Messages with a signal that can be judged and its field, the preferred ones first."""
 BOUNDS = {"opendlv.proxy.GroundSteeringRequest": "38 deg", "opendlv.proxy.PedalPositionRequest": "1"}
@@ -85,6 +90,19 @@ class RecordedDrive:
     def of_constant(self) -> float:
         """The mean distance of the signal to the constant that is nearest to it."""
         return float(np.abs(np.array(self.values) - np.median(self.values)).mean()) if self.values else 0.0
+
+
+@contextmanager
+def recording_of(path: Path) -> Iterator[tuple[Path, str]]:
+    """A recording, and what became of the topics of the bag that ``path`` may be; raises UsageError, BagError."""
+    if not rec_bag.is_bag(path):
+        yield path, ""
+        return
+    with tempfile.TemporaryDirectory() as folder, files_of_the_user():
+        place = Path(folder) / f"{path.resolve().stem}{_SUFFIX}"
+        problems: list[str] = []
+        said = rec_bag.into(path, place, False, problems.append, sys.stderr)
+        yield place, f"{shown_path(str(path))}: {said}" + "".join(f"  {each}\n" for each in problems)
 
 
 def look(path: Path, sent: Collection[str]) -> RecordedDrive:
@@ -242,7 +260,8 @@ def _limit(value: float) -> str:
 
 
 def _found(path: Path, drive: RecordedDrive, field: str) -> str:
-    lines = [f"{shown_path(str(path))}: {drive.duration:.1f} s, {_cameras(drive.cameras)}"]
+    name = path.name if path.is_absolute() else shown_path(str(path))
+    lines = [f"{name}: {drive.duration:.1f} s, {_cameras(drive.cameras)}"]
     if drive.target is None:
         lines.append(
             f"judged: whether each picture is answered by {drive.answer}/0, because there is no recorded signal"

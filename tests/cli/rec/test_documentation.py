@@ -13,7 +13,9 @@ from dodo_dsl.rec.truth import Mark, truth_text
 from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, video
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
-SHOWN = re.findall(r"^ +dodo rec (.*?)(?:  |$)", PAGE + rec.EXAMPLES + rec._CUT + rec._EXPORT + rec._INFO, re.MULTILINE)
+SHOWN = re.findall(
+    r"^ +dodo rec (.*?)(?:  |$)", PAGE + rec.EXAMPLES + rec._CUT + rec._EXPORT + rec._INFO + rec._IMPORT, re.MULTILINE
+)
 
 
 @pytest.mark.parametrize("words", sorted(set(SHOWN)))
@@ -37,6 +39,8 @@ def test_the_lines_shown_run(
     for name in ("drive.rec", "old.rec", "desk.rec"):
         record([*video(4), *others, *box], name)
     (tmp_path / "desk.json").write_text(truth_text([Mark("yellow", 1, 2, 3, 4)], "desk.png", WIDTH, HEIGHT))
+    if words.startswith("import"):
+        assert dodo_rec("export", "drive.rec", "--ros", "-o", "recorded").code == 0
     code, stdout, stderr = dodo_rec(*shlex.split(words))
     assert (code, stderr) == (0, "") and stdout
 

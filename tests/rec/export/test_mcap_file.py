@@ -28,7 +28,7 @@ from dodo_dsl.rec.mcap import topic
 from tests.opendlv.test_against_libcluon import some_value
 from tests.rec.conftest import BEGIN, MESSAGES, dodo_rec, message, video
 
-OWN = ("/camera/", "/picture/", "/tf", "/log")
+OWN = ("/camera/", "/picture/", "/tf", "/log", "/scan/", "/odom/", "/estimate/")
 
 
 def read(path: Path) -> dict[str, list[tuple[Any, Any]]]:

@@ -1,0 +1,150 @@
+"""Bytes of ROS messages: there and back, against rclpy, and what does not fit."""
+
+import json
+import os
+import random
+import subprocess
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dodo_dsl.opendlv.ros_codec import Codec, RosTypeError, own_name
+from tests.opendlv.ros.values import CARRIED, plain, some_fields
+
+ROOT = Path(__file__).parents[3]
+PYTHON = Path(os.environ.get("DODO_ROS_PYTHON", ROOT / "build/ros/bin/python"))
+CODEC = Codec()
+TWIST, DETECTIONS = "geometry_msgs/msg/Twist", "vision_msgs/msg/Detection2DArray"
+LANE = "std_msgs/Header header\nfloat32 offset\nuint8 count\nbool seen\nstring label\nPoint2[] points\n"
+
+
+@pytest.mark.parametrize("type_", CARRIED)
+@given(rng=st.randoms(use_true_random=False))
+def test_what_is_encoded_is_decoded(type_: str, rng: random.Random) -> None:
+    fields = some_fields(CODEC, type_, rng)
+    data = CODEC.encode(type_, fields)
+    assert data[:4] == b"\0\1\0\0"
+    assert plain(CODEC.decode(type_, data)) == plain(fields)
+    assert CODEC.encode(type_, CODEC.decode(type_, data)) == data
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(not PYTHON.exists(), reason="no Python with rclpy: name one in DODO_ROS_PYTHON")
+def test_rclpy_reads_and_writes_the_same() -> None:
+    rng = random.Random(47)
+    sent = [(type_, some_fields(CODEC, type_, rng)) for type_ in CARRIED for _ in range(5)]
+    lines = [json.dumps([type_, CODEC.encode(type_, fields).hex()]) for type_, fields in sent]
+    peer = subprocess.run(
+        [PYTHON, Path(__file__).with_name("rclpy_peer.py")],
+        input="\n".join(lines),
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    compared = set()
+    for (type_, fields), line in zip(sent, peer.stdout.splitlines(), strict=True):
+        if (found := json.loads(line)) is not None:
+            compared.add(type_.partition("/")[0])
+            assert found[0] == plain(fields), type_
+            assert plain(CODEC.decode(type_, bytes.fromhex(found[1]))) == plain(fields), type_
+    assert compared >= {"sensor_msgs", "geometry_msgs", "std_msgs"}
+
+
+@pytest.mark.parametrize(
+    ("type_", "fields", "said"),
+    [
+        ("geometry_msgs/msg/Twis", {}, "did you mean 'geometry_msgs/msg/Twist'?"),
+        ("a/msg/B", {}, "expected package/msg/Name, or its file in 'messages:'"),
+        (TWIST, {"linear": {"x": "fast"}}, "Twist.linear.x is 'fast', expected a number (float64)"),
+        (TWIST, {"linear": {"x": True}}, "expected a number"),
+        (TWIST, {"linear": [1.0]}, "expected the fields of geometry_msgs/msg/Vector3"),
+        (TWIST, {"speed": 1.0}, "has no 'speed': it has linear, angular"),
+        ("sensor_msgs/msg/Image", {"height": -1}, "expected a whole number from 0 to 4294967295"),
+        ("sensor_msgs/msg/Image", {"height": 0.5}, "expected a whole number"),
+        ("sensor_msgs/msg/Image", {"height": float("inf")}, "expected a whole number"),
+        ("sensor_msgs/msg/Image", {"encoding": 5}, "expected a text"),
+        ("sensor_msgs/msg/Image", {"data": "red"}, "expected a list of uint8"),
+        ("sensor_msgs/msg/Imu", {"orientation_covariance": [1.0]}, "has 1 values, expected 9"),
+        ("std_msgs/msg/Float32", {"data": 1e39}, "too large for a float32"),
+        ("std_msgs/msg/Bool", {"data": 2}, "expected true or false"),
+        (DETECTIONS, {"detections": 1}, "expected a list"),
+    ],
+)
+def test_values_that_do_not_fit(type_: str, fields: dict[str, object], said: str) -> None:
+    with pytest.raises(RosTypeError) as error:
+        CODEC.encode(type_, fields)
+    assert said in str(error.value)
+
+
+@given(st.sampled_from(CARRIED), st.binary(max_size=80))
+def test_any_bytes_are_decoded_or_refused(type_: str, data: bytes) -> None:
+    for each in (data, b"\0\1\0\0" + data):
+        try:
+            CODEC.decode(type_, each)
+        except RosTypeError as error:
+            assert f"{len(each)} bytes are no {type_}" in str(error)
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> tuple[Path, ...]:
+    folder = tmp_path / "lane_msgs" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Lane.msg").write_text(LANE)
+    (folder / "Point2.msg").write_text("float64 x\nfloat64 y\n")
+    (tmp_path / "Mode.idl").write_text(
+        "module team_msgs { module msg { struct Mode { long number; string text; }; }; };"
+    )
+    return folder / "Lane.msg", folder / "Point2.msg", tmp_path / "Mode.idl"
+
+
+@given(rng=st.randoms(use_true_random=False))
+def test_types_of_ones_own(rng: random.Random, tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.getbasetemp() / "lane_msgs" / "msg"
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {"Lane": LANE, "Point2": "float64 x\nfloat64 y\n"}
+    for name, text in files.items():
+        (folder / f"{name}.msg").write_text(text)
+    codec = Codec([folder / f"{name}.msg" for name in files])
+    fields = some_fields(codec, "lane_msgs/msg/Lane", rng)
+    assert plain(codec.decode("lane_msgs/msg/Lane", codec.encode("lane_msgs/msg/Lane", fields))) == plain(fields)
+
+
+def test_an_idl_file_names_its_package(own: tuple[Path, ...]) -> None:
+    codec = Codec(own)
+    fields = {"number": -3, "text": "go"}
+    assert codec.decode("team_msgs/msg/Mode", codec.encode("team_msgs/msg/Mode", fields)) == fields
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("/a/lane_msgs/msg/Lane.msg", "lane_msgs/msg/Lane"),
+        ("/a/lane_msgs/Lane.msg", "lane_msgs/msg/Lane"),
+    ],
+)
+def test_the_package_of_a_file(path: str, name: str) -> None:
+    assert own_name(Path(path)) == name
+
+
+@pytest.mark.parametrize(
+    ("files", "said"),
+    [
+        ({"p/msg/A.msg": "q/B b\n"}, "'b' of p/msg/A is of q/msg/B, which is not known: name its file, too"),
+        ({"p/msg/A.msg": "float32 = 3\n"}, "A.msg: "),
+        ({"p/A.idl": "struct {"}, "A.idl: "),
+        ({"std_msgs/msg/Header.msg": "string text\n"}, "own types do not fit: Type 'std_msgs/msg/Header'"),
+        ({"p/msg/A.msg": "\xff"}, "not UTF-8"),
+    ],
+)
+def test_files_that_are_refused(files: dict[str, str], said: str, tmp_path: Path) -> None:
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(text.encode("latin-1"))
+    with pytest.raises(RosTypeError) as error:
+        Codec([tmp_path / name for name in files])
+    assert said in str(error.value)
+    with pytest.raises(RosTypeError, match="No such file"):
+        Codec([tmp_path / "Missing.msg"])
