@@ -54,7 +54,7 @@ def export_bag(job: RecJob) -> None:
     """Makes a bag of a recording."""
     _require_rosbags("--ros")
     from dodo_dsl.opendlv.ros_messages import Types
-    from dodo_dsl.rec.bag_export import export_bag
+    from dodo_dsl.rec.bag_export import BagExport
 
     folder, storage, types = job.folder(), job.options.storage, Types(messages=job.messages)
     ending = {"mcap": ".mcap", "sqlite3": ".db3"}[storage]
@@ -65,7 +65,8 @@ def export_bag(job: RecJob) -> None:
         job.progress(f"writing {folder.name}", len(rows)) as progress,
         bag.written(place, folder.resolve().name, storage, types.store) as writer,
     ):
-        result = export_bag(job.recording, job.messages, rows, writer, types, progress)
+        result = BagExport(job.recording, job.messages, types, writer)
+        result.write(rows, progress)
         if not writer.counts:
             raise NothingSelected(f"{job.recording.path} has no message that has a type of ROS 2")
     _tell_skipped(result.skipped, result.reasons, job.tell)

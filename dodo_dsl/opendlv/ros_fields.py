@@ -7,6 +7,7 @@ positive), degrees for places on earth, and infinity for a distance in which not
 from collections.abc import Mapping
 from typing import Any
 
+from dodo_dsl.opendlv import ros_types
 from dodo_dsl.opendlv.ros_types import MOTION_REQUEST, POSE_ESTIMATE
 
 ANGULAR, ACCELERATION = "opendlv.proxy.AngularVelocityReading", "opendlv.proxy.AccelerationReading"
@@ -73,23 +74,13 @@ PATHS: Mapping[tuple[str, str], Paths] = {
 MAY_BE_INFINITE = {(DISTANCE, "distance"), (SCAN, "rangeMax")}
 
 FRAME_IDS: Mapping[str, str] = {
-    IMAGE: "camera_optical_frame",
-    COMPRESSED: "camera_optical_frame",
-    CAMERA_INFO: "camera_optical_frame",
+    **ros_types.FRAME_IDS,
     DETECTIONS: "camera_optical_frame",
-    LASER_SCAN: "laser",
-    RANGE: "range",
-    IMU: "imu_link",
-    NAV_SAT_FIX: "gps",
-    ODOMETRY_TYPE: "odom",
-    TWIST_STAMPED: "base_link",
     "ackermann_msgs/msg/AckermannDriveStamped": "base_link",
     "geometry_msgs/msg/PoseStamped": "map",
     "geometry_msgs/msg/PoseWithCovarianceStamped": "map",
 }
-"""``header.frame_id`` where a topic does not say it (REP 103 and 105)."""
-
-CHILD_FRAME_ID = "base_link"
+"""``header.frame_id`` where a topic does not say it, also of what a node sends."""
 
 UNKNOWN = [-1.0] + [0.0] * 8
 """The covariance of an Imu's quantity that is not measured."""
@@ -98,7 +89,7 @@ CONSTANTS: Mapping[str, Mapping[str, Any]] = {
     IMU: {"orientation": {"w": 1.0}, "orientation_covariance": UNKNOWN},
     NAV_SAT_FIX: {"status": {"status": 0, "service": 1}, "altitude": float("nan")},
     RANGE: {"max_range": float("inf")},
-    ODOMETRY_TYPE: {"child_frame_id": CHILD_FRAME_ID, "pose": {"pose": {"orientation": {"w": 1.0}}}},
+    ODOMETRY_TYPE: {"child_frame_id": "base_link", "pose": {"pose": {"orientation": {"w": 1.0}}}},
     "geometry_msgs/msg/PoseStamped": {"pose": {"orientation": {"w": 1.0}}},
 }
 """What a type holds beside its messages' fields; the rest is 0 or empty. NavSatFix has NaN for no altitude."""

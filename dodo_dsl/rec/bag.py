@@ -36,7 +36,7 @@ READ = {type_: ways[0] for type_, ways in GIVEN.items() if ways[0] != (MEMORY,)}
 
 
 class Way(NamedTuple):
-    """The ROS type and topic that messages become; all of them, or any where the type can say what is not there."""
+    """The ROS type and topic of messages; all of them, or any where the type can say what is not there."""
 
     type: str
     messages: tuple[str, ...]

@@ -1,7 +1,8 @@
 """A recording as an MCAP file, in protobuf: a topic for each message and sender stamp, and Foxglove's where they fit.
 
 Camera frames become CompressedVideo (H.264 and VP9) or CompressedImage (JPEG) with the same bytes, poses
-FrameTransform, scans LaserScan, odometry and estimates PoseInFrame, and log messages Log. Only messages with the fields of message set 1.0 or 0.9 do.
+FrameTransform, scans LaserScan, odometry and estimates PoseInFrame, and log messages Log. Only messages with the
+fields of message set 1.0 or 0.9 do.
 Reference: docs.foxglove.dev, "Message schemas"; mcap.dev, "MCAP File Format", and its registry on the encoding
 ``protobuf``.
 """

@@ -39,7 +39,6 @@ def fields_of(topic: str, number: int) -> dict[str, Any]:
     pixels = np.random.default_rng(number).integers(0, 255, (48, 64, 3), np.uint8)
     box = {"center": {"position": {"x": 32.0, "y": 24.0}}, "size_x": 8.0, "size_y": 4.0}
     hypotheses = [{"hypothesis": {"class_id": "cone" if number % 2 else "7", "score": 1.0}}]
-    header = {"stamp": stamp, "frame_id": "camera_optical_frame"}
     pose = {"pose": {"position": {"x": number * 0.5, "y": 1.0}, "orientation": {"z": 0.6, "w": 0.8}}}
     found: dict[str, tuple[str, dict[str, Any]]] = {
         "/camera/image_raw": (
@@ -49,12 +48,12 @@ def fields_of(topic: str, number: int) -> dict[str, Any]:
         "/cmd_vel": ("", {"linear": {"x": 0.5}, "angular": {"z": number / 128}}),
         "/detections": (
             "camera_optical_frame",
-            {"detections": [{"header": header, "bbox": box, "results": hypotheses}]},
+            {"detections": [{"bbox": box, "results": hypotheses}]},
         ),
         "/drive": ("base_link", {"drive": {"steering_angle": number / 64, "speed": 1.0}}),
         "/fix": ("gps", {"status": {"service": 1}, "latitude": 57.7, "longitude": 11.9, "altitude": float(number)}),
         "/imu": (
-            "imu_link",
+            "imu",
             {
                 "orientation": {"w": 1.0},
                 "orientation_covariance": [-1.0, *[0.0] * 8],

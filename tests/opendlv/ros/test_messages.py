@@ -89,8 +89,7 @@ def test_what_is_given_and_sent_again_is_the_same(type_: str, bus: tuple[str, ..
 
 
 def test_each_type_with_a_header_has_a_frame() -> None:
-    carried = {*GIVEN, *SENT}
-    assert set(FRAME_IDS) == {type_ for type_ in carried if TYPES.has_header(type_)}
+    assert set(FRAME_IDS) == {type_ for type_ in {*GIVEN, *SENT} if TYPES.has_header(type_)}
 
 
 SCAN = {"angleMin": -0.5, "angleIncrement": 0.25, "rangeMin": 0.125, "rangeMax": 30.0}
@@ -125,7 +124,7 @@ UNKNOWN = [-1.0] + [0.0] * 8
                 "orientation_covariance": UNKNOWN,
                 "angular_velocity_covariance": [0.0] * 9,
                 "linear_acceleration_covariance": UNKNOWN,
-                "header": {"frame_id": "imu_link", "stamp": {"sec": 1_700_000_000, "nanosec": 123_456_000}},
+                "header": {"frame_id": "imu", "stamp": {"sec": 1_700_000_000, "nanosec": 123_456_000}},
             },
         ),
         (
