@@ -4,8 +4,8 @@ Reference: OMG, "DDS-XTypes" 1.3, section 7.4.3; ROS 2, "Interface definition".
 """
 
 import importlib.util
-import math
-from collections.abc import Iterable, Mapping, Sequence
+import struct
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,18 @@ Fields = dict[str, Any]
 HEADER = "std_msgs/msg/Header"
 _BASE, _NAME, _ARRAY = 1, 2, 3
 _DTYPES = {"bool": "bool_", "char": "uint8", "byte": "int8"}
+_MISFITS = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
+"""What rosbags raises for values and bytes that do not fit, beside its own error."""
 _TEXTS = ("string", "wstring")
-_LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
 _LARGEST_DEFINITION = 1 << 20
 
 
@@ -72,8 +82,15 @@ class Codec:
 
     def encode(self, type_: str, fields: Mapping[str, Any]) -> bytes:
         """The bytes of a message; fields that are left out are 0 or empty. Raises RosTypeError."""
-        message = self._built(self._known(type_), fields, type_)
-        return bytes(self._store.serialize_cdr(message, type_, little_endian=True))
+        from rosbags.serde import SerdeError
+
+        try:
+            message = self._built(self._known(type_), fields, type_)
+            return bytes(self._store.serialize_cdr(message, type_, little_endian=True))
+        except RosTypeError:
+            raise
+        except (SerdeError, *_MISFITS) as error:
+            raise RosTypeError(f"a value does not fit {type_}: {error}") from None
 
     def decode(self, type_: str, data: bytes | memoryview) -> Fields:
         """All fields of a message, arrays of numbers as those of numpy, without a copy; raises RosTypeError."""
@@ -81,7 +98,7 @@ class Codec:
 
         try:
             message = self._store.deserialize_cdr(data, self._known(type_))
-        except (SerdeError, ArithmeticError, AssertionError, LookupError, MemoryError, ValueError) as error:
+        except (SerdeError, *_MISFITS) as error:
             raise RosTypeError(f"{len(data)} bytes are no {type_}: {error}") from None
         return self._plain(type_, message)
 
@@ -93,17 +110,16 @@ class Codec:
         """Whether a type has a stamp and a frame id."""
         return any(name == "header" and desc == (_NAME, HEADER) for name, desc in self._store.fielddefs[type_][1])
 
-    def leaf(self, type_: str, path: str) -> tuple[int, Any]:
-        """What is at a path (``pose.pose.position.x``) of a type; raises RosTypeError."""
-        at, desc = self._known(type_), (_NAME, type_)
+    def check_path(self, type_: str, path: str) -> None:
+        """Raises RosTypeError where a type has no such path (``pose.pose.position.x``)."""
+        at = self._known(type_)
         for name in path.split("."):
-            known = dict(self._store.fielddefs[at][1]) if desc[0] == _NAME else {}
+            known = dict(self._store.fielddefs[at][1]) if isinstance(at, str) else {}
             if name not in known:
-                has = f"it has {', '.join(known)}" if known else "it has no fields"
-                raise RosTypeError(f"{type_} has no '{path}': there is no '{name}' in {_shown(desc)}; {has}")
-            desc = known[name]
-            at = desc[1]
-        return desc
+                raise RosTypeError(
+                    f"{type_} has no '{path}': there is no '{name}' among {', '.join(known) or 'no fields'}"
+                )
+            at = known[name][1]
 
     def _known(self, type_: str) -> str:
         if type_ not in self._store.fielddefs:
@@ -122,10 +138,8 @@ class Codec:
 
     def _built(self, type_: str, fields: Any, place: str) -> Any:
         known = self._store.fielddefs[type_][1]
-        if not isinstance(fields, Mapping):
-            raise RosTypeError(f"{place} is {fields!r:.60}, expected the fields of {type_}")
-        if unknown := fields.keys() - {name for name, _ in known}:
-            raise RosTypeError(f"{place} has no '{min(unknown)}': it has {', '.join(name for name, _ in known)}")
+        if not isinstance(fields, Mapping) or (fields.keys() - {name for name, _ in known}):
+            raise RosTypeError(f"{place} is {fields!r:.60}, expected the fields {', '.join(name for name, _ in known)}")
         values = {
             self._python_name(name): self._value(desc, fields.get(name), f"{place}.{name}") for name, desc in known
         }
@@ -140,12 +154,9 @@ class Codec:
             return _scalar(of[0], value, place)
         (inner_kind, inner), count = of
         if inner_kind == _BASE and inner[0] not in _TEXTS:
-            return _array(inner[0], value, count if kind == _ARRAY else None, place)
-        if value is None:
-            value = [None] * count if kind == _ARRAY else []
-        if not isinstance(value, Sequence) or isinstance(value, str) or (kind == _ARRAY and len(value) != count):
-            raise RosTypeError(f"{place} is {value!r:.60}, expected a list{f' of {count}' if kind == _ARRAY else ''}")
-        return [self._value((inner_kind, inner), each, f"{place}[{at}]") for at, each in enumerate(value)]
+            return _array(inner[0], value, count if kind == _ARRAY else 0, place)
+        found = [None] * (count if kind == _ARRAY else 0) if value is None else value
+        return [self._value((inner_kind, inner), each, f"{place}[{at}]") for at, each in enumerate(found)]
 
     def _plain(self, type_: str, message: Any) -> Fields:
         named = self._store.fielddefs[type_][1]
@@ -185,43 +196,25 @@ def own_name(path: Path) -> str:
 
 
 def _scalar(base: str, value: Any, place: str) -> Any:
-    if base in _TEXTS:
-        value = "" if value is None else value
-        if not isinstance(value, str):
-            raise RosTypeError(f"{place} is {value!r:.60}, expected a text")
-        return value
-    if base == "bool":
-        if value not in (None, False, True):
-            raise RosTypeError(f"{place} is {value!r:.60}, expected true or false")
-        return bool(value)
-    value = 0 if value is None else value
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise RosTypeError(f"{place} is {value!r:.60}, expected a number ({base})")
-    if base.startswith("float"):
-        if base == "float32" and math.isfinite(value) and abs(float(value)) > _LARGEST_FLOAT32:
-            raise RosTypeError(f"{place} is {value!r}, too large for a {base}")
-        return float(value)
-    limits = np.iinfo(_DTYPES.get(base, base))
-    if not math.isfinite(value) or value != int(value) or not limits.min <= value <= limits.max:
-        raise RosTypeError(f"{place} is {value!r}, expected a whole number from {limits.min} to {limits.max}")
-    return int(value)
+    kinds: Any = str if base in _TEXTS else (bool, np.bool_) if base == "bool" else (int, float, np.number)
+    if value is None:
+        return "" if kinds is str else 0
+    if not isinstance(value, kinds) or (isinstance(value, bool) and base != "bool"):
+        raise RosTypeError(f"{place} is {value!r:.60}, expected {base}")
+    if base.startswith(("int", "uint", "byte", "char")):
+        limits = np.iinfo(_DTYPES.get(base, base))
+        if not limits.min <= value <= limits.max or value != int(value):
+            raise RosTypeError(f"{place} is {value!r}, expected a whole number from {limits.min} to {limits.max}")
+        return int(value)
+    return value
 
 
-def _array(base: str, value: Any, count: int | None, place: str) -> Any:
+def _array(base: str, value: Any, count: int, place: str) -> Any:
     dtype = np.dtype(_DTYPES.get(base, base))
     if value is None:
-        return np.zeros(count or 0, dtype)
+        return np.zeros(count, dtype)
     try:
-        flat = np.ascontiguousarray(np.frombuffer(value, dtype) if isinstance(value, bytes) else value, dtype)
+        found = np.frombuffer(value, dtype) if isinstance(value, bytes) else value
+        return np.ascontiguousarray(found, dtype).reshape(-1)
     except (TypeError, ValueError, OverflowError):
         raise RosTypeError(f"{place} is {value!r:.60}, expected a list of {base}") from None
-    if count is not None and flat.size != count:
-        raise RosTypeError(f"{place} has {flat.size} values, expected {count}")
-    return flat.reshape(-1)
-
-
-def _shown(desc: Iterable[Any]) -> str:
-    kind, of = desc
-    if kind == _NAME:
-        return str(of)
-    return str(of[0]) if kind == _BASE else "a list"

@@ -66,7 +66,7 @@ class Types(Codec):
         used: set[str] = set()
         for name, _ in _bus(topic):
             for field, path in self._paths(topic, name).items():
-                self.leaf(topic.type, path)
+                self.check_path(topic.type, path)
                 used.add(field)
         if topic.type != DETECTIONS and (left := topic.fields.keys() - used):
             raise RosTypeError(f"{topic.topic}: no message of {', '.join(topic.bus)} has the field '{min(left)}'")
