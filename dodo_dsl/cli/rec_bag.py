@@ -1,20 +1,31 @@
-"""Bags of ROS 2 in ``dodo rec`` and ``dodo new``: what became of each topic, and what was left out."""
+"""Bags of ROS 2 in ``dodo rec`` and ``dodo new``: what becomes of each topic, and what is left out.
+
+Topics of the application around here have its messages and names, others the usual ones of their types.
+"""
 
 import argparse
+from collections import Counter
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from dodo_dsl import advice, atomic
 from dodo_dsl.atomic import refuse_existing
 from dodo_dsl.cli.display import progress_bar
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.rec_actions import RecJob, tell
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.ros_types import Topic
 from dodo_dsl.rec import bag
 from dodo_dsl.rec.recording_filter import NothingSelected
+from dodo_dsl.spec.deployment import find_deployment
+
+if TYPE_CHECKING:
+    from dodo_dsl.opendlv.ros_messages import Types
 
 FILES = (".mcap", ".db3")
+_ENDINGS = {"mcap": ".mcap", "sqlite3": ".db3"}
 
 
 def is_bag(path: Path) -> bool:
@@ -34,14 +45,14 @@ def import_bag(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> N
 
 def into(path: Path, place: Path, lossy: bool, problem: Callable[[str], None], stderr: TextIO) -> str:
     """Write the recording of a bag, and return what each of its topics became."""
-    _require_rosbags("a bag of ROS 2")
+    known, types = _of_application("a bag of ROS 2")
     from dodo_dsl.rec.bag_import import import_bag
 
     with (
         bag.opened(path) as found,
         progress_bar(stderr, f"reading {path.name}", sum(found.counts.values())) as progress,
     ):
-        result = import_bag(found, path, place, lossy, progress)
+        result = import_bag(found, place, lossy, known, types, progress)
     _tell_skipped(result.skipped, result.reasons, problem)
     lines = [f"{result.counts.total()} messages of {len(result.topics)} topics\n"]
     for each in result.topics.values():
@@ -52,20 +63,20 @@ def into(path: Path, place: Path, lossy: bool, problem: Callable[[str], None], s
 
 def export_bag(job: RecJob) -> None:
     """Makes a bag of a recording."""
-    _require_rosbags("--ros")
-    from dodo_dsl.opendlv.ros_messages import Types
+    known, types = _of_application("--ros", job.messages)
     from dodo_dsl.rec.bag_export import BagExport
 
-    folder, storage, types = job.folder(), job.options.storage, Types(messages=job.messages)
-    ending = {"mcap": ".mcap", "sqlite3": ".db3"}[storage]
-    refuse_existing([folder / "metadata.yaml", folder / f"{folder.name}{ending}"], job.options.force)
+    counts = Counter(each.type for each in known)
+    names = {each.type: each.topic for each in known if counts[each.type] == 1}
+    folder, storage = job.folder(), job.options.storage
+    refuse_existing([folder / "metadata.yaml", folder / f"{folder.name}{_ENDINGS[storage]}"], job.options.force)
     rows = job.rows()
     with (
         atomic.files_into(folder) as place,
         job.progress(f"writing {folder.name}", len(rows)) as progress,
         bag.written(place, folder.resolve().name, storage, types.store) as writer,
     ):
-        result = BagExport(job.recording, job.messages, types, writer)
+        result = BagExport(job.recording, types, writer, names)
         result.write(rows, progress)
         if not writer.counts:
             raise NothingSelected(f"{job.recording.path} has no message that has a type of ROS 2")
@@ -78,15 +89,31 @@ def export_bag(job: RecJob) -> None:
     job.stdout.write("".join(lines))
 
 
-def _require_rosbags(what: str) -> None:
+def _of_application(what: str, messages: MessageSet | None = None) -> "tuple[list[Topic], Types]":
+    """The topics of the application around here, with the messages that are written; and ROS types with its own."""
     if find_spec("rosbags") is None:
         raise UsageError(f"{what} needs rosbags: {advice.install('ros')}")
+    from dodo_dsl import compiler
+    from dodo_dsl.opendlv.ros_messages import Types
 
-
-def _messages(count: int) -> str:
-    return f"{count} message{'s' * (count != 1)}"
+    if find_deployment(Path.cwd()) is None:
+        return [], Types(messages=messages)
+    checked = compiler.load([], services_only=True)
+    declared = checked.application.declared.values() if checked.application else ()
+    topics = {topic.name: topic for each in declared if each for topic in each.topics}
+    known = [
+        Topic(
+            topic=name,
+            type=topic.type,
+            bus=tuple(word for word, _ in topic.messages if "." in word),
+            fields=dict(topic.fields),
+        )
+        for name, topic in topics.items()
+    ]
+    deployment = checked.deployment
+    return known, Types(deployment.ros_types, messages or MessageSet.load(*deployment.messages))
 
 
 def _tell_skipped(skipped: Mapping[str, int], reasons: Mapping[str, str], problem: Callable[[str], None]) -> None:
     for topic, count in skipped.items():
-        problem(f"skipped {_messages(count)} of {topic}: {reasons[topic]}")
+        problem(f"skipped {count} message{'s' * (count != 1)} of {topic}: {reasons[topic]}")

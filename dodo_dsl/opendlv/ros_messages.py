@@ -32,7 +32,7 @@ from dodo_dsl.opendlv.ros_fields import (
 from dodo_dsl.opendlv.ros_pictures import PICTURES, CameraPicture, picture_fields
 from dodo_dsl.opendlv.ros_types import CLOCK_TYPE, NUMBERS, POSE_ESTIMATE, CameraView, StaticFrame, Topic
 
-__all__ = ["BusMessage", "CameraPicture", "RosTypeError", "Types", "require_ros", "stamp_of", "time_of"]
+__all__ = ["BusMessage", "CameraPicture", "RosTypeError", "Types", "messages_of", "require_ros", "stamp_of", "time_of"]
 
 MICROSECONDS = 1_000_000
 _BOX, _PROPERTY, _CLASS = (f"opendlv.logic.perception.Detection{name}" for name in ("BoundingBox", "Property", "Type"))
@@ -56,7 +56,7 @@ class Types(Codec):
 
     def __init__(self, own_files: Sequence[Path] = (), messages: MessageSet | None = None) -> None:
         super().__init__(own_files)
-        self._messages = messages or MessageSet.standard()
+        self.messages = messages or MessageSet.standard()
 
     def check(self, topic: Topic) -> None:
         """Raises RosTypeError for a topic whose type, messages, fields or paths there are not."""
@@ -64,7 +64,7 @@ class Types(Codec):
         if topic.type in (*PICTURES, CAMERA_INFO, CLOCK_TYPE):
             return
         used: set[str] = set()
-        for name, _ in _bus(topic):
+        for name, _ in messages_of(topic):
             for field, path in self._paths(topic, name).items():
                 self.check_path(topic.type, path)
                 used.add(field)
@@ -83,7 +83,7 @@ class Types(Codec):
         if topic.type in (*PICTURES, CAMERA_INFO):
             return self.given_header(topic, time_us) | picture_fields(topic, picture)
         fields = _copied(CONSTANTS.get(topic.type, {})) | self.given_header(topic, time_us)
-        names = [name for name, _ in _bus(topic)]
+        names = [name for name, _ in messages_of(topic)]
         for name in names:
             if name not in messages:
                 raise RosTypeError(f"{topic.topic} is made of {' and '.join(names)}: there is no {name} yet")
@@ -98,7 +98,7 @@ class Types(Codec):
         if topic.type == DETECTIONS:
             return list(_detections(topic, fields, time))
         unknown = _not_measured(topic, fields)
-        bus = ((name, stamp) for name, stamp in _bus(topic) if name not in unknown)
+        bus = ((name, stamp) for name, stamp in messages_of(topic) if name not in unknown)
         return [BusMessage(name, stamp, time, self._values(topic, name, fields)) for name, stamp in bus]
 
     def frames(self, frames: Sequence[StaticFrame], time_us: int) -> Fields:
@@ -125,7 +125,7 @@ class Types(Codec):
         A type of one number needs no path where the message has one field.
         """
         try:
-            known = self._messages.type(name).DESCRIPTOR.fields_by_name
+            known = self.messages.type(name).DESCRIPTOR.fields_by_name
         except MessageError as error:
             raise RosTypeError(f"{topic.topic}: {error}") from None
         own = {field: path for field, path in topic.fields.items() if field in known}
@@ -141,7 +141,7 @@ class Types(Codec):
         paths = self._paths(topic, name)
         if not paths:
             raise RosTypeError(f"{topic.topic}: {topic.type} does not become {name} by itself, name its 'fields'")
-        known = self._messages.layout(name).definition
+        known = self.messages.layout(name).definition
         types = {field.name: field.type for field in known.fields}
         found = {}
         for field, path in paths.items():
@@ -164,7 +164,7 @@ def time_of(fields: Mapping[str, Any]) -> int:
     return int(stamp["sec"]) * MICROSECONDS + int(stamp["nanosec"]) // 1000
 
 
-def _bus(topic: Topic) -> Iterator[tuple[str, int]]:
+def messages_of(topic: Topic) -> Iterator[tuple[str, int]]:
     """The names and sender stamps of a topic's messages."""
     for each in topic.bus:
         name, _, stamp = each.partition("/")
@@ -270,7 +270,7 @@ def _detections(topic: Topic, fields: Mapping[str, Any], time: int) -> Iterator[
     """Boxes as fractions of the picture, and classes: a whole number is a DetectionType, a name a DetectionProperty."""
     if topic.camera is None:
         raise RosTypeError(f"{topic.topic} needs its camera's size: boxes are in pixels")
-    stamps = dict(_bus(topic))
+    stamps = dict(messages_of(topic))
     for number, each in enumerate(fields["detections"]):
         place = f"detections[{number}] of {topic.topic}"
         common = {"sampleId": 0, "detectionId": number}

@@ -77,7 +77,7 @@ class Bag:
     """An open bag: ``counts`` are the messages of each topic and type, by their names."""
 
     def __init__(self, reader: Any, path: Path) -> None:
-        self._reader, self._path = reader, path
+        self._reader, self.path = reader, path
         self.counts: dict[tuple[str, str], int] = {}
         for each in sorted(reader.connections, key=lambda found: (found.topic, found.msgtype)):
             key = each.topic, each.msgtype
@@ -88,7 +88,7 @@ class Bag:
         chosen = [each for each in self._reader.connections if wanted(each.topic, each.msgtype)]
         found = self._reader.messages(connections=chosen) if chosen else iter(())
         while True:
-            with _readable(self._path):
+            with _readable(self.path):
                 stored = next(found, None)
             if stored is None:
                 return

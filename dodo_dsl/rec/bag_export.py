@@ -1,7 +1,7 @@
 """A recording as a bag of ROS 2, with a topic for each message that has a type there."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,12 +46,13 @@ class BagExport:
     """Writes messages in the order of their times, stored at their sample times.
 
     ``left_out`` are those without a counterpart, by their ids; ``skipped`` those that do not fit, by topic, with the
-    first of the ``reasons``.
+    first of the ``reasons``. ``names`` are those of topics that are not the usual ones, by their types.
     """
 
-    def __init__(self, recording: Recording, messages: MessageSet, types: Types, writer: BagWriter) -> None:
+    def __init__(self, recording: Recording, types: Types, writer: BagWriter, names: Mapping[str, str]) -> None:
         self.left_out, self.skipped, self.reasons = Counter[int](), Counter[str](), dict[str, str]()
-        self._recording, self._messages, self._types, self._writer = recording, messages, types, writer
+        self._recording, self._messages, self._types = recording, types.messages, types
+        self._writer, self._names = writer, names
         self._decoders: dict[tuple[int, str], VideoDecoder] = {}
 
     def write(self, rows: Numbers, progress: Callable[[int], None]) -> None:
@@ -61,8 +62,7 @@ class BagExport:
         for done, envelope in enumerate(self._recording.envelopes(ordered), 1):
             key = envelope.data_type, envelope.sender_stamp
             if envelope.data_type == IMAGE:
-                name = f"camera_{key[1]}" if key[1] != cameras[0] else "camera"
-                self._picture(f"/{name}/image_raw", envelope)
+                self._picture("" if key[1] == cameras[0] else f"_{key[1]}", envelope)
             elif key in routes:
                 self._gather(routes[key], envelope)
             else:
@@ -88,7 +88,8 @@ class BagExport:
                 if (len(parts) < len(way.messages) and not way.is_any) or (way.type == DETECTIONS and not camera):
                     continue
                 bus = tuple(f"{name}/{stamp}" for name in parts)
-                topic = f"{way.topic}_{stamp}" if number else way.topic
+                usual = self._names.get(way.type, way.topic)
+                topic = f"{usual}_{stamp}" if number else usual
                 gathered = _Gathered(Topic(topic=topic, type=way.type, bus=bus, camera=camera))
                 for name in parts:
                     found[self._messages.id(name), stamp].append(gathered)
@@ -124,20 +125,23 @@ class BagExport:
         except RosTypeError as error:
             self._skip(topic.topic, error)
 
-    def _picture(self, name: str, envelope: Envelope) -> None:
+    def _picture(self, suffix: str, envelope: Envelope) -> None:
         """A JPEG stays as it is, others are decoded."""
-        time = _time(envelope)
+        time, name = _time(envelope), f"/camera{suffix}/image_raw"
         try:
             image = MessageSet.standard().decode(IMAGE, envelope.payload)  # set 0.9 has the same numbers
             if CODECS.get(image.format) == "mjpeg":
-                topic = Topic(topic=f"{name}/compressed", type=COMPRESSED, bus=())
+                topic = self._named(COMPRESSED, f"{name}/compressed", suffix)
                 fields = self._types.given_header(topic, time) | {"format": "jpeg", "data": image.data}
             else:
-                topic = Topic(topic=name, type=IMAGE_TYPE, bus=())
+                topic = self._named(IMAGE_TYPE, name, suffix)
                 fields = self._types.given(topic, {}, time, self._decoded(image, envelope.sender_stamp))
             self._writer.write(topic.topic, topic.type, time, self._types.encode(topic.type, fields))
         except (MessageError, RosTypeError, VideoError) as error:
             self._skip(name, error)
+
+    def _named(self, type_: str, usual: str, suffix: str) -> Topic:
+        return Topic(topic=f"{self._names[type_]}{suffix}" if type_ in self._names else usual, type=type_, bus=())
 
     def _decoded(self, image: Any, stamp: int) -> CameraPicture:
         key = stamp, image.format

@@ -1,16 +1,17 @@
 """A bag of ROS 2 as a recording, by the types of its topics."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from msgspec import structs
+
 from dodo_dsl.opendlv.envelope import Envelope
-from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording_writer import RecordingWriter
 from dodo_dsl.opendlv.ros_codec import Fields, RosTypeError
 from dodo_dsl.opendlv.ros_fields import CAMERA_INFO, COMPRESSED, DETECTIONS
-from dodo_dsl.opendlv.ros_messages import Types, time_of
+from dodo_dsl.opendlv.ros_messages import Types, messages_of, time_of
 from dodo_dsl.opendlv.ros_pictures import PICTURES, picture_of
 from dodo_dsl.opendlv.ros_types import CameraView, Topic
 from dodo_dsl.opendlv.video import FORMAT, VideoEncoder, VideoError
@@ -31,9 +32,14 @@ class Imported:
     reasons: dict[str, str] = field(default_factory=dict)
 
 
-def topics_of(bag: Bag, camera: CameraView | None) -> dict[str, Topic]:
-    """The topics that a recording can have, each with its messages; topics of the same messages get sender stamps."""
-    found, used = dict[str, Topic](), Counter[str]()
+def topics_of(bag: Bag, camera: CameraView | None, known: Iterable[Topic]) -> dict[str, Topic]:
+    """The topics that a recording can have, each with its messages; topics of the same messages get sender stamps.
+
+    Those that are ``known`` have the messages that are written.
+    """
+    there = [each for each in known if (each.topic, each.type) in bag.counts and each.bus]
+    found = {each.topic: structs.replace(each, camera=camera) for each in there}
+    used = Counter[str]({name: stamp + 1 for each in there for name, stamp in messages_of(each)})
     for topic, type_ in bag.counts:
         names = (IMAGE,) if type_ in PICTURES else READ.get(type_, ())
         if not names or topic in found or (type_ == DETECTIONS and camera is None):
@@ -44,10 +50,11 @@ def topics_of(bag: Bag, camera: CameraView | None) -> dict[str, Topic]:
     return found
 
 
-def import_bag(bag: Bag, path: Path, place: Path, lossy: bool, progress: Callable[[int], None]) -> Imported:
+def import_bag(
+    bag: Bag, place: Path, lossy: bool, known: Iterable[Topic], types: Types, progress: Callable[[int], None]
+) -> Imported:
     """Write the messages of a bag into the new recording ``place``; raises BagError if there are none for it."""
-    types = Types()
-    topics = topics_of(bag, _camera(bag, types))
+    topics = topics_of(bag, _camera(bag, types), known)
     kept = {(topic.topic, topic.type) for topic in topics.values()}
     result = Imported(topics, {key: count for key, count in bag.counts.items() if key not in kept})
     converter = _Converter(types, lossy)
@@ -64,7 +71,7 @@ def import_bag(bag: Bag, path: Path, place: Path, lossy: bool, progress: Callabl
             progress(done)
         if not writer.frames:
             why = next(iter(result.reasons.values()), "none of its topics has a type that a recording knows")
-            raise BagError(f"'{path}' has nothing for a recording: {why}")
+            raise BagError(f"'{bag.path}' has nothing for a recording: {why}")
     return result
 
 
@@ -90,7 +97,6 @@ class _Converter:
 
     def __init__(self, types: Types, lossy: bool) -> None:
         self._types, self._lossy = types, lossy
-        self._messages = MessageSet.standard()
         self._encoders: dict[tuple[str, int, int], VideoEncoder] = {}
         self._pictures = Counter[str]()
 
@@ -119,5 +125,6 @@ class _Converter:
         return self._envelope(IMAGE, stamp, time_of(fields) or time, time, values)
 
     def _envelope(self, name: str, stamp: int, sample_time: int, time: int, values: Fields) -> Envelope:
-        payload = self._messages.encode(self._messages.type(name)(**values))
-        return Envelope(self._messages.id(name), payload, time, time, sample_time, stamp)
+        messages = self._types.messages
+        payload = messages.encode(messages.type(name)(**values))
+        return Envelope(messages.id(name), payload, time, time, sample_time, stamp)
