@@ -4,7 +4,6 @@ Topics of the application around here have its messages and names, others the us
 """
 
 import argparse
-from collections import Counter
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -66,8 +65,6 @@ def export_bag(job: RecJob) -> None:
     known, types = _of_application("--ros", job.messages)
     from dodo_dsl.rec.bag_export import BagExport
 
-    counts = Counter(each.type for each in known)
-    names = {each.type: each.topic for each in known if counts[each.type] == 1}
     folder, storage = job.folder(), job.options.storage
     refuse_existing([folder / "metadata.yaml", folder / f"{folder.name}{_ENDINGS[storage]}"], job.options.force)
     rows = job.rows()
@@ -76,7 +73,7 @@ def export_bag(job: RecJob) -> None:
         job.progress(f"writing {folder.name}", len(rows)) as progress,
         bag.written(place, folder.resolve().name, storage, types.store) as writer,
     ):
-        result = BagExport(job.recording, types, writer, names)
+        result = BagExport(job.recording, types, writer, known)
         result.write(rows, progress)
         if not writer.counts:
             raise NothingSelected(f"{job.recording.path} has no message that has a type of ROS 2")

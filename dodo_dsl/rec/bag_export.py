@@ -1,7 +1,7 @@
 """A recording as a bag of ROS 2, with a topic for each message that has a type there."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,7 @@ from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.ros_codec import Fields, RosTypeError
 from dodo_dsl.opendlv.ros_fields import COMPRESSED, DETECTIONS
 from dodo_dsl.opendlv.ros_fields import IMAGE as IMAGE_TYPE
-from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
+from dodo_dsl.opendlv.ros_messages import CameraPicture, Types, messages_of
 from dodo_dsl.opendlv.ros_types import SENT, CameraView, Topic
 from dodo_dsl.opendlv.video import CODECS, VideoDecoder, VideoError
 from dodo_dsl.rec.bag import WRITTEN, BagWriter
@@ -46,13 +46,13 @@ class BagExport:
     """Writes messages in the order of their times, stored at their sample times.
 
     ``left_out`` are those without a counterpart, by their ids; ``skipped`` those that do not fit, by topic, with the
-    first of the ``reasons``. ``names`` are those of topics that are not the usual ones, by their types.
+    first of the ``reasons``. Topics that are ``known`` keep their names, if they are the only one of their type.
     """
 
-    def __init__(self, recording: Recording, types: Types, writer: BagWriter, names: Mapping[str, str]) -> None:
+    def __init__(self, recording: Recording, types: Types, writer: BagWriter, known: Sequence[Topic]) -> None:
         self.left_out, self.skipped, self.reasons = Counter[int](), Counter[str](), dict[str, str]()
         self._recording, self._messages, self._types = recording, types.messages, types
-        self._writer, self._names = writer, names
+        self._writer, self._known = writer, known
         self._decoders: dict[tuple[int, str], VideoDecoder] = {}
 
     def write(self, rows: Numbers, progress: Callable[[int], None]) -> None:
@@ -62,7 +62,7 @@ class BagExport:
         for done, envelope in enumerate(self._recording.envelopes(ordered), 1):
             key = envelope.data_type, envelope.sender_stamp
             if envelope.data_type == IMAGE:
-                self._picture("" if key[1] == cameras[0] else f"_{key[1]}", envelope)
+                self._picture(envelope, is_first=key[1] == cameras[0])
             elif key in routes:
                 self._gather(routes[key], envelope)
             else:
@@ -88,7 +88,7 @@ class BagExport:
                 if (len(parts) < len(way.messages) and not way.is_any) or (way.type == DETECTIONS and not camera):
                     continue
                 bus = tuple(f"{name}/{stamp}" for name in parts)
-                usual = self._names.get(way.type, way.topic)
+                usual = self._name(way.type, way.topic, way.messages)
                 topic = f"{usual}_{stamp}" if number else usual
                 gathered = _Gathered(Topic(topic=topic, type=way.type, bus=bus, camera=camera))
                 for name in parts:
@@ -125,23 +125,27 @@ class BagExport:
         except RosTypeError as error:
             self._skip(topic.topic, error)
 
-    def _picture(self, suffix: str, envelope: Envelope) -> None:
+    def _picture(self, envelope: Envelope, is_first: bool) -> None:
         """A JPEG stays as it is, others are decoded."""
-        time, name = _time(envelope), f"/camera{suffix}/image_raw"
+        time, name = _time(envelope), "/camera/image_raw" if is_first else f"/camera_{envelope.sender_stamp}/image_raw"
         try:
             image = MessageSet.standard().decode(IMAGE, envelope.payload)  # set 0.9 has the same numbers
             if CODECS.get(image.format) == "mjpeg":
-                topic = self._named(COMPRESSED, f"{name}/compressed", suffix)
+                name = f"{name}/compressed"
+                topic = Topic(topic=self._name(COMPRESSED, name) if is_first else name, type=COMPRESSED, bus=())
                 fields = self._types.given_header(topic, time) | {"format": "jpeg", "data": image.data}
             else:
-                topic = self._named(IMAGE_TYPE, name, suffix)
+                topic = Topic(topic=self._name(IMAGE_TYPE, name) if is_first else name, type=IMAGE_TYPE, bus=())
                 fields = self._types.given(topic, {}, time, self._decoded(image, envelope.sender_stamp))
             self._writer.write(topic.topic, topic.type, time, self._types.encode(topic.type, fields))
         except (MessageError, RosTypeError, VideoError) as error:
             self._skip(name, error)
 
-    def _named(self, type_: str, usual: str, suffix: str) -> Topic:
-        return Topic(topic=f"{self._names[type_]}{suffix}" if type_ in self._names else usual, type=type_, bus=())
+    def _name(self, type_: str, usual: str, messages: Sequence[str] = ()) -> str:
+        """That of the application's only topic of a type, if it is of no other messages."""
+        own = [each for each in self._known if each.type == type_]
+        fits = len(own) == 1 and {name for name, _ in messages_of(own[0])} in (set(), set(messages))
+        return own[0].topic if fits else usual
 
     def _decoded(self, image: Any, stamp: int) -> CameraPicture:
         key = stamp, image.format

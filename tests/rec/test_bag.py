@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 
+from dodo_dsl.opendlv.envelope import encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.ros_messages import Types
@@ -127,9 +128,6 @@ def test_a_bag_becomes_a_recording_and_a_bag_again(storage: str, compression: Co
 
 def test_one_file_is_a_bag_and_jpeg_stays_as_it_is(tmp_path: Path) -> None:
     jpeg = message("opendlv.proxy.ImageReading", BEGIN, 0, format="mjpg", width=8, height=8, data=b"\xff\xd8\xff\xd9")
-    (tmp_path / "a.rec").write_bytes(b"")
-    from dodo_dsl.opendlv.envelope import encode_frame
-
     lonely = message("opendlv.proxy.GroundSteeringRequest", BEGIN, 0, groundSteering=1)
     (tmp_path / "a.rec").write_bytes(b"".join(map(encode_frame, [jpeg, lonely, *video(3, sender_stamp=2)])))
     code, stdout, _ = dodo_rec("export", tmp_path / "a.rec", "--ros", "-o", tmp_path / "b")
@@ -208,3 +206,53 @@ def test_a_bag_is_a_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert dodo("compile", "--check")[0] == 0
     found = [MESSAGES.name(each.data_type) for each in read_envelopes(tmp_path / "tests/recordings/bag.rec")]
     assert found == ["opendlv.proxy.GroundMotionRequest", "robot.PlanarScan"] * 12
+
+
+MAPPING = """dodo: 1
+registry: []
+messages: [lane_msgs/Lane.msg]
+application:
+  files: [compose.yml]
+  services:
+    car:
+      ros:
+        in: {/front: sensor_msgs/msg/Image}
+        out:
+          /estimate: nav_msgs/msg/Odometry
+          /lane: {type: lane_msgs/msg/Lane, to: opendlv.proxy.GroundSteeringRequest/3, fields: {groundSteering: offset}}
+"""
+
+
+def test_topics_of_the_application_become_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lane_msgs").mkdir()
+    (tmp_path / "lane_msgs/Lane.msg").write_text("float32 offset\n")
+    (tmp_path / "dodo.yml").write_text(MAPPING)
+    (tmp_path / "compose.yml").write_text("services: {car: {image: car}}\n")
+    types, odometry = Types([tmp_path / "lane_msgs/Lane.msg"]), fields_of("/odom", 1)
+    topics: dict[str, tuple[str, dict[str, Any]]] = {
+        "/estimate": (TOPICS["/odom"], odometry),
+        "/image": (TOPICS["/camera/image_raw"], fields_of("/camera/image_raw", 1)),
+        "/lane": ("lane_msgs/msg/Lane", {"offset": 0.5}),
+        "/odom": (TOPICS["/odom"], odometry),
+    }
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for name, (kind, fields) in topics.items():
+            connection = writer.add_connection(name, kind, typestore=types.store)
+            writer.write(connection, BEGIN * 1000, types.encode(kind, fields))
+    code, stdout, stderr = dodo_rec("import", "bag", "-o", "a.rec")
+    assert (code, stderr) == (0, "")
+    assert sorted(line.split(" -> ")[1] for line in stdout.splitlines()[1:]) == [
+        "opendlv.proxy.GroundSteeringRequest/3",
+        "opendlv.proxy.ImageReading/0",
+        "robot.OdometryReading/0",
+        "robot.PoseEstimate",
+    ]
+    code, stdout, _ = dodo_rec("export", "a.rec", "--ros", "-o", "b")
+    assert code == 0
+    assert {line.split()[0] for line in stdout.splitlines()[1:]} == {
+        "/front",
+        "/odom",
+        "/pose",
+        "opendlv.proxy.GroundSteeringRequest:",
+    }
