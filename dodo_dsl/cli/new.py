@@ -350,11 +350,12 @@ def _files(wanted: Wanted, tests: _Tests, place: Destination) -> tuple[list[New]
     if wanted.rec:
         from dodo_dsl.cli import recorded_drive  # slow to load, and rarely needed
 
-        declared = application.declared.values() if application else ()
+        declared = [*application.declared.values()] if application else []
         sent = {name.partition("/")[0] for own in declared if own for name, _ in own.outputs}
         with recorded_drive.recording_of(wanted.rec) as (rec, imported):
             drive = recorded_drive.look(rec, sent)
-            made, note = recorded_drive.files(wanted.name, rec, drive, place.registry, place.root, pictures)
+            of_ros = any(own.topics for own in declared if own)
+            made, note = recorded_drive.files(wanted.name, rec, drive, place.registry, place.root, pictures, of_ros)
         note = imported + note + (pictures.note if drive.cameras else "")
         return made, note + recorded_drive.unpassable(rec, drive, application, pictures)
     if wanted.extends:

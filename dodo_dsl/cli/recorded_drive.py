@@ -194,9 +194,12 @@ def _values(path: Path, recording: Recording, messages: MessageSet, target: Mess
 
 
 def files(
-    name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path, pictures: Pictures
+    name: str, path: Path, drive: RecordedDrive, registry: Path, root: Path, pictures: Pictures, of_ros: bool
 ) -> tuple[list[New], str]:
-    """The test's files, its spec first, with the recording where the registry has it not yet; and what was found."""
+    """The test's files, its spec first, with the recording where the registry has it not yet; and what was found.
+
+    Nodes ``of_ros`` answer in their own time, which is the test's, and not with the sample time of a picture.
+    """
     place = path.resolve()
     copies = []
     stem = re.sub(r"[\0-\x1f\x7f]", "-", path.stem if path.suffix == _SUFFIX else path.name)
@@ -217,6 +220,7 @@ def files(
         timeout=math.ceil(drive.duration) + 2 * _START_UP_S,
         max_time=math.ceil(drive.duration) + _START_UP_S,
         cameras=drive.cameras,
+        in_test_time=of_ros or not drive.cameras,
         memories=pictures.parameters("rec-replay"),
         max_gap=math.ceil(drive.gap) if drive.gap > DEFAULT_GAP_S else 0,
         without=drive.requests,

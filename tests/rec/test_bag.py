@@ -199,8 +199,14 @@ def test_an_interrupt_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_bag_is_a_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "bag", "mcap", CompressionMode.NONE, {name: TOPICS[name] for name in ("/cmd_vel", "/scan")})
+    (tmp_path / "dodo.yml").write_text(
+        "dodo: 1\nregistry: [tests]\napplication: {files: [compose.yml], services: {car: {ros: "
+        "{in: {/scan: sensor_msgs/msg/LaserScan}, out: {/cmd_vel: geometry_msgs/msg/Twist}}}}}\n"
+    )
+    (tmp_path / "compose.yml").write_text("services: {car: {image: car}}\n")
     code, out, err = dodo("new", "dil-bag", "--level", "dil", "--rec", "bag")
     assert (code, err) == (0, "")
+    assert "sample-times: test" in (tmp_path / "tests/dil-bag/dil-bag.dodo.yml").read_text()
     assert "bag: 24 messages of 2 topics\n  /cmd_vel (geometry_msgs/msg/Twist): 12 -> " in out
     assert "judged: yawRate of opendlv.proxy.GroundMotionRequest/0, 12 values from 0 to 0.0859375\n" in out
     assert dodo("compile", "--check")[0] == 0
