@@ -35,7 +35,7 @@ COMMANDS = {
     "judge": Subcommand("judge", "judge the recording of a test again, also by other limits"),
     "rank": Subcommand("rank", "rank applications by the goals of their tests"),
     "stats": Subcommand("stats", "show how many services the tests share"),
-    "rec": Subcommand("rec", "inspect, cut and export recordings"),
+    "rec": Subcommand("rec", "inspect, cut, export and import recordings"),
     "lsp": Subcommand("lsp", "check tests in an editor while they are written"),
     "completion": Subcommand(
         "completion", "print a script that lets a shell complete commands, options, tests, services and rigs"

@@ -44,7 +44,7 @@ def require_ros(*modules: str) -> None:
 
 
 class Codec:
-    """The standard types of ROS 2 (Kilted), those of ackermann_msgs and vision_msgs, and types of one's own.
+    """The standard types of ROS 2 (Kilted), those of ackermann_msgs and vision_msgs, and own types.
 
     ``own_files`` are ``.msg`` and ``.idl`` files. The package of a ``.msg`` file is the folder above its folder
     ``msg``, or else the folder that it is in; ``.idl`` files say it themselves. Raises RosTypeError.
@@ -61,7 +61,7 @@ class Codec:
         for path in own_files:
             own.update(_definitions(path))
         self.own = tuple(own)
-        """The names of one's own types."""
+        """The names of own types."""
         shipped = {name: text for name, text in DEFINITIONS.items() if name not in own}
         for name, text in shipped.items():
             own.update(get_types_from_msg(text, name))

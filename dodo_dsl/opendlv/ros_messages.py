@@ -153,7 +153,7 @@ class Types(Codec):
 def stamp_of(time_us: int) -> dict[str, int]:
     """A time in us as ROS has it."""
     if not 0 <= time_us < _LATEST:
-        raise RosTypeError(f"{time_us} us is no time of ROS, expected 1970 to 2038")
+        raise RosTypeError(f"{time_us} us is not a time of ROS, expected 1970 to 2038")
     seconds, rest = divmod(time_us, MICROSECONDS)
     return {"sec": seconds, "nanosec": rest * 1000}
 
@@ -207,7 +207,7 @@ def _of_ros(name: str, field: str, type_: str, value: Any, place: str) -> Any:
     if (name, field) == (ODOMETRY, "yaw"):
         heading = heading_of(*(value[axis] for axis in "xyzw"))
         if heading is None:
-            raise RosTypeError(f"{place} is no attitude: its length is 0, or not finite")
+            raise RosTypeError(f"{place} is not an attitude: its length is 0, or not finite")
         return heading
     if type_ == "string":
         if not isinstance(value, str):

@@ -104,7 +104,7 @@ def opened(path: Path) -> Iterator[Bag]:
 
     path.stat()
     if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise BagError(f"'{path}' is no bag: it has no metadata.yaml; expected a folder of rosbag2, a .mcap or a .db3")
+        raise BagError(f"'{path}' is not a bag: it has no metadata.yaml; expected a folder of rosbag2, a .mcap or a .db3")
     with _readable(path):
         reader = Reader(path)
         reader.open()

@@ -165,7 +165,7 @@ def check(bag: Path, target: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("import", "empty"), "'empty' is no bag: it has no metadata.yaml"),
+        (("import", "empty"), "'empty' is not a bag: it has no metadata.yaml"),
         (("import", "missing"), "missing: No such file"),
         (("import", "bag", "-o", "there.rec"), "'there.rec' exists already; --force replaces it"),
         (("import", "others"), "'others' has nothing for a recording: none of its topics has a type"),

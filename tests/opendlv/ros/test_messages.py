@@ -269,7 +269,7 @@ REFUSED = [
         {"pose": {"orientation": {"w": 0.0}}},
         "expected a unit",
     ),
-    (topic("nav_msgs/msg/Odometry", "robot.OdometryReading"), {}, "pose.pose.orientation of /t is no attitude"),
+    (topic("nav_msgs/msg/Odometry", "robot.OdometryReading"), {}, "pose.pose.orientation of /t is not an attitude"),
     (topic(DETECTIONS, SENT[DETECTIONS][0]), {}, "needs its camera's size"),
     (
         topic(DETECTIONS, SENT[DETECTIONS][0], camera=CAMERA),
