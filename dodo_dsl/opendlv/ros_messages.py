@@ -3,32 +3,19 @@
 ``given`` makes the fields of a ROS message that an application gets, ``sent`` the messages that one of its own becomes.
 """
 
+import functools
 import math
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from dodo_dsl.opendlv import ros_fields as ros
 from dodo_dsl.opendlv.attitude import heading_of, quaternion
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
-from dodo_dsl.opendlv.odvd import integer_range
 from dodo_dsl.opendlv.ros_codec import Codec, Fields, RosTypeError, require_ros
-from dodo_dsl.opendlv.ros_fields import (
-    ACCELERATION,
-    ANGULAR,
-    CAMERA_INFO,
-    CONSTANTS,
-    DETECTIONS,
-    FRAME_IDS,
-    IMU,
-    LASER_SCAN,
-    MAY_BE_INFINITE,
-    ODOMETRY,
-    PATHS,
-    SCAN,
-    UNKNOWN,
-)
 from dodo_dsl.opendlv.ros_pictures import PICTURES, CameraPicture, picture_fields
 from dodo_dsl.opendlv.ros_types import CLOCK_TYPE, NUMBERS, POSE_ESTIMATE, CameraView, StaticFrame, Topic
 
@@ -36,6 +23,7 @@ __all__ = ["BusMessage", "CameraPicture", "RosTypeError", "Types", "messages_of"
 
 MICROSECONDS = 1_000_000
 _BOX, _PROPERTY, _CLASS = (f"opendlv.logic.perception.Detection{name}" for name in ("BoundingBox", "Property", "Type"))
+_DECIMAL = ("float", "double")
 _LATEST = 2**31 * MICROSECONDS
 
 
@@ -61,14 +49,14 @@ class Types(Codec):
     def check(self, topic: Topic) -> None:
         """Raises RosTypeError for a topic whose type, messages, fields or paths there are not."""
         self.fields(topic.type)
-        if topic.type in (*PICTURES, CAMERA_INFO, CLOCK_TYPE):
+        if topic.type in (*PICTURES, ros.CAMERA_INFO, CLOCK_TYPE):
             return
         used: set[str] = set()
         for name, _ in messages_of(topic):
             for field, path in self._paths(topic, name).items():
                 self.check_path(topic.type, path)
                 used.add(field)
-        if topic.type != DETECTIONS and (left := topic.fields.keys() - used):
+        if topic.type != ros.DETECTIONS and (left := topic.fields.keys() - used):
             raise RosTypeError(f"{topic.topic}: no message of {', '.join(topic.bus)} has the field '{min(left)}'")
 
     def given(
@@ -80,9 +68,9 @@ class Types(Codec):
         """
         if topic.type == CLOCK_TYPE:
             return {"clock": stamp_of(time_us)}
-        if topic.type in (*PICTURES, CAMERA_INFO):
+        if topic.type in (*PICTURES, ros.CAMERA_INFO):
             return self.given_header(topic, time_us) | picture_fields(topic, picture)
-        fields = _copied(CONSTANTS.get(topic.type, {})) | self.given_header(topic, time_us)
+        fields = _copied(ros.CONSTANTS.get(topic.type, {})) | self.given_header(topic, time_us)
         names = [name for name, _ in messages_of(topic)]
         for name in names:
             if name not in messages:
@@ -95,7 +83,7 @@ class Types(Codec):
         """The messages that a ROS message becomes, with the time of its stamp, or of receipt where it has none."""
         time = time_of(fields) if self.has_header(topic.type) else 0
         time = time or received_us
-        if topic.type == DETECTIONS:
+        if topic.type == ros.DETECTIONS:
             return list(_detections(topic, fields, time))
         unknown = _not_measured(topic, fields)
         bus = ((name, stamp) for name, stamp in messages_of(topic) if name not in unknown)
@@ -116,7 +104,7 @@ class Types(Codec):
         """The field ``header``, where the type has one."""
         if not self.has_header(topic.type):
             return {}
-        frame_id = topic.frame_id or FRAME_IDS.get(topic.type, "")
+        frame_id = topic.frame_id or ros.FRAME_IDS.get(topic.type, "")
         return {"header": {"stamp": stamp_of(time_us), "frame_id": frame_id}}
 
     def _paths(self, topic: Topic, name: str) -> Mapping[str, str]:
@@ -131,22 +119,19 @@ class Types(Codec):
         own = {field: path for field, path in topic.fields.items() if field in known}
         if topic.type in NUMBERS and not own:
             if len(known) != 1:
-                raise RosTypeError(
-                    f"{topic.topic}: {name} has {len(known)} fields, expected one, or 'fields' to say which"
-                )
+                raise RosTypeError(f"{topic.topic}: {name} has {len(known)} fields, expected 'fields' to say which")
             return dict.fromkeys(known, "data")
-        return {**PATHS.get((topic.type, name), {}), **own}
+        return {**ros.PATHS.get((topic.type, name), {}), **own}
 
     def _values(self, topic: Topic, name: str, fields: Mapping[str, Any]) -> Fields:
         paths = self._paths(topic, name)
         if not paths:
             raise RosTypeError(f"{topic.topic}: {topic.type} does not become {name} by itself, name its 'fields'")
-        known = self.messages.layout(name).definition
-        types = {field.name: field.type for field in known.fields}
-        found = {}
+        types = {each.name: each.type for each in self.messages.layout(name).definition.fields}
+        found: Fields = {}
         for field, path in paths.items():
-            place = f"{path} of {topic.topic}"
-            found[field] = _of_ros(name, field, types[field], _at(fields, path, place), place)
+            value = functools.reduce(operator.getitem, path.split("."), fields)
+            found[field] = _of_ros(name, field, types[field], value, f"{path} of {topic.topic}")
         return _unit(found, topic) if name == POSE_ESTIMATE else found
 
 
@@ -182,80 +167,58 @@ def _put(fields: Fields, path: str, value: Any) -> None:
     fields[last] = value
 
 
-def _at(fields: Any, path: str, place: str) -> Any:
-    for name in path.split("."):
-        if not isinstance(fields, Mapping) or name not in fields:
-            raise RosTypeError(f"{place} is missing: there is no '{name}'")
-        fields = fields[name]
-    return fields
-
-
 def _to_ros(name: str, field: str, value: Any) -> Any:
-    if (name, field) == (SCAN, "ranges"):
+    if (name, field) == (ros.SCAN, "ranges"):
         if len(value) % 4:
             raise RosTypeError(f"{name}.{field} has {len(value)} bytes, expected 4 for each range")
         return np.frombuffer(value, "<f4")
     _refuse_not_finite(name, field, value, f"{name}.{field}")
-    if (name, field) == (ODOMETRY, "yaw"):
+    if (name, field) == (ros.ODOMETRY, "yaw"):
         return dict(zip("xyzw", quaternion(0.0, 0.0, value), strict=True))
     return value
 
 
 def _of_ros(name: str, field: str, type_: str, value: Any, place: str) -> Any:
-    if (name, field) == (SCAN, "ranges"):
+    if (name, field) == (ros.SCAN, "ranges"):
         return np.asarray(value, "<f4").tobytes()
-    if (name, field) == (ODOMETRY, "yaw"):
+    if (name, field) == (ros.ODOMETRY, "yaw"):
         heading = heading_of(*(value[axis] for axis in "xyzw"))
         if heading is None:
             raise RosTypeError(f"{place} is not an attitude: its length is 0, or not finite")
         return heading
-    if type_ == "string":
-        if not isinstance(value, str):
-            raise RosTypeError(f"{place} is {value!r:.60}, and {name}.{field} a text")
-        return value
-    if isinstance(value, str) or not isinstance(value, bool | int | float | np.number | np.bool_):
-        raise RosTypeError(f"{place} is {value!r:.60}, and {name}.{field} a number")
-    if (name, field) in _NO_VALUE and math.isnan(value):
+    if (name, field) == (ros.GEOLOCATION, "altitude") and math.isnan(value):
         return 0.0
     _refuse_not_finite(name, field, value, place)
-    if type_ == "bool":
-        return bool(value)
-    if type_ in ("float", "double"):
-        return float(value)
-    limits = integer_range(type_)
-    if value != int(value) or int(value) not in limits:
-        whole = f"a whole number from {limits[0]} to {limits[-1]}"
-        raise RosTypeError(f"{place} is {value!r}, and {name}.{field} {whole}")
-    return int(value)
-
-
-_NO_VALUE = {("opendlv.logic.sensation.Geolocation", "altitude")}
+    is_text = type_ == "string"
+    if is_text != isinstance(value, str) or (not is_text and type_ not in _DECIMAL and value != int(value)):
+        raise RosTypeError(f"{place} is {value!r:.60}, and {name}.{field} is {type_}")
+    return value if is_text else float(value) if type_ in _DECIMAL else int(value)
 
 
 def _refuse_not_finite(name: str, field: str, value: Any, place: str) -> None:
     if not isinstance(value, float | np.floating) or math.isfinite(value):
         return
-    if math.isnan(value) or (name, field) not in MAY_BE_INFINITE:
+    if math.isnan(value) or (name, field) not in ros.MAY_BE_INFINITE:
         raise RosTypeError(f"{place} is {value}, not a finite number")
 
 
 def _completed(topic: Topic, fields: Fields, names: Sequence[str]) -> Fields:
-    if topic.type == LASER_SCAN and "ranges" in fields:
+    if topic.type == ros.LASER_SCAN and "ranges" in fields:
         last = max(len(fields["ranges"]) - 1, 0)
         fields["angle_max"] = fields["angle_min"] + fields["angle_increment"] * last
         fields["scan_time"] = 1 / topic.rate if topic.rate else 0.0
     for name, covariance in _COVARIANCES.items():
-        if topic.type == IMU and name not in names:
-            fields[covariance] = UNKNOWN
+        if topic.type == ros.IMU and name not in names:
+            fields[covariance] = ros.UNKNOWN
     return fields
 
 
-_COVARIANCES = {ANGULAR: "angular_velocity_covariance", ACCELERATION: "linear_acceleration_covariance"}
+_COVARIANCES = {ros.ANGULAR: "angular_velocity_covariance", ros.ACCELERATION: "linear_acceleration_covariance"}
 
 
 def _not_measured(topic: Topic, fields: Mapping[str, Any]) -> list[str]:
     """The messages of which an Imu has nothing, as its covariances say."""
-    return [name for name, each in _COVARIANCES.items() if topic.type == IMU and fields[each][0] == -1]
+    return [name for name, each in _COVARIANCES.items() if topic.type == ros.IMU and fields[each][0] == -1]
 
 
 def _unit(found: Fields, topic: Topic) -> Fields:
@@ -268,7 +231,7 @@ def _unit(found: Fields, topic: Topic) -> Fields:
 
 def _detections(topic: Topic, fields: Mapping[str, Any], time: int) -> Iterator[BusMessage]:
     """Boxes as fractions of the picture, and classes: a whole number is a DetectionType, a name a DetectionProperty."""
-    if topic.camera is None:
+    if topic.camera is None or not topic.camera.width * topic.camera.height:
         raise RosTypeError(f"{topic.topic} needs its camera's size: boxes are in pixels")
     stamps = dict(messages_of(topic))
     for number, each in enumerate(fields["detections"]):

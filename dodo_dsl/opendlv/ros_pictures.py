@@ -40,7 +40,7 @@ class CameraPicture(NamedTuple):
 def picture_fields(topic: Topic, picture: CameraPicture | None) -> Fields:
     """The fields of a picture, or of what is known of its camera, without the header; raises RosTypeError."""
     if topic.type == CAMERA_INFO:
-        if topic.camera is None:
+        if topic.camera is None or not topic.camera.fovy * topic.camera.height:
             raise RosTypeError(f"{topic.topic} needs its camera's size and opening angle")
         return _camera_info(topic.camera)
     if picture is None:

@@ -5,32 +5,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dodo_dsl.opendlv import ros_fields as ros
 from dodo_dsl.opendlv.ros_codec import RosTypeError, require_ros
-from dodo_dsl.opendlv.ros_fields import (
-    ACCELERATION,
-    ANGULAR,
-    DETECTIONS,
-    DISTANCE,
-    GEOLOCATION,
-    GROUND_SPEED,
-    IMU,
-    LASER_SCAN,
-    NAV_SAT_FIX,
-    ODOMETRY,
-    ODOMETRY_TYPE,
-    RANGE,
-    SCAN,
-    SPEED,
-    STEERING,
-    TWIST_STAMPED,
-    WGS84,
-)
 from dodo_dsl.opendlv.ros_types import GIVEN, MEMORY, MOTION_REQUEST, POSE_ESTIMATE, SENT
 
 STORAGES = {"mcap": "MCAP", "sqlite3": "SQLITE3"}
 
 READ = {type_: ways[0] for type_, ways in GIVEN.items() if ways[0] != (MEMORY,)} | {
-    type_: bus for type_, bus in SENT.items() if type_ != ODOMETRY_TYPE
+    type_: bus for type_, bus in SENT.items() if type_ != ros.ODOMETRY_TYPE
 }
 """The messages that each type of a bag becomes: a TwistStamped is a request, an Odometry a reading."""
 
@@ -46,16 +28,16 @@ class Way(NamedTuple):
 
 WRITTEN = (
     Way("geometry_msgs/msg/Twist", (MOTION_REQUEST,), "/cmd_vel"),
-    Way("ackermann_msgs/msg/AckermannDriveStamped", (STEERING, SPEED), "/drive"),
-    Way(LASER_SCAN, (SCAN,), "/scan"),
-    Way(RANGE, (DISTANCE,), "/range"),
-    Way(IMU, (ANGULAR, ACCELERATION), "/imu", is_any=True),
-    Way(NAV_SAT_FIX, (GEOLOCATION,), "/fix"),
-    Way(NAV_SAT_FIX, (WGS84,), "/fix_without_altitude"),
-    Way(ODOMETRY_TYPE, (ODOMETRY,), "/odom"),
-    Way(TWIST_STAMPED, (GROUND_SPEED,), "/speed"),
+    Way("ackermann_msgs/msg/AckermannDriveStamped", (ros.STEERING, ros.SPEED), "/drive"),
+    Way(ros.LASER_SCAN, (ros.SCAN,), "/scan"),
+    Way(ros.RANGE, (ros.DISTANCE,), "/range"),
+    Way(ros.IMU, (ros.ANGULAR, ros.ACCELERATION), "/imu", is_any=True),
+    Way(ros.NAV_SAT_FIX, (ros.GEOLOCATION,), "/fix"),
+    Way(ros.NAV_SAT_FIX, (ros.WGS84,), "/fix_without_altitude"),
+    Way(ros.ODOMETRY_TYPE, (ros.ODOMETRY,), "/odom"),
+    Way(ros.TWIST_STAMPED, (ros.GROUND_SPEED,), "/speed"),
     Way("geometry_msgs/msg/PoseStamped", (POSE_ESTIMATE,), "/pose"),
-    Way(DETECTIONS, SENT[DETECTIONS], "/detections", is_any=True),
+    Way(ros.DETECTIONS, SENT[ros.DETECTIONS], "/detections", is_any=True),
 )
 """The topics of a recording; a sender stamp that is not the first one follows the name."""
 
@@ -104,7 +86,9 @@ def opened(path: Path) -> Iterator[Bag]:
 
     path.stat()
     if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise BagError(f"'{path}' is not a bag: it has no metadata.yaml; expected a folder of rosbag2, a .mcap or a .db3")
+        raise BagError(
+            f"'{path}' is not a bag: it has no metadata.yaml; expected a folder of rosbag2, a .mcap or a .db3"
+        )
     with _readable(path):
         reader = Reader(path)
         reader.open()

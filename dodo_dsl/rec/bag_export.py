@@ -32,15 +32,6 @@ class _Gathered:
     fresh: list[tuple[str, Any]] = field(default_factory=list)
     latest: dict[str, Any] = field(default_factory=dict)
 
-    @property
-    def has_any_number(self) -> bool:
-        """Whether a message may come several times before the topic's own is whole."""
-        return self.topic.type == DETECTIONS
-
-    def add(self, name: str, message: Any, time: int) -> None:
-        self.time, self.latest[name] = time, message
-        self.fresh.append((name, message))
-
 
 class BagExport:
     """Writes messages in the order of their times, stored at their sample times.
@@ -103,11 +94,12 @@ class BagExport:
             except MessageError as error:
                 self._skip(gathered.topic.topic, error)
                 continue
-            is_there = name in dict(gathered.fresh) and not gathered.has_any_number
-            if gathered.time != time or is_there:
+            is_list = gathered.topic.type == DETECTIONS
+            if gathered.time != time or (name in dict(gathered.fresh) and not is_list):
                 self._store(gathered)
-            gathered.add(name, message, time)
-            if len(gathered.fresh) == len(gathered.topic.bus) and not gathered.has_any_number:
+            gathered.time, gathered.latest[name] = time, message
+            gathered.fresh.append((name, message))
+            if len(gathered.fresh) == len(gathered.topic.bus) and not is_list:
                 self._store(gathered)
 
     def _store(self, gathered: _Gathered) -> None:

@@ -63,7 +63,7 @@ def import_bag(
             try:
                 for envelope in converter.envelopes(topics[stored.topic], stored.data, stored.time):
                     writer.write(envelope)
-            except (RosTypeError, VideoError, ValueError) as error:
+            except (VideoError, TypeError, ValueError) as error:
                 result.skipped[stored.topic] += 1
                 result.reasons.setdefault(stored.topic, str(error))
             else:

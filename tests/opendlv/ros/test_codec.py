@@ -10,14 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.opendlv.ros_codec import Codec, RosTypeError, own_name
+from dodo_dsl.opendlv.ros_codec import Codec, RosTypeError
 from tests.opendlv.ros.values import CARRIED, plain, some_fields
 
 ROOT = Path(__file__).parents[3]
 PYTHON = Path(os.environ.get("DODO_ROS_PYTHON", ROOT / "build/ros/bin/python"))
 CODEC = Codec()
 TWIST, DETECTIONS = "geometry_msgs/msg/Twist", "vision_msgs/msg/Detection2DArray"
-LANE = "std_msgs/Header header\nfloat32 offset\nuint8 count\nbool seen\nstring label\nPoint2[] points\n"
 
 
 @pytest.mark.parametrize("type_", CARRIED)
@@ -92,45 +91,21 @@ def test_any_bytes_are_decoded_or_refused(type_: str, data: bytes) -> None:
             assert f"{len(each)} bytes are no {type_}" in str(error)
 
 
-@pytest.fixture
-def own(tmp_path: Path) -> tuple[Path, ...]:
-    folder = tmp_path / "lane_msgs" / "msg"
-    folder.mkdir(parents=True)
-    (folder / "Lane.msg").write_text(LANE)
-    (folder / "Point2.msg").write_text("float64 x\nfloat64 y\n")
-    (tmp_path / "Mode.idl").write_text(
-        "module team_msgs { module msg { struct Mode { long number; string text; }; }; };"
-    )
-    return folder / "Lane.msg", folder / "Point2.msg", tmp_path / "Mode.idl"
-
-
-@given(rng=st.randoms(use_true_random=False))
-def test_types_of_ones_own(rng: random.Random, tmp_path_factory: pytest.TempPathFactory) -> None:
-    folder = tmp_path_factory.getbasetemp() / "lane_msgs" / "msg"
-    folder.mkdir(parents=True, exist_ok=True)
-    files = {"Lane": LANE, "Point2": "float64 x\nfloat64 y\n"}
+def test_own_types(tmp_path: Path) -> None:
+    files = {
+        "lane_msgs/msg/Lane.msg": "std_msgs/Header header\nuint8 count\nbool seen\nstring[] labels\nPoint2[] points\n",
+        "lane_msgs/Point2.msg": "float64 x\nfloat64[2] y\n",
+        "Mode.idl": "module team_msgs { module msg { struct Mode { long number; string text; }; }; };",
+    }
     for name, text in files.items():
-        (folder / f"{name}.msg").write_text(text)
-    codec = Codec([folder / f"{name}.msg" for name in files])
-    fields = some_fields(codec, "lane_msgs/msg/Lane", rng)
-    assert plain(codec.decode("lane_msgs/msg/Lane", codec.encode("lane_msgs/msg/Lane", fields))) == plain(fields)
-
-
-def test_an_idl_file_names_its_package(own: tuple[Path, ...]) -> None:
-    codec = Codec(own)
-    fields = {"number": -3, "text": "go"}
-    assert codec.decode("team_msgs/msg/Mode", codec.encode("team_msgs/msg/Mode", fields)) == fields
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        ("/a/lane_msgs/msg/Lane.msg", "lane_msgs/msg/Lane"),
-        ("/a/lane_msgs/Lane.msg", "lane_msgs/msg/Lane"),
-    ],
-)
-def test_the_package_of_a_file(path: str, name: str) -> None:
-    assert own_name(Path(path)) == name
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    codec = Codec([tmp_path / name for name in files])
+    assert codec.own == ("lane_msgs/msg/Lane", "lane_msgs/msg/Point2", "team_msgs/msg/Mode")
+    rng = random.Random(47)
+    for type_ in codec.own * 10:
+        fields = some_fields(codec, type_, rng)
+        assert plain(codec.decode(type_, codec.encode(type_, fields))) == plain(fields)
 
 
 @pytest.mark.parametrize(

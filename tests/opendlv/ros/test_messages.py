@@ -258,11 +258,14 @@ REFUSED = [
     (
         topic("std_msgs/msg/Float64", "opendlv.proxy.SwitchStateReading"),
         {"data": 0.5},
-        "a whole number from -32768 to 32767",
+        "is 0.5, and opendlv.proxy.SwitchStateReading.state is int16",
     ),
-    (topic("std_msgs/msg/Float64", "opendlv.proxy.SwitchStateReading"), {"data": 4e4}, "a whole number from -32768"),
     (topic("std_msgs/msg/String", STEERING, fields={"groundSteering": "data"}), {"data": "1"}, "is '1', and"),
-    (topic("std_msgs/msg/Float64", "opendlv.system.LogMessage", fields={"description": "data"}), {}, "a text"),
+    (
+        topic("std_msgs/msg/Float64", "opendlv.system.LogMessage", fields={"description": "data"}),
+        {},
+        "description is string",
+    ),
     (topic("geometry_msgs/msg/Twist", STEERING), {}, "does not become opendlv.proxy.GroundSteeringRequest by itself"),
     (
         topic("geometry_msgs/msg/PoseStamped", "robot.PoseEstimate"),
@@ -271,6 +274,7 @@ REFUSED = [
     ),
     (topic("nav_msgs/msg/Odometry", "robot.OdometryReading"), {}, "pose.pose.orientation of /t is not an attitude"),
     (topic(DETECTIONS, SENT[DETECTIONS][0]), {}, "needs its camera's size"),
+    (topic(DETECTIONS, SENT[DETECTIONS][0], camera=CameraView(width=0, height=0)), {}, "needs its camera's size"),
     (
         topic(DETECTIONS, SENT[DETECTIONS][0], camera=CAMERA),
         {"detections": [{"bbox": detected(x=math.nan, y=1, width=1, height=1)}]},
@@ -303,11 +307,12 @@ def test_what_is_sent_and_cannot_be_taken(wanted: Topic, fields: dict[str, Any],
         ),
         (topic(IMAGE, "video0.bgr"), [], "/t needs a picture"),
         (topic("sensor_msgs/msg/CameraInfo", "video0.bgr"), [], "needs its camera's size and opening angle"),
+        (topic("sensor_msgs/msg/CameraInfo", "v", camera=CameraView(width=8, height=6)), [], "needs its camera's size"),
         (topic("sensor_msgs/msg/Rage", DISTANCE), [], "did you mean 'sensor_msgs/msg/Range'?"),
         (topic("sensor_msgs/msg/Range", "opendlv.proxy.DistanceRead"), [], "there is no message"),
         (topic("sensor_msgs/msg/Range", DISTANCE, fields={"distance": "rang"}), [], "there is no 'rang' among header"),
         (topic("sensor_msgs/msg/Range", DISTANCE, fields={"far": "range"}), [], "has the field 'far'"),
-        (topic("std_msgs/msg/Float32", GYRO), [], f"{GYRO} has 3 fields, expected one"),
+        (topic("std_msgs/msg/Float32", GYRO), [], f"{GYRO} has 3 fields, expected 'fields'"),
     ],
 )
 def test_what_cannot_be_given(wanted: Topic, messages: list[Any], said: str) -> None:
