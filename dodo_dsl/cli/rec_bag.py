@@ -19,6 +19,7 @@ from dodo_dsl.opendlv.ros_types import Topic
 from dodo_dsl.rec import bag
 from dodo_dsl.rec.recording_filter import NothingSelected
 from dodo_dsl.spec.deployment import find_deployment
+from dodo_dsl.terminal import printable
 
 if TYPE_CHECKING:
     from dodo_dsl.opendlv.ros_messages import Types
@@ -53,11 +54,11 @@ def into(path: Path, place: Path, lossy: bool, problem: Callable[[str], None], s
     ):
         result = import_bag(found, place, lossy, known, types, progress)
     _tell_skipped(result.skipped, result.reasons, problem)
-    lines = [f"{result.counts.total()} messages of {len(result.topics)} topics\n"]
+    lines = [f"{result.counts.total()} messages of {len(result.topics)} topics"]
     for each in result.topics.values():
-        lines.append(f"  {each.topic} ({each.type}): {result.counts[each.topic]} -> {', '.join(each.bus)}\n")
-    lines += [f"  {topic} ({type_}): {count} -> left out\n" for (topic, type_), count in result.left_out.items()]
-    return "".join(lines)
+        lines.append(f"  {each.topic} ({each.type}): {result.counts[each.topic]} -> {', '.join(each.bus)}")
+    lines += [f"  {topic} ({type_}): {count} -> left out" for (topic, type_), count in result.left_out.items()]
+    return _text(lines)
 
 
 def export_bag(job: RecJob) -> None:
@@ -78,12 +79,16 @@ def export_bag(job: RecJob) -> None:
         if not writer.counts:
             raise NothingSelected(f"{job.recording.path} has no message that has a type of ROS 2")
     _tell_skipped(result.skipped, result.reasons, job.tell)
-    lines = [f"{folder}: {sum(writer.counts.values())} messages of {len(writer.counts)} topics\n"]
-    lines += [f"  {topic} ({type_}): {count}\n" for (topic, type_), count in sorted(writer.counts.items())]
+    lines = [f"{folder}: {sum(writer.counts.values())} messages of {len(writer.counts)} topics"]
+    lines += [f"  {topic} ({type_}): {count}" for (topic, type_), count in sorted(writer.counts.items())]
     for id_, count in sorted(result.left_out.items()):
         name = job.messages.name(id_) if id_ in job.messages.ids() else f"message {id_}"
-        lines.append(f"  {name}: {count} -> left out\n")
-    job.stdout.write("".join(lines))
+        lines.append(f"  {name}: {count} -> left out")
+    job.stdout.write(_text(lines))
+
+
+def _text(lines: list[str]) -> str:
+    return "".join(f"{printable(line)}\n" for line in lines)
 
 
 def _of_application(what: str, messages: MessageSet | None = None) -> "tuple[list[Topic], Types]":
