@@ -173,7 +173,7 @@ class Bridge:
             try:
                 newest[key] = messages.decode(envelope.data_type, envelope.payload)
             except MessageError as error:
-                self._findings.say(Finding(f"a message of the bus is broken: {error}", "warning"))
+                self._findings.say(Finding(f"a message of the bus is broken: {error}", ("bus", key), "warning"))
                 continue
             for each in wanted[key]:
                 self._feed(each, key, newest, envelope.sample_time)
@@ -198,12 +198,11 @@ class Bridge:
         try:
             data = self._types.encode(topic.type, self._types.given(topic, messages, time_us, picture))
         except RosTypeError as error:
-            self._findings.say(Finding(str(error), "warning"))
+            self._findings.say(Finding(str(error), ("given", topic.topic), "warning"))
             return
         if not given.writer.write(data):
-            self._findings.say(
-                Finding(f"a reader of {topic.topic} takes nothing any more: its program hangs", "warning")
-            )
+            text = f"a reader of {topic.topic} takes nothing any more: its program hangs"
+            self._findings.say(Finding(text, ("hangs", topic.topic), "warning"))
 
     def _show(self, name: str) -> None:
         """Gives the graph the pictures of a memory."""
@@ -279,7 +278,7 @@ class Bridge:
         now = now_us()
         if len(data) > _LARGEST_ANSWER:
             text = f"{topic.topic} has messages of more than {_LARGEST_ANSWER >> 20} MB, which are not taken"
-            self._findings.say(Finding(text))
+            self._findings.say(Finding(text, ("large", topic.topic)))
             return
         try:
             fields = self._types.decode(topic.type, data)
@@ -289,13 +288,18 @@ class Bridge:
                 made = self._session.messages.type(message.name)(**message.fields)
                 self._session.send(made, message.sample_time, message.stamp)
         except (RosTypeError, MessageError, TypeError, ValueError) as error:
-            self._findings.say(Finding(f"what {self._node(topic)} sends on {topic.topic} is not taken: {error}"))
+            text = f"sends on {topic.topic} is not taken: {error}"
+            self._findings.say_later(("broken", topic.topic), lambda: f"what {self._node(topic)} {text}")
 
     def _judge_header(self, topic: Topic, fields: Mapping[str, Any], now: int) -> None:
-        of = f" from {self._node(topic)}"
         expected = topic.frame_id or FRAME_IDS.get(topic.type, "")
-        self._findings.say(findings.frame_problem(topic, of, fields["header"]["frame_id"], expected))
-        self._findings.say(findings.stamp_problem(topic, of, time_of(fields), now))
+        frame, stamp = fields["header"]["frame_id"], time_of(fields)
+        if findings.frame_problem(topic, "", frame, expected):
+            key = ("frame", topic.topic)
+            self._findings.say_later(key, lambda: findings.frame_problem(topic, self._node(topic), frame, expected))
+        if findings.stamp_problem(topic, "", stamp, now):
+            key = ("stamp", topic.topic)
+            self._findings.say_later(key, lambda: findings.stamp_problem(topic, self._node(topic), stamp, now))
 
     def _node(self, topic: Topic, writes: bool = True) -> str:
         return " and ".join(sorted({self._seen.name(each) for each in self._seen.of(topic.topic, writes)})) or "a node"
@@ -313,9 +317,8 @@ class Bridge:
             if lost and (last or now - self._lost_since >= _BETTER_LATE):
                 size = topic.camera.width * topic.camera.height * 3
                 node = " and ".join(sorted({self._seen.name(reader) for reader in loose}))
-                self._findings.say(findings.small_buffer(topic, node, size, findings.receive_limit(), lost))
-                self._lost_before = 1 << 62
-                return
+                text = findings.loss(topic, node, size, findings.receive_limit(), lost)
+                self._findings.say(Finding(text, ("lost",)))
 
     @staticmethod
     def _lost() -> int:

@@ -6,7 +6,7 @@ Rules look at what discovery told; what comes from the application is looked at 
 import json
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from pathlib import Path
@@ -23,10 +23,12 @@ ALONE = 15.0
 AGE = 2.0
 """Seconds by which a stamp may lie behind what is heard; more is another clock or an old message."""
 AHEAD = 0.2
+_ANOTHER_CLOCK = 600.0
 RELIABLE, TRANSIENT = "reliable", "transient-local"
 _NEAR = 0.6
 _RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
 _US = 1_000_000
+_MOST = 100
 _BUS_PORT = 12175
 
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -34,9 +36,10 @@ _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 
 @dataclass(frozen=True)
 class Finding:
-    """A sentence; an error makes the test's goal hard to reach, a warning need not."""
+    """A sentence; an error makes the test's goal hard to reach, a warning need not. It is said once for its ``key``."""
 
     text: str
+    key: tuple[object, ...]
     severity: str = "error"
 
 
@@ -77,7 +80,8 @@ def _mismatch(topic: Topic, own: Endpoint, other: Endpoint, seen: Discovered) ->
         key = "out" if other.writes else "in"
         yield Finding(
             f"{node} {verb} {other.type} on {topic.topic}, which is {own.type} in the test: "
-            f"write one type in both ('ros: {key}')"
+            f"write one type in both ('ros: {key}')",
+            ("type", topic.topic, other.guid),
         )
         return
     writer, reader = (other, own) if other.writes else (own, other)
@@ -91,7 +95,8 @@ def _mismatch(topic: Topic, own: Endpoint, other: Endpoint, seen: Discovered) ->
             f"{node} {verb} {topic.topic}, but never meets the test's end of it: {node} {at} "
             f"{offered if other.writes else wanted}, the test {'wants' if other.writes else 'offers'} "
             f"{wanted if other.writes else offered}: write 'qos: {{{lacking}: "
-            f"{(offered if other.writes else wanted).replace(' ', '-')}}}' at the topic"
+            f"{(offered if other.writes else wanted).replace(' ', '-')}}}' at the topic",
+            (lacking, topic.topic, other.guid),
         )
 
 
@@ -100,7 +105,8 @@ def _crowds(sent: Iterable[Topic], seen: Discovered) -> Iterator[Finding]:
         names = sorted(seen.name(each) for each in seen.of(topic.topic, True))
         if len(names) > 1:
             who = f"{names[0]} has two publishers" if names[0] == names[-1] else f"{_listed(names)} publish"
-            yield Finding(f"{who} on {topic.topic}: what comes last counts; let one publish there")
+            text = f"{who} on {topic.topic}: what comes last counts; let one publish there"
+            yield Finding(text, ("crowd", topic.topic))
 
 
 def _alone(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
@@ -109,15 +115,17 @@ def _alone(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
         of = f" of {_listed(services)}" if services else ""
         yield Finding(
             f"no ROS node is in the graph: the programs{of} ended, or use another domain (ROS_DOMAIN_ID), "
-            "another network, or no DDS"
+            "another network, or no DDS",
+            ("alone",),
         )
 
 
 def _silent(seen: Discovered) -> Iterator[Finding]:
     """Participants that announced themselves and nothing else."""
     speaking = {each.participant for each in seen.endpoints.values()}
-    for _ in sorted(seen.participants - speaking):
-        yield Finding("a ROS program announced itself, but none of its topics: it hangs or ended while it started")
+    if seen.participants - speaking:
+        text = "a ROS program announced itself, but none of its topics: it hangs or ended while it started"
+        yield Finding(text, ("silent",))
 
 
 def _missing(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
@@ -130,11 +138,11 @@ def _missing(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
             other = _nearest(topic, [each for each in seen.topics(not given) if _is_loose(each, known, seen)])
             lacks = f"nobody {'listens to' if given else 'publishes'} {topic.topic} ({topic.type})"
             if other:
-                yield Finding(f"{lacks}; {_remedy(topic, other, seen)}")
+                yield Finding(f"{lacks}; {_remedy(topic, other, seen)}", ("missing", topic.topic))
             elif not given or not heard:
-                yield Finding(f"{lacks}; {_nodes(seen)}")
+                yield Finding(f"{lacks}; {_nodes(seen)}", ("missing", topic.topic))
             elif topic.type != _CAMERA_INFO:
-                yield Finding(lacks, "warning")
+                yield Finding(lacks, ("missing", topic.topic), "warning")
 
 
 def _is_loose(endpoint: Endpoint, known: set[str], seen: Discovered) -> bool:
@@ -163,35 +171,39 @@ def _nodes(seen: Discovered) -> str:
     return f"the graph has {_listed(names)}" if names else "the graph has no node with a name"
 
 
-def frame_problem(topic: Topic, node: str, frame_id: str, expected: str) -> Finding | None:
-    """Of a message's ``header.frame_id``; an empty one is as good as none."""
-    allowed = {expected, "odom", "map"} if expected in ("odom", "map") else {expected}
+def frame_problem(topic: Topic, node: str, frame_id: str, expected: str) -> str:
+    """Of a message's ``header.frame_id``, empty for none; an empty frame is as good as none."""
+    allowed = {"odom", "map"} if expected in ("odom", "map") else {expected}
     if not frame_id or not expected or frame_id.lstrip("/") in allowed:
-        return None
-    return Finding(f"{topic.topic} comes in frame '{frame_id}'{node}; expected '{expected}'")
+        return ""
+    return f"{topic.topic} comes in frame '{frame_id:.60}' from {node}; expected '{expected}'"
 
 
-def stamp_problem(topic: Topic, node: str, stamp_us: int, now_us: int) -> Finding | None:
-    """Of a message's ``header.stamp``."""
+def stamp_problem(topic: Topic, node: str, stamp_us: int, now_us: int) -> str:
+    """Of a message's ``header.stamp``, empty for none."""
     if stamp_us == 0:
-        return Finding(f"{topic.topic} comes without a stamp{node}; expected that of what it answers (header.stamp)")
+        return f"{topic.topic} comes without a stamp from {node}; expected that of what it answers (header.stamp)"
     age = (now_us - stamp_us) / _US
     if -AHEAD <= age <= AGE:
-        return None
-    if abs(age) > 3600:
-        return Finding(
-            f"the stamps of {topic.topic}{node} are of another clock, {_span(abs(age))} "
+        return ""
+    if abs(age) >= _ANOTHER_CLOCK:
+        return (
+            f"the stamps of {topic.topic} from {node} are of another clock, {_span(abs(age))} "
             f"{'behind' if age > 0 else 'ahead of'} the test's: copy header.stamp, or take the node's clock"
         )
-    return Finding(f"{topic.topic} comes with stamps {_span(abs(age))} {'old' if age > 0 else 'ahead'}{node}")
+    return f"{topic.topic} comes with stamps {_span(abs(age))} {'old' if age > 0 else 'ahead'} from {node}"
 
 
-def small_buffer(topic: Topic, node: str, size: int, limit: int, lost: int) -> Finding:
-    """Pictures that do not fit into what the kernel lets a best-effort reader keep."""
-    return Finding(
-        f"{lost} datagrams were lost, as {node} hears {topic.topic} by best effort and receive buffers (at most "
-        f"{limit} bytes) were full of its pictures of {size} bytes: 'sudo sysctl -w net.core.rmem_max={4 * size}', "
-        "smaller pictures, or a reliable subscription"
+def loss(topic: Topic, node: str, size: int, limit: int, lost: int) -> str:
+    """Of pictures that did not fit into a best-effort reader's buffer."""
+    remedy = (
+        f"'sudo sysctl -w net.core.rmem_max={4 * size}'"
+        if limit < size
+        else f"give the node one of {4 * size} bytes (FASTDDS_BUILTIN_TRANSPORTS, CYCLONEDDS_URI)"
+    )
+    return (
+        f"{lost} datagrams were lost: {node} hears {topic.topic} by best effort, and its receive buffer is smaller "
+        f"than a picture ({size} bytes): {remedy}, or subscribe reliably"
     )
 
 
@@ -222,19 +234,26 @@ class Findings:
 
     def __init__(self, graph: RosGraph, seen: Discovered) -> None:
         self._graph, self._seen = graph, seen
-        self._said: set[str] = set()
-        self._lock = threading.Lock()
+        self._said: set[tuple[object, ...]] = set()
+        self._later: dict[tuple[object, ...], Callable[[], str]] = {}
+        self._lock = threading.RLock()
         self._changes, self._changed, self._first = 0, 0.0, 0.0
         self._left: dict[bytes, float] = {}
 
-    def say(self, finding: Finding | None) -> None:
+    def say(self, finding: Finding) -> None:
         with self._lock:
-            if finding is None or finding.text in self._said or len(self._said) >= 100:
+            if finding.key in self._said or len(self._said) >= _MOST:
                 return
-            self._said.add(finding.text)
+            self._said.add(finding.key)
         record = {"dodo": "ros", "finding": finding.text, "severity": finding.severity}
         print(json.dumps(record, ensure_ascii=False), flush=True)
         print(f"ros-bridge: {finding.severity}: {finding.text}", file=sys.stderr, flush=True)
+
+    def say_later(self, key: tuple[object, ...], text: Callable[[], str]) -> None:
+        """An error, at the next look: by then the names of nodes are known."""
+        with self._lock:
+            if key not in self._said and len(self._later) < _MOST:
+                self._later.setdefault(key, text)
 
     def look(self, now: float, last: bool = False) -> None:
         """Judges the graph when it has settled, or at the ``last``; ``now`` in seconds."""
@@ -247,6 +266,10 @@ class Findings:
         waited = now - self._first - (0.0 if self._seen.participants else ALONE - PATIENCE)
         for finding in problems(self._graph, self._seen, PATIENCE if last and self._seen.participants else waited):
             self.say(finding)
+        with self._lock:
+            later, self._later = self._later, {}
+        for key, text in later.items():
+            self.say(Finding(text(), key))
         if not last:
             self._look_for_the_dead(now)
 
@@ -254,7 +277,8 @@ class Findings:
         for key in self._seen.left:
             if now - self._left.setdefault(key, now) >= SETTLED and (names := self._seen.nodes.get(key)):
                 who = _listed([f"'{name}'" for name in sorted(names)])
-                self.say(Finding(f"{who} left the ROS graph during the test: the program ended or hangs", "warning"))
+                text = f"{who} left the ROS graph during the test: the program ended or hangs"
+                self.say(Finding(text, ("left", key), "warning"))
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -263,9 +287,10 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _span(seconds: float) -> str:
-    return (
-        f"{seconds:.2f} s" if seconds < 600 else f"{seconds / 86400:.1f} days" if seconds > 2e5 else f"{seconds:.0f} s"
-    )
+    for unit, length in (("days", 86_400.0), ("h", 3600.0)):
+        if seconds >= length:
+            return f"{seconds / length:.1f} {unit}"
+    return f"{seconds:.2f} s"
 
 
 def _word(text: str) -> str:

@@ -49,7 +49,6 @@ _CONFIGURATION = f"""<CycloneDDS><Domain>
 <SocketReceiveBufferSize min='default' max='4MB'/><MaxSampleSize>{MAX_SAMPLE_BYTES}B</MaxSampleSize>
 <Watermarks><WhcHigh>{MAX_SAMPLE_BYTES}B</WhcHigh></Watermarks></Internal>
 <Compatibility><IgnoreTypeInformation>{_EPROSIMA}</IgnoreTypeInformation></Compatibility>
-<Tracing><Verbosity>severe</Verbosity></Tracing>
 </Domain></CycloneDDS>"""
 _NODES, _NODES_TYPE = "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any

@@ -1,0 +1,166 @@
+"""A test's side of the bridge in a network of its own: bus, shared memory, bridge and ROS nodes, for some seconds.
+
+``scenario.py`` gets a scenario as JSON and prints what came of it; ``played`` runs it in new namespaces.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from dodo_dsl.opendlv.ros_types import STATIC_FRAMES, STATIC_FRAMES_TYPE, RosGraph
+from dodo_dsl.opendlv.session import Session
+from dodo_dsl.opendlv.shared_memory import SharedMemory
+
+ROOT = Path(__file__).parents[3]
+PYTHON = Path(os.environ.get("DODO_ROS_PYTHON") or ROOT / "build/ros/bin/python")
+NAMESPACES = ["unshare", *(["-U", "-r"] if os.getuid() else []), "-n", "-i", "-p", "-f", "--mount-proc", "--kill-child"]
+NETWORK = "ip link set lo up && ip route add 224.0.0.0/4 dev lo src 127.0.0.1"
+PATIENCE_S = 60.0
+CID = 111
+WIDTH, HEIGHT = 64, 48
+
+
+class Scenario(msgspec.Struct, kw_only=True):
+    """``peers`` are nodes with their endpoints; ``messages`` go to the bus again and again, with pictures."""
+
+    graph: RosGraph
+    peers: dict[str, list[dict[str, Any]]] = {}
+    messages: list[tuple[str, int, dict[str, Any]]] = []
+    size: tuple[int, int] = (WIDTH, HEIGHT)
+    seconds: float = 4.0
+    environment: dict[str, str] = {}
+    leaves: str = ""
+    """A peer that is ended after half of the time."""
+
+
+class Played(msgspec.Struct, kw_only=True):
+    """``heard`` are lines of the peers; ``sent`` messages of the bus: name, stamp, age in us, fields."""
+
+    heard: list[dict[str, Any]]
+    sent: list[tuple[str, int, int, str]]
+    findings: list[tuple[str, str]]
+    code: int
+    log: str
+    pictures: int
+    frames: list[str]
+    """The children of /tf_static."""
+
+
+def refusal() -> str:
+    """Why these tests cannot run here; empty when they can."""
+    if not PYTHON.exists():
+        return f"needs ROS 2: there is no {PYTHON}; DODO_ROS_PYTHON names a Python with rclpy"
+    for words in ([str(PYTHON), "-c", "import rclpy, nav_msgs.msg"], [*NAMESPACES, "sh", "-c", NETWORK]):
+        done = subprocess.run(words, check=False, capture_output=True, timeout=PATIENCE_S)
+        if done.returncode:
+            return f"needs ROS 2 and namespaces: {done.stderr.decode()[-200:]}"
+    return ""
+
+
+def played(scenario: Scenario) -> Played:
+    words = [sys.executable, str(Path(__file__)), msgspec.json.encode(scenario).decode()]
+    shell = [*NAMESPACES, "sh", "-c", f'{NETWORK} && exec "$@"', "sh", *words]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        shell, capture_output=True, text=True, timeout=PATIENCE_S + scenario.seconds, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return msgspec.json.decode(done.stdout, type=Played)
+
+
+def _main(scenario: Scenario) -> Played:
+    name = f"dodo-ros-{os.getpid()}-{time.time_ns()}.bgr"
+    width, height = scenario.size
+    with (
+        Session(CID) as session,
+        SharedMemory.create(name, width * height * 3) as memory,
+        tempfile.TemporaryDirectory() as folder,
+    ):
+        places = {who: Path(folder) / who for who in ("bridge", "log", *scenario.peers)}
+        graph = msgspec.json.encode(scenario.graph).decode()
+        names = [f"--name={name}"] if "MEMORY" in graph else []
+        words = [sys.executable, "-m", "services.ros_bridge", f"--cid={CID}", f"--topics={graph}", *names]
+        with places["bridge"].open("w") as out, places["log"].open("w") as log:
+            bridge = subprocess.Popen(
+                [word.replace("MEMORY", name) for word in words], cwd=ROOT, stdout=out, stderr=log
+            )
+        peers = {
+            who: subprocess.Popen(
+                [PYTHON, Path(__file__).with_name("peer.py"), who, json.dumps(endpoints)],
+                stdout=places[who].open("w"),
+                env={**os.environ, "PYTHONPATH": "", **scenario.environment},
+            )
+            for who, endpoints in scenario.peers.items()
+        }
+        sent: list[tuple[str, int, int, str]] = []
+        threading.Thread(target=_listen, args=(sent,), daemon=True).start()
+        pictures, begin = 0, time.monotonic()
+        while time.monotonic() - begin < scenario.seconds and bridge.poll() is None:
+            if scenario.leaves and time.monotonic() - begin > scenario.seconds / 2:
+                peers[scenario.leaves].terminate()
+            now = time.time_ns() // 1000
+            for full_name, stamp, fields in scenario.messages:
+                values = {key: bytes.fromhex(v) if isinstance(v, str) else v for key, v in fields.items()}
+                session.send(session.messages.type(full_name)(**values), now, stamp)
+            if names:
+                with memory.lock():
+                    memory.buffer[:] = bytes([pictures % 256]) * len(memory.buffer)
+                    memory.stamp(now)
+                    memory.notify_all()
+                pictures += 1
+            time.sleep(0.05)
+        frames = _frames(scenario.graph)
+        bridge.terminate()
+        code = bridge.wait(PATIENCE_S)
+        for peer in peers.values():
+            peer.kill()
+        lines = [json.loads(line) for line in places["bridge"].read_text().splitlines()]
+        return Played(
+            heard=[json.loads(line) for who in peers for line in places[who].read_text().splitlines()],
+            sent=sent,
+            findings=[(line["severity"], line["finding"]) for line in lines],
+            code=code,
+            log=places["log"].read_text(),
+            pictures=pictures,
+            frames=frames,
+        )
+
+
+def _frames(graph: RosGraph) -> list[str]:
+    """What somebody who comes late hears on /tf_static."""
+    if not graph.frames:
+        return []
+    from dodo_dsl.opendlv.ros_messages import Types
+    from services.ros_bridge.graph import Graph
+
+    joined = Graph()
+    reader = joined.reader(STATIC_FRAMES, STATIC_FRAMES_TYPE, durable=True)
+    end = time.monotonic() + PATIENCE_S / 3
+    while time.monotonic() < end:
+        for data in reader.take():
+            return [each["child_frame_id"] for each in Types().decode(STATIC_FRAMES_TYPE, data)["transforms"]]
+        time.sleep(0.05)
+    return []
+
+
+def _listen(sent: list[tuple[str, int, int, str]]) -> None:
+    """What the bridge says on the bus, beside the first session's own messages."""
+    with Session(CID) as session:
+        while True:
+            envelope = session.receive(None)
+            if envelope is not None:
+                fields = str(session.messages.decode(envelope.data_type, envelope.payload)).replace("\n", " ").strip()
+                name = session.messages.name(envelope.data_type)
+                sent.append((name, envelope.sender_stamp, envelope.sent - envelope.sample_time, fields))
+
+
+if __name__ == "__main__":
+    print(msgspec.json.encode(_main(msgspec.json.decode(sys.argv[1], type=Scenario))).decode())

@@ -1,0 +1,209 @@
+"""The bridge with real ROS 2 nodes: every type both ways, the time, and what goes wrong, said in one line each."""
+
+import struct
+from typing import Any
+
+import pytest
+
+from dodo_dsl.opendlv.ros_types import (
+    GIVEN,
+    MOTION_REQUEST,
+    POSE_ESTIMATE,
+    CameraView,
+    RosGraph,
+    StaticFrame,
+    Topic,
+)
+from tests.services.ros_bridge.scenario import HEIGHT, WIDTH, Played, Scenario, played, refusal
+
+_WHY_NOT = refusal()
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.realtime,
+    pytest.mark.skipif(bool(_WHY_NOT), reason=_WHY_NOT),
+]
+CAMERA = CameraView(width=WIDTH, height=HEIGHT, fovy=48.8)
+IMAGE, TWIST, POSE = "sensor_msgs/msg/Image", "geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"
+SCAN, STAMPED = "sensor_msgs/msg/LaserScan", "geometry_msgs/msg/TwistStamped"
+
+
+def topic(name: str, type_: str, *bus: str, **rest: object) -> Topic:
+    return Topic(topic=name, type=type_, bus=bus, **rest)  # type: ignore[arg-type]
+
+
+def end(name: str, type_: str, **rest: object) -> dict[str, object]:
+    return {"topic": name, "type": type_, **rest}
+
+
+VX = {"linear.x": 0.5, "angular.z": 0.25}
+MESSAGES: list[tuple[str, int, dict[str, Any]]] = [
+    ("robot.PlanarScan", 0, {"angleMin": -0.5, "angleIncrement": 0.5, "ranges": struct.pack("<2f", 1.5, 2.5).hex()}),
+    ("opendlv.proxy.DistanceReading", 2, {"distance": 1.5}),
+    ("opendlv.proxy.DistanceReading", 3, {"distance": 9.0}),
+    ("opendlv.proxy.AngularVelocityReading", 0, {"angularVelocityZ": 0.5}),
+    ("opendlv.proxy.AccelerationReading", 0, {"accelerationZ": 9.75}),
+    ("opendlv.logic.sensation.Geolocation", 0, {"latitude": 57.5, "longitude": 12.25, "altitude": 4.0}),
+    ("robot.OdometryReading", 0, {"x": 1.0, "vx": 0.5}),
+    ("opendlv.proxy.GroundSpeedReading", 0, {"groundSpeed": 0.75}),
+]
+BUS = {
+    "sensor_msgs/msg/Range": ("opendlv.proxy.DistanceReading/2",),
+    **{type_: ("MEMORY",) for type_, ways in GIVEN.items() if ways == (("memory",),)},
+}
+GRAPH = RosGraph(
+    given=(
+        *(
+            topic(f"/in/{type_.rpartition('/')[2].lower()}", type_, *BUS.get(type_, ways[0]), camera=CAMERA)
+            for type_, ways in GIVEN.items()
+        ),
+        topic("/in/speed", "std_msgs/msg/Float32", "opendlv.proxy.GroundSpeedReading"),
+        topic("/in/slow", "std_msgs/msg/Float64", "opendlv.proxy.GroundSpeedReading", rate=2.0),
+    ),
+    sent=(
+        topic("/cmd_vel", TWIST, MOTION_REQUEST),
+        topic("/cmd_stamped", STAMPED, f"{MOTION_REQUEST}/1"),
+        topic("/odom", "nav_msgs/msg/Odometry", POSE_ESTIMATE),
+        topic("/pose", POSE, f"{POSE_ESTIMATE}/1"),
+        topic("/pose_cov", "geometry_msgs/msg/PoseWithCovarianceStamped", f"{POSE_ESTIMATE}/2"),
+        topic("/height", "std_msgs/msg/Float64", "opendlv.proxy.GroundSpeedReading/7"),
+    ),
+    frames=(StaticFrame(parent="base_link", child="laser", x=0.1),),
+)
+PEERS = {
+    "simulated_lane": [
+        *(end(each.topic, each.type) for each in GRAPH.given),
+        end("/clock", "rosgraph_msgs/msg/Clock", reliable=False),
+        end("/cmd_vel", TWIST, fields=VX, reliable=False),
+    ],
+    "estimator": [
+        end("/cmd_stamped", STAMPED, age=0.01, fields={"twist.linear.x": 0.25}),
+        end("/odom", "nav_msgs/msg/Odometry", age=0.01, fields={"pose.pose.position.x": 2.0}),
+        end("/pose", POSE, age=0.01, fields={"pose.position.y": 3.0, "header.frame_id": "map"}),
+        end("/pose_cov", "geometry_msgs/msg/PoseWithCovarianceStamped", age=0.01, fields={"pose.pose.position.z": 4.0}),
+        end("/height", "std_msgs/msg/Float64", fields={"data": 5.0}),
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def well() -> Played:
+    return played(Scenario(graph=GRAPH, peers=PEERS, messages=MESSAGES, seconds=6))
+
+
+@pytest.mark.xdist_group("ros-bridge-well")
+def test_gives_and_takes_every_type_and_finds_nothing(well: Played) -> None:
+    heard = {line["topic"]: line["message"] for line in well.heard}
+    assert heard.keys() == {each.topic for each in GRAPH.given} | {"/clock"}
+    assert heard["/in/image"]["data"][0] == WIDTH * HEIGHT * 3
+    assert heard["/in/camerainfo"]["k"][2] == (WIDTH - 1) / 2
+    assert heard["/in/laserscan"]["ranges"] == [1.5, 2.5]
+    assert heard["/in/range"]["range"] == 1.5
+    assert heard["/in/imu"]["linear_acceleration"]["z"] == 9.75
+    assert heard["/in/imu"]["angular_velocity"]["z"] == 0.5
+    assert heard["/in/navsatfix"]["latitude"] == 57.5
+    assert heard["/in/odometry"]["pose"]["pose"]["position"]["x"] == 1.0
+    assert heard["/in/speed"]["data"] == 0.75
+    sent = {(name, stamp): (age, fields) for name, stamp, age, fields in well.sent}
+    assert sent[MOTION_REQUEST, 0][1].startswith("vx: 0.5 ")
+    assert sent[MOTION_REQUEST, 0][0] < 5_000  # us, as it has no stamp
+    assert sent[MOTION_REQUEST, 1][0] >= 10_000
+    assert [sent[POSE_ESTIMATE, stamp][1].split(" q")[0] for stamp in range(3)] == [
+        "x: 2 y: 0 z: 0",
+        "x: 0 y: 3 z: 0",
+        "x: 0 y: 0 z: 4",
+    ]
+    assert sent["opendlv.proxy.GroundSpeedReading", 7][1] == "groundSpeed: 5"
+    assert well.frames == ["laser"]
+    assert (well.findings, well.code, well.log) == ([], 0, "")
+
+
+@pytest.mark.xdist_group("ros-bridge-well")
+def test_gives_pictures_once_with_their_time_and_the_time_in_steps(well: Played) -> None:
+    by_topic: dict[str, list[dict[str, float]]] = {}
+    for line in well.heard:
+        at = line["message"].get("clock") or line["message"].get("header", {}).get("stamp")
+        by_topic.setdefault(line["topic"], []).append(at)
+    images = [(each["sec"], each["nanosec"]) for each in by_topic["/in/image"]]
+    assert 1 < len(images) == len(set(images)) <= well.pictures
+    assert images == [(each["sec"], each["nanosec"]) for each in by_topic["/in/camerainfo"]]
+    times = [each["sec"] * 10**9 + each["nanosec"] for each in by_topic["/clock"]]
+    assert times == sorted(times)
+    assert not [each for each in times if each % 10_000_000]
+    assert len(by_topic["/in/slow"]) < len(by_topic["/in/speed"]) / 4
+
+
+WRONG = RosGraph(
+    given=(
+        topic("/camera/image_raw", IMAGE, "MEMORY", camera=CAMERA),
+        topic("/scan", SCAN, "robot.PlanarScan"),
+        topic("/map_scan", SCAN, "robot.PlanarScan"),
+        topic("/unused", SCAN, "robot.PlanarScan"),
+    ),
+    sent=(
+        topic("/cmd_vel", TWIST, MOTION_REQUEST),
+        topic("/cmd_two", TWIST, MOTION_REQUEST),
+        topic("/cmd_type", TWIST, MOTION_REQUEST),
+        topic("/cmd_quality", TWIST, MOTION_REQUEST, reliability="reliable"),
+        topic("/frame", POSE, POSE_ESTIMATE),
+        topic("/unstamped", POSE, POSE_ESTIMATE),
+        topic("/old", POSE, POSE_ESTIMATE),
+        topic("/nothing", POSE, POSE_ESTIMATE),
+    ),
+)
+QX = {"pose.orientation.w": 1.0}
+WRONG_PEERS = {
+    "lane": [
+        end("/image_raw", IMAGE),
+        end("/scan", SCAN),
+        end("/map_scan", SCAN, durable=True),
+        end("/cmd_vel_raw", TWIST, fields=VX),
+        end("/cmd_two", TWIST, fields=VX),
+        end("/cmd_type", STAMPED, age=0.0, fields={}),
+        end("/cmd_quality", TWIST, fields=VX, reliable=False),
+    ],
+    "teleop": [
+        end("/cmd_two", TWIST, fields=VX),
+        end("/frame", POSE, age=0.0, fields={**QX, "header.frame_id": "camera"}),
+        end("/unstamped", POSE, fields=QX),
+        end("/old", POSE, age=7200.0, fields=QX),
+        end("/nothing", POSE, age=0.0, fields={"pose.orientation.w": 0.0}),
+    ],
+    "short": [end("/elsewhere", TWIST, fields=VX)],
+}
+SENTENCES = [
+    "nobody listens to /camera/image_raw (sensor_msgs/msg/Image); 'lane' listens to /image_raw: "
+    "remap it (--ros-args -r /image_raw:=/camera/image_raw)",
+    "nobody publishes /cmd_vel (geometry_msgs/msg/Twist); 'lane' publishes /cmd_vel_raw: "
+    "remap it (--ros-args -r /cmd_vel_raw:=/cmd_vel)",
+    "nobody listens to /unused (sensor_msgs/msg/LaserScan)",
+    "'lane' listens to /map_scan, but never meets the test's end of it: 'lane' wants transient local, "
+    "the test offers volatile: write 'qos: {durability: transient-local}' at the topic",
+    "'lane' publishes /cmd_quality, but never meets the test's end of it: 'lane' offers best effort, "
+    "the test wants reliable: write 'qos: {reliability: best-effort}' at the topic",
+    "'lane' publishes geometry_msgs/msg/TwistStamped on /cmd_type, which is geometry_msgs/msg/Twist in the test: "
+    "write one type in both ('ros: out')",
+    "'lane' and 'teleop' publish on /cmd_two: what comes last counts; let one publish there",
+    "/frame comes in frame 'camera' from 'teleop'; expected 'map'",
+    "/unstamped comes without a stamp from 'teleop'; expected that of what it answers (header.stamp)",
+    "the stamps of /old from 'teleop' are of another clock, 2.0 h behind the test's: copy header.stamp, "
+    "or take the node's clock",
+    "what 'teleop' sends on /nothing is not taken: the orientation of /nothing is 0, expected a unit quaternion",
+    "'short' left the ROS graph during the test: the program ended or hangs",
+]
+
+
+def test_names_what_goes_wrong() -> None:
+    seen = played(Scenario(graph=WRONG, peers=WRONG_PEERS, messages=MESSAGES[:1], seconds=10, leaves="short"))
+    said = [sentence for _, sentence in seen.findings]
+    assert sorted(said) == sorted(SENTENCES)
+    assert seen.code == 0
+
+
+def test_counts_pictures_that_a_small_buffer_loses() -> None:
+    camera = CameraView(width=640, height=480, fovy=48.8)
+    graph = RosGraph(given=(topic("/camera", IMAGE, "MEMORY", camera=camera),))
+    peers = {"lane": [end("/camera", IMAGE, reliable=False)]}
+    seen = played(Scenario(graph=graph, peers=peers, size=(640, 480), seconds=8))
+    assert len(seen.heard) < seen.pictures
+    (finding,) = seen.findings
+    assert "datagrams were lost: 'lane' hears /camera by best effort" in finding[1]
