@@ -59,6 +59,16 @@ SENT: Mapping[str, tuple[str, ...]] = {
 NUMBERS = ("std_msgs/msg/Float32", "std_msgs/msg/Float64")
 """Types of one number: they need ``from`` or ``to``, a message with one number."""
 
+NODE_ENVIRONMENT: Mapping[str, str] = {
+    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4?max_msg_size=65500&sockets_size=16777216",
+    "CYCLONEDDS_URI": (
+        "<CycloneDDS><Domain><General><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
+        "</General><Internal><SocketReceiveBufferSize max='16MB'/></Internal></Domain></CycloneDDS>"
+    ),
+}
+"""Variables of an application's nodes where it does not set them: datagrams of 65 kB, and receive buffers that hold some
+pictures, or what the kernel grants. Without shared memory, so that nodes get messages in the same order each time."""
+
 
 FRAME_IDS: Mapping[str, str] = {
     "sensor_msgs/msg/Image": "camera_optical_frame",

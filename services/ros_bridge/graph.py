@@ -46,7 +46,7 @@ _EPROSIMA = "1.15"
 _CONFIGURATION = f"""<CycloneDDS><Domain>
 <General><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize></General>
 <Internal><HeartbeatInterval min='1 ms' minsched='2 ms' max='4 ms'>2 ms</HeartbeatInterval>
-<SocketReceiveBufferSize min='default' max='4MB'/><MaxSampleSize>{MAX_SAMPLE_BYTES}B</MaxSampleSize>
+<SocketReceiveBufferSize max='16MB'/><MaxSampleSize>{MAX_SAMPLE_BYTES}B</MaxSampleSize>
 <Watermarks><WhcHigh>{MAX_SAMPLE_BYTES}B</WhcHigh></Watermarks></Internal>
 <Compatibility><IgnoreTypeInformation>{_EPROSIMA}</IgnoreTypeInformation></Compatibility>
 </Domain></CycloneDDS>"""

@@ -18,13 +18,13 @@ from rclpy.time import Duration
 
 
 def plain(message: Any) -> Any:
-    """A message as JSON has it; long lists as length and sum."""
+    """A message as JSON has it; long lists as length, first and last."""
     if hasattr(message, "get_fields_and_field_types"):
         return {name: plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
     if isinstance(message, (str, bool, int, float)):
         return message
     if len(message) > 40:
-        return [len(message), sum(map(int, bytes(message)))]
+        return [len(message), message[0], message[-1]]
     return [plain(each) if hasattr(each, "get_fields_and_field_types") else float(each) for each in message]
 
 
