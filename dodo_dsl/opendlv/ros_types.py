@@ -66,8 +66,8 @@ NODE_ENVIRONMENT: Mapping[str, str] = {
         "</General><Internal><SocketReceiveBufferSize max='16MB'/></Internal></Domain></CycloneDDS>"
     ),
 }
-"""Variables of an application's nodes where it does not set them: datagrams of 65 kB, and receive buffers that hold some
-pictures, or what the kernel grants. Without shared memory, so that nodes get messages in the same order each time."""
+"""Variables of an application's nodes where it does not set them: datagrams of 65 kB, and receive buffers that hold
+some pictures, or what the kernel grants. Without shared memory, so that messages come in the same order each time."""
 
 
 FRAME_IDS: Mapping[str, str] = {

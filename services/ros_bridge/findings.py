@@ -27,6 +27,7 @@ _ANOTHER_CLOCK = 600.0
 RELIABLE, TRANSIENT = "reliable", "transient-local"
 _NEAR = 0.6
 _RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
+_SOCKETS = Path("/proc/net/udp")
 _US = 1_000_000
 _MOST = 100
 _BUS_PORT = 12175
@@ -66,7 +67,7 @@ def problems(graph: RosGraph, seen: Discovered, waited: float) -> Iterator[Findi
 
 
 def _mismatches(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
-    """Ends of one topic that never meet, DoDo's and those of two nodes."""
+    """Ends of one topic that never meet."""
     for given, topics in ((True, graph.given), (False, graph.sent)):
         for topic in topics:
             own = Endpoint(b"", b"", topic.topic, topic.type, given, is_reliable(topic), is_durable(topic))
@@ -139,7 +140,7 @@ def _missing(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
             lacks = f"nobody {'listens to' if given else 'publishes'} {topic.topic} ({topic.type})"
             if other:
                 yield Finding(f"{lacks}; {_remedy(topic, other, seen)}", ("missing", topic.topic))
-            elif not given or not heard:
+            elif topic.type != _CAMERA_INFO and (not given or not heard):
                 yield Finding(f"{lacks}; {_nodes(seen)}", ("missing", topic.topic))
             elif topic.type != _CAMERA_INFO:
                 yield Finding(lacks, ("missing", topic.topic), "warning")
@@ -217,9 +218,9 @@ def receive_limit() -> int:
 
 def lost_datagrams(own: Iterable[int] = ()) -> int:
     """How many the kernel dropped for full buffers in this network, but those of the bus and of inodes ``own``."""
-    table, lost, own = Path("/proc/net/udp"), 0, set(own)
+    lost, own = 0, set(own)
     try:
-        lines = table.read_text().splitlines()[1:]
+        lines = _SOCKETS.read_text().splitlines()[1:]
     except OSError:
         return 0
     for line in lines:

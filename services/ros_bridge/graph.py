@@ -164,7 +164,7 @@ class Graph:
             for endpoint in _taken(reader):
                 self._tell(seen, endpoint, writes)
         for raw in self._nodes.take():
-            for participant_key, node, guids in _nodes(raw):
+            for participant_key, node, guids in nodes_of(raw):
                 seen.named(participant_key, node, guids)
 
     def _tell(self, seen: Discovered, endpoint: Any, writes: bool) -> None:
@@ -232,7 +232,7 @@ def _ros_type(type_: str) -> str:
     return type_
 
 
-def _nodes(raw: bytes) -> Iterator[tuple[bytes, str, list[bytes]]]:
+def nodes_of(raw: bytes) -> Iterator[tuple[bytes, str, list[bytes]]]:
     """Participant, node and GUIDs of its endpoints, from a ``ParticipantEntitiesInfo``; none of what is malformed."""
     for size in _GID_BYTES:
         try:
