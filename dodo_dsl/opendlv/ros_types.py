@@ -59,16 +59,6 @@ SENT: Mapping[str, tuple[str, ...]] = {
 NUMBERS = ("std_msgs/msg/Float32", "std_msgs/msg/Float64")
 """Types of one number: they need ``from`` or ``to``, a message with one number."""
 
-NODE_ENVIRONMENT: Mapping[str, str] = {
-    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4?max_msg_size=65500&sockets_size=16777216",
-    "CYCLONEDDS_URI": (
-        "<CycloneDDS><Domain><General><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
-        "</General><Internal><SocketReceiveBufferSize max='16MB'/></Internal></Domain></CycloneDDS>"
-    ),
-}
-"""Variables of an application's nodes where it does not set them: datagrams of 65 kB, and receive buffers that hold
-some pictures, or what the kernel grants. Without shared memory, so that messages come in the same order each time."""
-
 
 FRAME_IDS: Mapping[str, str] = {
     "sensor_msgs/msg/Image": "camera_optical_frame",
@@ -85,9 +75,14 @@ FRAME_IDS: Mapping[str, str] = {
 
 
 NODE_ENVIRONMENT: Mapping[str, str] = {
-    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4?max_msg_size=65500&sockets_size=4194304",
+    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4?max_msg_size=65500&sockets_size=16777216",
+    "CYCLONEDDS_URI": (
+        "<CycloneDDS><Domain><General><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
+        "</General><Internal><SocketReceiveBufferSize max='16MB'/></Internal></Domain></CycloneDDS>"
+    ),
 }
-"""What gives nodes receive buffers that hold a picture."""
+"""Variables of an application's nodes where it does not set them: datagrams of 65 kB, and receive buffers that hold
+some pictures, or what the kernel grants. Without shared memory, so that messages come in the same order each time."""
 
 
 class CameraView(msgspec.Struct, frozen=True, kw_only=True):

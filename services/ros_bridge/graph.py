@@ -1,32 +1,18 @@
-"""The application's ROS graph by DDS: writers and readers of raw CDR, and what discovery says of others.
+"""The application's ROS graph by DDS: writers and readers of raw CDR, and what discovery tells.
 
-ROS 2's names on DDS: a topic ``/camera`` is ``rt/camera``, a type ``a/msg/B`` is ``a::msg::dds_::B_``. Cyclone takes a
-type by its name alone, so that bytes pass as they are. ``ros_discovery_info`` says which node has which endpoints.
+On DDS a topic ``/camera`` is ``rt/camera``, a type ``a/msg/B`` is ``a::msg::dds_::B_``. Cyclone takes a type by its
+name alone, so that bytes pass as they are. ``ros_discovery_info`` says which node has which endpoints.
 """
 
 import os
-import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
+from cyclonedds import builtin
 from cyclonedds._clayer import ddspy_take, ddspy_write  # type: ignore[import-not-found]
-from cyclonedds.builtin import (
-    BuiltinDataReader,
-    BuiltinTopicDcpsParticipant,
-    BuiltinTopicDcpsPublication,
-    BuiltinTopicDcpsSubscription,
-)
-from cyclonedds.core import (
-    DDSException,
-    DDSStatus,
-    InstanceState,
-    Policy,
-    Qos,
-    ReadCondition,
-    SampleState,
-    ViewState,
-    WaitSet,
-)
+from cyclonedds.core import DDSException, DDSStatus, InstanceState, Policy, Qos, ReadCondition, SampleState, ViewState
+from cyclonedds.core import WaitSet as Waits
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl.types import uint8
@@ -35,245 +21,196 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from services.ros_bridge.discovered import Discovered, Endpoint
+from dodo_dsl.opendlv.ros_messages import RosTypeError, Types
 
-MAX_SAMPLE_BYTES = 64 << 20
-_DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
-_DOMAINS = range(233)
-_EPROSIMA = "1.15"
-# Fragments of a whole datagram, heartbeats soon after a lost one, no type information of Fast DDS, which Cyclone cannot
-# complete, and buffers that hold some pictures
-_CONFIGURATION = f"""<CycloneDDS><Domain>
+# Fragments of a whole datagram, heartbeats soon after a lost one, buffers that hold some pictures, and no type
+# information of Fast DDS (vendor 1.15), which Cyclone cannot complete
+_CONFIGURATION = """<CycloneDDS><Domain>
 <General><MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize></General>
 <Internal><HeartbeatInterval min='1 ms' minsched='2 ms' max='4 ms'>2 ms</HeartbeatInterval>
-<SocketReceiveBufferSize max='16MB'/><MaxSampleSize>{MAX_SAMPLE_BYTES}B</MaxSampleSize>
-<Watermarks><WhcHigh>{MAX_SAMPLE_BYTES}B</WhcHigh></Watermarks></Internal>
-<Compatibility><IgnoreTypeInformation>{_EPROSIMA}</IgnoreTypeInformation></Compatibility>
+<SocketReceiveBufferSize max='16MB'/><MaxSampleSize>64MB</MaxSampleSize>
+<Watermarks><WhcHigh>64MB</WhcHigh></Watermarks></Internal>
+<Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>
 </Domain></CycloneDDS>"""
-_NODES, _NODES_TYPE = "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
+_NODES, _NODES_TYPE = "ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 _AT_ONCE = 100
-_BLOCKED = duration(milliseconds=100)
-_PREFIX_BYTES = 12  # of a GUID, the participant's
-_GUID_BYTES = 16
-_GID_BYTES = (16, 24)  # Humble has 24
-_NODES_LIMIT = 1000
+_MOST = 10_000
+PREFIX_BYTES = 12  # of a GUID: the participant's
 
 
-class GraphError(RuntimeError):
-    """The graph cannot be joined."""
+class BridgeError(ValueError):
+    """What ends the bridge, in one sentence."""
 
 
-class Writer:
-    """Publishes CDR on one topic."""
+@dataclass(frozen=True)
+class Endpoint:
+    """A publisher or a subscription; ``topic`` is ROS' name, empty where it is none, as of services."""
 
-    def __init__(self, writer: Any) -> None:
-        self._writer = writer
+    guid: bytes
+    topic: str
+    type: str
+    writes: bool
+    reliable: bool = True
+    durable: bool = False
 
-    def write(self, data: bytes) -> bool:
-        """False where a reliable reader takes nothing any more."""
-        return bool(ddspy_write(self._writer._ref, data) == 0)
-
-    @property
-    def readers(self) -> int:
-        """How many have matched."""
-        return int(self._writer.get_publication_matched_status().current_count)
+    def lacks(self, reader: "Endpoint") -> str:
+        """Which quality a subscription of this publisher's topic wants and does not get."""
+        if reader.reliable and not self.reliable:
+            return "reliability"
+        return "durability" if reader.durable and not self.durable else ""
 
 
-class Reader:
-    """Takes CDR from one topic."""
+@dataclass
+class Discovered:
+    """What discovery has told, at most so much; ``nodes`` by their participants, also of those that have ``left``."""
 
-    def __init__(self, reader: Any) -> None:
-        self._reader = reader
-        self.condition = ReadCondition(reader, _ANY)
+    endpoints: dict[bytes, Endpoint] = field(default_factory=dict)
+    names: dict[bytes, str] = field(default_factory=dict)
+    nodes: dict[bytes, set[str]] = field(default_factory=dict)
+    participants: set[bytes] = field(default_factory=set)
+    left: set[bytes] = field(default_factory=set)
+    changes: int = 0
 
-    def take(self) -> list[bytes]:
-        samples = ddspy_take(self._reader._ref, _ANY, _AT_ONCE)
-        if isinstance(samples, int):
-            return []
-        return [sample[0] for sample in samples if isinstance(sample, tuple)]
+    def add(self, endpoint: Endpoint) -> None:
+        if len(self.endpoints) < _MOST:
+            self.endpoints[endpoint.guid] = endpoint
 
-    def close(self) -> None:
-        self._reader = None
+    def add_nodes(self, types: Types, data: bytes) -> None:
+        """Names nodes by a message of theirs, if it is one."""
+        try:
+            fields = types.decode(_NODES_TYPE, data)
+        except RosTypeError:
+            return
+        participant = bytes(fields["gid"]["data"])[:PREFIX_BYTES]
+        for node in fields["node_entities_info_seq"]:
+            if len(self.names) < _MOST:
+                name = f"{node['node_namespace'].rstrip('/')}/{node['node_name']}".removeprefix("/")
+                self.nodes.setdefault(participant, set()).add(name)
+                gids = [*node["reader_gid_seq"], *node["writer_gid_seq"]]
+                self.names.update((bytes(gid["data"]), name) for gid in gids[:_MOST])
+
+    def of(self, topic: str, writes: bool) -> list[Endpoint]:
+        """Who publishes a topic, or hears it."""
+        return [each for each in self.endpoints.values() if each.topic == topic and each.writes == writes]
+
+    def name(self, *ends: Endpoint) -> str:
+        """Of their nodes."""
+        known = [self.names.get(e.guid) or min(self.nodes.get(e.guid[:PREFIX_BYTES], ()), default="") for e in ends]
+        return listed({f"'{name}'" if name else "a program" for name in known}) or "a node"
+
+
+def listed(names: Iterable[str]) -> str:
+    *first, last = sorted(names) or [""]
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 class Graph:
-    """A participant of the domain in ``ROS_DOMAIN_ID``; raises GraphError."""
+    """A participant of the domain in ``ROS_DOMAIN_ID``; raises BridgeError, as all of its methods."""
 
-    def __init__(self) -> None:
-        text = os.environ.get(_DOMAIN_VARIABLE) or "0"
-        if not text.isascii() or not text.isdigit() or int(text) not in _DOMAINS:
-            raise GraphError(f"{_DOMAIN_VARIABLE} is '{text}'; expected a whole number from 0 to {_DOMAINS[-1]}")
+    def __init__(self, types: Types) -> None:
         os.environ.pop("CYCLONEDDS_URI", None)  # it is for the application's nodes
+        domain = int(os.environ.get("ROS_DOMAIN_ID") or 0)
+        self._types, self.seen = types, Discovered()
         try:
-            self._domain = Domain(int(text), _CONFIGURATION)
-            self._participant = DomainParticipant(int(text))
+            self._domain = Domain(domain, _CONFIGURATION)
+            self._participant = DomainParticipant(domain)
+            self._waits = Waits(self._participant)
+            self._participants = self._discovery(builtin.BuiltinTopicDcpsParticipant)
+            self._publications = self._discovery(builtin.BuiltinTopicDcpsPublication)
+            self._subscriptions = self._discovery(builtin.BuiltinTopicDcpsSubscription)
         except DDSException as error:
-            raise GraphError(f"the ROS graph cannot be joined: {error} Is there a network with multicast?") from None
-        self._own = self._participant.get_guid().bytes[:_PREFIX_BYTES]
-        self._topics: dict[tuple[str, str], Any] = {}
-        self._waits = WaitSet(self._participant)
-        self._participants = self._discovery(BuiltinTopicDcpsParticipant)
-        self._endpoints = {
-            True: self._discovery(BuiltinTopicDcpsPublication),
-            False: self._discovery(BuiltinTopicDcpsSubscription),
-        }
-        self._nodes = Reader(self._reader(_NODES, _NODES_TYPE, _qos(True, True, _AT_ONCE)))
-        self._waits.attach(self._nodes.condition)
+            raise BridgeError(f"the ROS graph cannot be joined: {error} Is there a network with multicast?") from None
+        self._own = self._participant.get_guid().bytes[:PREFIX_BYTES]
+        self._nodes = self.reader(_NODES, _NODES_TYPE, durable=True, depth=_AT_ONCE)
 
-    def writer(
-        self, topic: str, type_: str, *, reliable: bool = True, durable: bool = False, depth: int = 10
-    ) -> Writer:
+    def writer(self, topic: str, type_: str, *, reliable: bool = True, durable: bool = False, depth: int = 10) -> Any:
         """Of a ROS topic; ``durable`` gives a reader that comes late the last ones."""
-        try:
-            on = self._topic(f"rt{topic}", _dds_type(type_))
-            writer: Any = DataWriter(self._participant, on, _qos(reliable, durable, depth))
-            writer.set_status_mask(DDSStatus.PublicationMatched)
-            self._waits.attach(writer)
-        except DDSException as error:
-            raise GraphError(f"{topic} cannot be published: {error}") from None
-        return Writer(writer)
+        writer = self._made(DataWriter, topic, type_, _qos(reliable, durable, depth))
+        writer.set_status_mask(DDSStatus.PublicationMatched)
+        self._waits.attach(writer)
+        return writer
 
-    def reader(
-        self, topic: str, type_: str, *, reliable: bool = True, durable: bool = False, depth: int = 10
-    ) -> Reader:
+    def reader(self, topic: str, type_: str, *, reliable: bool = True, durable: bool = False, depth: int = 10) -> Any:
         """Of a ROS topic; one that is not ``reliable`` hears both kinds of writers."""
-        try:
-            reader = Reader(self._reader(f"rt{topic}", _dds_type(type_), _qos(reliable, durable, depth)))
-        except DDSException as error:
-            raise GraphError(f"{topic} cannot be heard: {error}") from None
+        reader = self._made(DataReader, topic, type_, _qos(reliable, durable, depth))
+        reader.condition = ReadCondition(reader, _ANY)
         self._waits.attach(reader.condition)
         return reader
 
-    def drop(self, reader: Reader) -> None:
+    def drop(self, reader: Any) -> None:
         """Hears it no longer."""
         self._waits.detach(reader.condition)
-        reader.close()
+        del reader.condition  # which holds its last reference
 
     def wait(self, seconds: float) -> None:
-        """Until something is heard, discovered or matched, at most so long."""
+        """Until something is heard, discovered or matched, at most so long; then ``seen`` has what came and went."""
         self._waits.wait(duration(seconds=seconds))
+        for key, _, is_alive in self._taken(self._participants):
+            (self.seen.participants if is_alive else self.seen.left).add(key)
+            (self.seen.left if is_alive else self.seen.participants).discard(key)
+        for writes, source in ((True, self._publications), (False, self._subscriptions)):
+            for _, each, is_alive in self._taken(source):
+                if is_alive:
+                    self.seen.add(_endpoint(each, writes))
+                else:
+                    self.seen.endpoints.pop(each.key.bytes, None)
+        for data in taken(self._nodes):
+            self.seen.add_nodes(self._types, data)
+            self.seen.changes += 1
 
-    def discover(self, seen: Discovered) -> None:
-        """Tells what came and went since the last time."""
-        for participant in _taken(self._participants):
-            key = participant.key.bytes
-            if key[:_PREFIX_BYTES] != self._own:
-                seen.participant(key[:_PREFIX_BYTES], _is_alive(participant))
-        for writes, reader in self._endpoints.items():
-            for endpoint in _taken(reader):
-                self._tell(seen, endpoint, writes)
-        for raw in self._nodes.take():
-            for participant_key, node, guids in nodes_of(raw):
-                seen.named(participant_key, node, guids)
+    def _taken(self, source: builtin.BuiltinDataReader) -> Iterator[tuple[bytes, Any, bool]]:
+        """Participants, samples and whether these are alive, of others."""
+        while samples := source.take(_AT_ONCE):
+            for each in samples:
+                info, key = each.sample_info, each.key.bytes[:PREFIX_BYTES]
+                if key != self._own:
+                    self.seen.changes += 1
+                    yield key, each, info.valid_data and info.instance_state == InstanceState.Alive
 
-    def _tell(self, seen: Discovered, endpoint: Any, writes: bool) -> None:
-        guid = endpoint.key.bytes
-        if guid[:_PREFIX_BYTES] == self._own:
-            return
-        if not _is_alive(endpoint):
-            seen.gone(guid)
-            return
-        qos: Qos = endpoint.qos
-        name, type_ = endpoint.topic_name, endpoint.type_name
-        seen.endpoint(
-            Endpoint(
-                guid=guid,
-                participant=guid[:_PREFIX_BYTES],
-                topic=name[2:] if name.startswith("rt/") else "",
-                type=_ros_type(type_),
-                writes=writes,
-                reliable=isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
-                durable=qos[Policy.Durability] not in (None, Policy.Durability.Volatile),
-            )
-        )
-
-    def _discovery(self, topic: Any) -> BuiltinDataReader:
-        reader = BuiltinDataReader(self._participant, topic)
-        condition = ReadCondition(reader, _ANY)
-        self._waits.attach(condition)
+    def _discovery(self, topic: Any) -> builtin.BuiltinDataReader:
+        reader = builtin.BuiltinDataReader(self._participant, topic)
+        self._waits.attach(ReadCondition(reader, _ANY))
         return reader
 
-    def _reader(self, topic: str, type_: str, qos: Qos) -> Any:
-        return DataReader(self._participant, self._topic(topic, type_), qos)
+    def _made(self, kind: Any, topic: str, type_: str, qos: Qos) -> Any:
+        package, folder, name = type_.split("/")
+        shape = make_idl_struct(f"{name}_", f"{package}::{folder}::dds_::{name}_", {"x": uint8})
+        try:
+            on: Any = Topic(self._participant, f"rt{topic}" if topic.startswith("/") else topic, shape)
+            return kind(self._participant, on, qos)
+        except DDSException as error:
+            raise BridgeError(f"{topic} ({type_}) cannot be joined: {error}") from None
 
-    def _topic(self, name: str, type_: str) -> Any:
-        if (name, type_) not in self._topics:
-            kind = make_idl_struct(type_.rpartition("::")[2], type_, {"x": uint8})
-            self._topics[name, type_] = Topic(self._participant, name, kind)
-        return self._topics[name, type_]
+
+def write(writer: Any, data: bytes) -> bool:
+    """False where a reliable reader takes nothing any more."""
+    return bool(ddspy_write(writer._ref, data) == 0)
+
+
+def taken(reader: Any) -> list[bytes]:
+    samples = ddspy_take(reader._ref, _ANY, _AT_ONCE)
+    return [] if isinstance(samples, int) else [sample[0] for sample in samples if isinstance(sample, tuple)]
+
+
+def readers_of(writer: Any) -> int:
+    return int(writer.get_publication_matched_status().current_count)
+
+
+def _endpoint(sample: Any, writes: bool) -> Endpoint:
+    name, parts, qos = sample.topic_name, sample.type_name.split("::"), sample.qos
+    is_ros = len(parts) == 4 and parts[2] == "dds_"
+    return Endpoint(
+        guid=sample.key.bytes,
+        topic=name[2:] if name.startswith("rt/") else "",
+        type=f"{parts[0]}/{parts[1]}/{parts[3].removesuffix('_')}" if is_ros else sample.type_name,
+        writes=writes,
+        reliable=isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
+        durable=qos[Policy.Durability] not in (None, Policy.Durability.Volatile),
+    )
 
 
 def _qos(reliable: bool, durable: bool, depth: int) -> Qos:
-    kind = Policy.Reliability.Reliable(_BLOCKED) if reliable else Policy.Reliability.BestEffort
+    kind = Policy.Reliability.Reliable(duration(milliseconds=100)) if reliable else Policy.Reliability.BestEffort
     lasting = Policy.Durability.TransientLocal if durable else Policy.Durability.Volatile
-    return Qos(kind, lasting, Policy.History.KeepLast(max(1, depth)))
-
-
-def _taken(reader: BuiltinDataReader) -> Iterator[Any]:
-    while samples := reader.take(_AT_ONCE):
-        yield from samples
-
-
-def _is_alive(sample: Any) -> bool:
-    info = sample.sample_info
-    return bool(info.valid_data and info.instance_state == InstanceState.Alive)
-
-
-def _dds_type(type_: str) -> str:
-    package, kind, name = type_.split("/")
-    return f"{package}::{kind}::dds_::{name}_"
-
-
-def _ros_type(type_: str) -> str:
-    parts = type_.split("::")
-    if len(parts) == 4 and parts[2] == "dds_":
-        return f"{parts[0]}/{parts[1]}/{parts[3].removesuffix('_')}"
-    return type_
-
-
-def nodes_of(raw: bytes) -> Iterator[tuple[bytes, str, list[bytes]]]:
-    """Participant, node and GUIDs of its endpoints, from a ``ParticipantEntitiesInfo``; none of what is malformed."""
-    for size in _GID_BYTES:
-        try:
-            yield from _Cdr(raw).nodes(size)
-        except (struct.error, UnicodeDecodeError, ValueError):
-            continue
-        return
-
-
-class _Cdr:
-    """Reads CDR's strings, counts and bytes."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data, self._at = data, 4
-        self._order = "<" if data[1:2] == b"\1" else ">"
-
-    def nodes(self, gid: int) -> list[tuple[bytes, str, list[bytes]]]:
-        participant = self.bytes(gid)[:_PREFIX_BYTES]
-        found = []
-        for _ in range(self.count()):
-            space, name = self.text(), self.text()
-            guids = [self.bytes(gid)[:_GUID_BYTES] for _ in range(2) for _ in range(self.count())]
-            found.append((participant, f"{space.rstrip('/')}/{name}".removeprefix("/"), guids))
-        if len(self._data) - self._at >= 4:
-            raise ValueError
-        return found
-
-    def count(self) -> int:
-        self._at += -self._at % 4
-        (value,) = struct.unpack_from(f"{self._order}I", self._data, self._at)
-        self._at += 4
-        if value > _NODES_LIMIT:
-            raise ValueError
-        return int(value)
-
-    def text(self) -> str:
-        return self.bytes(self.count()).rstrip(b"\0").decode()
-
-    def bytes(self, size: int) -> bytes:
-        piece = self._data[self._at : self._at + size]
-        if len(piece) < size:
-            raise ValueError
-        self._at += size
-        return piece
+    return Qos(kind, lasting, Policy.History.KeepLast(depth))

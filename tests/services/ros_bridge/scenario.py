@@ -139,13 +139,13 @@ def _frames(graph: RosGraph) -> list[str]:
     if not graph.frames:
         return []
     from dodo_dsl.opendlv.ros_messages import Types
-    from services.ros_bridge.graph import Graph
+    from services.ros_bridge.graph import Graph, taken
 
-    joined = Graph()
+    joined = Graph(Types())
     reader = joined.reader(STATIC_FRAMES, STATIC_FRAMES_TYPE, durable=True)
     end = time.monotonic() + PATIENCE_S / 3
     while time.monotonic() < end:
-        for data in reader.take():
+        for data in taken(reader):
             return [each["child_frame_id"] for each in Types().decode(STATIC_FRAMES_TYPE, data)["transforms"]]
         time.sleep(0.05)
     return []
