@@ -72,9 +72,8 @@ class BagExport:
         sizes = (CameraView(width=each.width, height=each.height) for each in packets(self._recording, images))
         camera = next((each for each in sizes if each.width and each.height), None)
         found = defaultdict[tuple[int, int], list[_Gathered]](list)
-        for way in (
-            each for each in WRITTEN if set(self._messages.names()).issuperset(each.messages)
-        ):  # set 0.9 lacks some
+        known = set(self._messages.names())  # set 0.9 lacks some
+        for way in (each for each in WRITTEN if known.issuperset(each.messages)):
             stamps = {name: self._stamps(rows, self._messages.id(name)) for name in way.messages}
             for number, stamp in enumerate(sorted({one for some in stamps.values() for one in some})):
                 parts = [name for name in way.messages if stamp in stamps[name]]

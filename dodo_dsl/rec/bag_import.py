@@ -55,6 +55,8 @@ def import_bag(
 ) -> Imported:
     """Write the messages of a bag into the new recording ``place``; raises BagError if there are none for it."""
     topics = topics_of(bag, _camera(bag, types), known)
+    for topic in topics.values():
+        types.check(topic)
     kept = {(topic.topic, topic.type) for topic in topics.values()}
     result = Imported(topics, {key: count for key, count in bag.counts.items() if key not in kept})
     converter = _Converter(types, lossy)

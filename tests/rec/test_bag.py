@@ -257,6 +257,9 @@ def test_topics_of_the_application_become_what_it_says(tmp_path: Path, monkeypat
         "robot.PoseEstimate",
     ]
     code, stdout, _ = dodo_rec("export", "a.rec", "--ros", "-o", "b")
+    (tmp_path / "dodo.yml").write_text(MAPPING.replace("offset", "ofset"))
+    failed = dodo_rec("import", "bag", "-o", "a.rec", "--force")
+    assert (failed.code, failed.stdout) == (2, "") and "there is no 'ofset' among offset" in failed.stderr
     assert code == 0
     assert {line.split()[0] for line in stdout.splitlines()[1:]} == {
         "/front",
