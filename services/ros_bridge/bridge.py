@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import FrameType
@@ -26,7 +26,7 @@ from dodo_dsl.opendlv.ros_types import CLOCK, CLOCK_TYPE, RosGraph, Topic
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.ros_bridge.findings import Finding, Findings, end_of, frame_problem, loss, lost_datagrams, stamp_problem
-from services.ros_bridge.graph import BridgeError, Graph, readers_of, taken, write
+from services.ros_bridge.graph import BridgeError, Endpoint, Graph, readers_of, taken, write
 
 START_PATIENCE = 5.0
 """Seconds for which the first picture and the first time wait for nodes that are to hear them."""
@@ -53,7 +53,7 @@ class Sent:
 
     topic: Topic
     reader: Any
-    reliable: bool
+    reliable: bool = True
 
 
 def is_picture(topic: Topic) -> bool:
@@ -87,12 +87,12 @@ class Bridge:
         self._seen = self._graph.seen
         self._findings = Findings(topics, self._seen)
         self._ready, self._clock_heard = threading.Event(), threading.Event()
-        self._clock = self._graph.writer(CLOCK, CLOCK_TYPE, depth=1)
+        self._clock = self._graph.writer(Endpoint(b"", CLOCK, CLOCK_TYPE, True), 1)
         self._given = [self._giving(topic) for topic in topics.given]
-        self._sent = [Sent(topic, self._reader(topic), end_of(topic, False).reliable) for topic in topics.sent]
+        self._sent = [Sent(topic, self._graph.reader(end_of(topic, False), topic.depth)) for topic in topics.sent]
         if topics.frames:
             name, type_ = ros_types.STATIC_FRAMES, ros_types.STATIC_FRAMES_TYPE
-            self._frames = self._graph.writer(name, type_, durable=True, depth=1)
+            self._frames = self._graph.writer(Endpoint(b"", name, type_, True, durable=True), 1)
             write(self._frames, self._types.encode(type_, self._types.frames(topics.frames, now_us())))
         self._lost_before, self._losing = lost_datagrams(), 0
 
@@ -112,13 +112,11 @@ class Bridge:
 
     def _giving(self, topic: Topic) -> Given:
         keys = {} if is_picture(topic) else {name: self._session.messages.key(name) for name in topic.bus}
-        own, depth = end_of(topic, True), topic.depth
-        writer = self._graph.writer(topic.topic, topic.type, reliable=own.reliable, durable=own.durable, depth=depth)
-        return Given(topic, writer, {name.partition("/")[0]: (id_, at or 0) for name, (id_, at) in keys.items()})
-
-    def _reader(self, topic: Topic, reliable: bool = True) -> Any:
-        own, reliable = end_of(topic, False), reliable and end_of(topic, False).reliable
-        return self._graph.reader(topic.topic, topic.type, reliable=reliable, durable=own.durable, depth=topic.depth)
+        return Given(
+            topic,
+            self._graph.writer(end_of(topic, True), topic.depth),
+            {name.partition("/")[0]: (id_, at or 0) for name, (id_, at) in keys.items()},
+        )
 
     def _hear_bus(self) -> None:
         """Publishes a topic when each of its messages has come again."""
@@ -201,7 +199,9 @@ class Bridge:
                     sent.reliable = all(each.reliable for each in self._seen.of(sent.topic.topic, True))
                     if not sent.reliable:
                         self._graph.drop(sent.reader)
-                        sent.reader = self._reader(sent.topic, reliable=False)
+                        sent.reader = self._graph.reader(
+                            replace(end_of(sent.topic, False), reliable=False), sent.topic.depth
+                        )
                 for data in taken(sent.reader):
                     self._take(sent.topic, data)
             if time.monotonic() - looked >= LOOK:

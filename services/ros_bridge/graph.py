@@ -11,8 +11,7 @@ from typing import Any
 
 from cyclonedds import builtin
 from cyclonedds._clayer import ddspy_take, ddspy_write  # type: ignore[import-not-found]
-from cyclonedds.core import DDSException, DDSStatus, InstanceState, Policy, Qos, ReadCondition, SampleState, ViewState
-from cyclonedds.core import WaitSet as Waits
+from cyclonedds.core import DDSException, DDSStatus, InstanceState, Policy, Qos, ReadCondition, WaitSet
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl.types import uint8
@@ -33,7 +32,8 @@ _CONFIGURATION = """<CycloneDDS><Domain>
 <Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>
 </Domain></CycloneDDS>"""
 _NODES, _NODES_TYPE = "ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo"
-_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
+_ANY = 0x7F  # samples, whatever their state
+_KINDS = "Participant", "Publication", "Subscription"
 _AT_ONCE = 100
 _MOST = 10_000
 PREFIX_BYTES = 12  # of a GUID: the participant's
@@ -115,25 +115,26 @@ class Graph:
         try:
             self._domain = Domain(domain, _CONFIGURATION)
             self._participant = DomainParticipant(domain)
-            self._waits = Waits(self._participant)
-            self._participants = self._discovery(builtin.BuiltinTopicDcpsParticipant)
-            self._publications = self._discovery(builtin.BuiltinTopicDcpsPublication)
-            self._subscriptions = self._discovery(builtin.BuiltinTopicDcpsSubscription)
+            self._waits = WaitSet(self._participant)
+            kinds = (getattr(builtin, f"BuiltinTopicDcps{name}") for name in _KINDS)
+            self._told = [builtin.BuiltinDataReader(self._participant, kind) for kind in kinds]
+            for each in self._told:
+                self._waits.attach(ReadCondition(each, _ANY))
         except DDSException as error:
             raise BridgeError(f"the ROS graph cannot be joined: {error} Is there a network with multicast?") from None
         self._own = self._participant.get_guid().bytes[:PREFIX_BYTES]
-        self._nodes = self.reader(_NODES, _NODES_TYPE, durable=True, depth=_AT_ONCE)
+        self._nodes = self.reader(Endpoint(b"", _NODES, _NODES_TYPE, False, durable=True), _AT_ONCE)
 
-    def writer(self, topic: str, type_: str, *, reliable: bool = True, durable: bool = False, depth: int = 10) -> Any:
-        """Of a ROS topic; ``durable`` gives a reader that comes late the last ones."""
-        writer = self._made(DataWriter, topic, type_, _qos(reliable, durable, depth))
+    def writer(self, own: Endpoint, depth: int = 10) -> Any:
+        """Of a ROS topic; a durable one gives a reader that comes late the last messages."""
+        writer = self._made(DataWriter, own, depth)
         writer.set_status_mask(DDSStatus.PublicationMatched)
         self._waits.attach(writer)
         return writer
 
-    def reader(self, topic: str, type_: str, *, reliable: bool = True, durable: bool = False, depth: int = 10) -> Any:
-        """Of a ROS topic; one that is not ``reliable`` hears both kinds of writers."""
-        reader = self._made(DataReader, topic, type_, _qos(reliable, durable, depth))
+    def reader(self, own: Endpoint, depth: int = 10) -> Any:
+        """Of a ROS topic; one that is not reliable hears both kinds of writers."""
+        reader = self._made(DataReader, own, depth)
         reader.condition = ReadCondition(reader, _ANY)
         self._waits.attach(reader.condition)
         return reader
@@ -146,41 +147,43 @@ class Graph:
     def wait(self, seconds: float) -> None:
         """Until something is heard, discovered or matched, at most so long; then ``seen`` has what came and went."""
         self._waits.wait(duration(seconds=seconds))
-        for key, _, is_alive in self._taken(self._participants):
-            (self.seen.participants if is_alive else self.seen.left).add(key)
-            (self.seen.left if is_alive else self.seen.participants).discard(key)
-        for writes, source in ((True, self._publications), (False, self._subscriptions)):
-            for _, each, is_alive in self._taken(source):
-                if is_alive:
-                    self.seen.add(_endpoint(each, writes))
+        for number, source in enumerate(self._told):
+            for each, is_alive in self._taken(source):
+                key = each.key.bytes
+                if number == 0:
+                    (self.seen.participants if is_alive else self.seen.left).add(key[:PREFIX_BYTES])
+                    (self.seen.left if is_alive else self.seen.participants).discard(key[:PREFIX_BYTES])
+                elif is_alive:
+                    self.seen.add(_endpoint(each, writes=number == 1))
                 else:
-                    self.seen.endpoints.pop(each.key.bytes, None)
+                    self.seen.endpoints.pop(key, None)
         for data in taken(self._nodes):
             self.seen.add_nodes(self._types, data)
             self.seen.changes += 1
 
-    def _taken(self, source: builtin.BuiltinDataReader) -> Iterator[tuple[bytes, Any, bool]]:
-        """Participants, samples and whether these are alive, of others."""
+    def _taken(self, source: builtin.BuiltinDataReader) -> Iterator[tuple[Any, bool]]:
+        """What discovery tells of others, and whether they are alive."""
         while samples := source.take(_AT_ONCE):
             for each in samples:
-                info, key = each.sample_info, each.key.bytes[:PREFIX_BYTES]
-                if key != self._own:
+                if each.key.bytes[:PREFIX_BYTES] != self._own:
                     self.seen.changes += 1
-                    yield key, each, info.valid_data and info.instance_state == InstanceState.Alive
+                    info = each.sample_info
+                    yield each, info.valid_data and info.instance_state == InstanceState.Alive
 
-    def _discovery(self, topic: Any) -> builtin.BuiltinDataReader:
-        reader = builtin.BuiltinDataReader(self._participant, topic)
-        self._waits.attach(ReadCondition(reader, _ANY))
-        return reader
-
-    def _made(self, kind: Any, topic: str, type_: str, qos: Qos) -> Any:
-        package, folder, name = type_.split("/")
+    def _made(self, kind: Any, own: Endpoint, depth: int) -> Any:
+        package, folder, name = own.type.split("/")
         shape = make_idl_struct(f"{name}_", f"{package}::{folder}::dds_::{name}_", {"x": uint8})
+        blocked, lasting = duration(milliseconds=100), Policy.Durability
+        qos = Qos(
+            Policy.Reliability.Reliable(blocked) if own.reliable else Policy.Reliability.BestEffort,
+            lasting.TransientLocal if own.durable else lasting.Volatile,
+            Policy.History.KeepLast(depth),
+        )
         try:
-            on: Any = Topic(self._participant, f"rt{topic}" if topic.startswith("/") else topic, shape)
+            on: Any = Topic(self._participant, f"rt{own.topic}" if own.topic != _NODES else _NODES, shape)
             return kind(self._participant, on, qos)
         except DDSException as error:
-            raise BridgeError(f"{topic} ({type_}) cannot be joined: {error}") from None
+            raise BridgeError(f"{own.topic} ({own.type}) cannot be joined: {error}") from None
 
 
 def write(writer: Any, data: bytes) -> bool:
@@ -190,7 +193,7 @@ def write(writer: Any, data: bytes) -> bool:
 
 def taken(reader: Any) -> list[bytes]:
     samples = ddspy_take(reader._ref, _ANY, _AT_ONCE)
-    return [] if isinstance(samples, int) else [sample[0] for sample in samples if isinstance(sample, tuple)]
+    return [] if isinstance(samples, int) else [data for data, info in samples if info.valid_data]
 
 
 def readers_of(writer: Any) -> int:
@@ -200,17 +203,7 @@ def readers_of(writer: Any) -> int:
 def _endpoint(sample: Any, writes: bool) -> Endpoint:
     name, parts, qos = sample.topic_name, sample.type_name.split("::"), sample.qos
     is_ros = len(parts) == 4 and parts[2] == "dds_"
-    return Endpoint(
-        guid=sample.key.bytes,
-        topic=name[2:] if name.startswith("rt/") else "",
-        type=f"{parts[0]}/{parts[1]}/{parts[3].removesuffix('_')}" if is_ros else sample.type_name,
-        writes=writes,
-        reliable=isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
-        durable=qos[Policy.Durability] not in (None, Policy.Durability.Volatile),
-    )
-
-
-def _qos(reliable: bool, durable: bool, depth: int) -> Qos:
-    kind = Policy.Reliability.Reliable(duration(milliseconds=100)) if reliable else Policy.Reliability.BestEffort
-    lasting = Policy.Durability.TransientLocal if durable else Policy.Durability.Volatile
-    return Qos(kind, lasting, Policy.History.KeepLast(depth))
+    type_ = f"{parts[0]}/{parts[1]}/{parts[3].removesuffix('_')}" if is_ros else sample.type_name
+    reliable = isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable)
+    durable = qos[Policy.Durability] not in (None, Policy.Durability.Volatile)
+    return Endpoint(sample.key.bytes, name[2:] if name.startswith("rt/") else "", type_, writes, reliable, durable)

@@ -39,6 +39,9 @@ class Scenario(msgspec.Struct, kw_only=True):
     environment: dict[str, str] = {}
     leaves: str = ""
     """A peer that is ended after half of the time."""
+    raw: list[tuple[str, str, str, int]] = []
+    """Topic, type, bytes (hex) and how often they are sent after half of the time, at once, by a stranger."""
+    loses_memory: bool = False
 
 
 class Played(msgspec.Struct, kw_only=True):
@@ -66,13 +69,18 @@ def refusal() -> str:
 
 
 def played(scenario: Scenario) -> Played:
-    words = [sys.executable, str(Path(__file__)), msgspec.json.encode(scenario).decode()]
+    words = [sys.executable, str(Path(__file__))]
     shell = [*NAMESPACES, "sh", "-c", f'{NETWORK} && exec "$@"', "sh", *words]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        shell, capture_output=True, text=True, timeout=PATIENCE_S + scenario.seconds, env=environment, check=False
+        shell,
+        input=msgspec.json.encode(scenario),
+        capture_output=True,
+        timeout=PATIENCE_S + scenario.seconds,
+        env=environment,
+        check=False,
     )
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stderr.decode()
     return msgspec.json.decode(done.stdout, type=Played)
 
 
@@ -102,10 +110,16 @@ def _main(scenario: Scenario) -> Played:
         }
         sent: list[tuple[str, int, int, str]] = []
         threading.Thread(target=_listen, args=(sent,), daemon=True).start()
-        pictures, begin = 0, time.monotonic()
+        pictures, begin, is_over = 0, time.monotonic(), False
         while time.monotonic() - begin < scenario.seconds and bridge.poll() is None:
-            if scenario.leaves and time.monotonic() - begin > scenario.seconds / 2:
-                peers[scenario.leaves].terminate()
+            if not is_over and time.monotonic() - begin > scenario.seconds / 2:
+                is_over = True
+                if scenario.leaves:
+                    peers[scenario.leaves].terminate()
+                _shout(scenario.raw)
+                if scenario.loses_memory:
+                    memory.close()
+                    names = []
             now = time.time_ns() // 1000
             for full_name, stamp, fields in scenario.messages:
                 values = {key: bytes.fromhex(v) if isinstance(v, str) else v for key, v in fields.items()}
@@ -134,15 +148,33 @@ def _main(scenario: Scenario) -> Played:
         )
 
 
+def _shout(raw: list[tuple[str, str, str, int]]) -> None:
+    """Bytes on topics, whatever they are."""
+    if not raw:
+        return
+    from dodo_dsl.opendlv.ros_messages import Types
+    from services.ros_bridge.graph import Endpoint, Graph, readers_of, write
+
+    joined = Graph(Types())
+    for topic, type_, data, often in raw:
+        writer = joined.writer(Endpoint(b"", topic, type_, True), 1000)
+        end = time.monotonic() + PATIENCE_S / 3
+        while not readers_of(writer) and time.monotonic() < end:
+            time.sleep(0.01)
+        for _ in range(often):
+            write(writer, bytes.fromhex(data))
+        time.sleep(0.5)
+
+
 def _frames(graph: RosGraph) -> list[str]:
     """What somebody who comes late hears on /tf_static."""
     if not graph.frames:
         return []
     from dodo_dsl.opendlv.ros_messages import Types
-    from services.ros_bridge.graph import Graph, taken
+    from services.ros_bridge.graph import Endpoint, Graph, taken
 
     joined = Graph(Types())
-    reader = joined.reader(STATIC_FRAMES, STATIC_FRAMES_TYPE, durable=True)
+    reader = joined.reader(Endpoint(b"", STATIC_FRAMES, STATIC_FRAMES_TYPE, False, durable=True))
     end = time.monotonic() + PATIENCE_S / 3
     while time.monotonic() < end:
         for data in taken(reader):
@@ -163,4 +195,4 @@ def _listen(sent: list[tuple[str, int, int, str]]) -> None:
 
 
 if __name__ == "__main__":
-    print(msgspec.json.encode(_main(msgspec.json.decode(sys.argv[1], type=Scenario))).decode())
+    print(msgspec.json.encode(_main(msgspec.json.decode(sys.stdin.buffer.read(), type=Scenario))).decode())

@@ -207,3 +207,42 @@ def test_counts_pictures_that_a_small_buffer_loses() -> None:
     assert len(seen.heard) < seen.pictures
     (finding,) = seen.findings
     assert "datagrams were lost: 'lane' hears /camera by best effort" in finding[1]
+
+
+CDR = "00010000"
+
+
+def test_a_strangers_bytes_and_floods_end_nothing() -> None:
+    """Malformed, endless, not finite, too large, and 3,000 at once: each is a sentence at most."""
+    good = struct.pack("<6d", 0.5, 0, 0, 0, 0, 0.25).hex()
+    names = ("/short", "/random", "/nan", "/large", "/flood")
+    graph = RosGraph(sent=tuple(topic(name, POSE if name == "/random" else TWIST, *sent_as(name)) for name in names))
+    raw = [
+        ("/short", TWIST, CDR + "0102", 3),
+        ("/random", POSE, CDR + "ff" * 100, 3),
+        ("/nan", TWIST, CDR + struct.pack("<6d", *[float("nan")] * 6).hex(), 3),
+        ("/large", TWIST, CDR + "00" * 2_000_000, 1),
+        ("/flood", TWIST, CDR + good, 3000),
+    ]
+    seen = played(Scenario(graph=graph, raw=raw, seconds=6))
+    said = sorted(sentence.partition(": ")[0] for _, sentence in seen.findings)
+    assert said == [
+        "/large has messages of more than 1 MB, which are not taken (from a node)",
+        *(f"a message on {name} is not taken" for name in ("/nan", "/random", "/short")),
+    ]
+    assert seen.code == 0
+    assert len(seen.log.splitlines()) == len(said)
+    assert 0 < len(seen.sent) <= 3000
+    assert {fields for _, _, _, fields in seen.sent} == {"vx: 0.5 vy: 0 vz: 0 rollRate: 0 pitchRate: 0 yawRate: 0.25"}
+
+
+def sent_as(name: str) -> tuple[str, ...]:
+    return (POSE_ESTIMATE if name == "/random" else MOTION_REQUEST,)
+
+
+def test_ends_with_a_sentence_when_a_memory_is_lost() -> None:
+    graph = RosGraph(given=(topic("/camera", IMAGE, "MEMORY", camera=CAMERA),))
+    seen = played(Scenario(graph=graph, loses_memory=True, seconds=20))
+    assert seen.code == 1
+    assert seen.log.startswith("ros-bridge: shared memory ")
+    assert seen.log.endswith("was removed by its creator\n")
