@@ -297,7 +297,7 @@ def declared(service: source.Mapping) -> Declared | None:
     readers = entry.value.get("readers")
     count = readers.value if isinstance(readers, Scalar) and isinstance(readers.value, int) else 0
     lines = tuple(printed_lines(entry.value.get("lines")))
-    topics = ros_topics(entry.value.get("ros"))
+    topics = tuple(ros_topics(entry.value.get("ros")))
     outputs += tuple(word for topic in topics if not topic.given for word in topic.messages)
     sent = {name.removesuffix("/0") for name, _ in outputs}
     printed = {line.port: (line.port, line.message_span) for line in lines if line.port not in sent}

@@ -3,15 +3,19 @@
 The bridge is a service of DoDo's that stands beside the application's own, in their network, memory and time.
 """
 
+import contextlib
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
 
 from dodo_dsl import source
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.opendlv.ros_types import NODE_ENVIRONMENT, SENT
+from dodo_dsl.opendlv.ros_types import NODE_ENVIRONMENT, SENT, Topic
 from dodo_dsl.source import Node, Scalar
-from dodo_dsl.spec import quantity
+from dodo_dsl.spec.quantity import QuantityError, convert
 
 BRIDGE = "dodo-ros-bridge"
 """The service between the test's bus and the application's ROS graph, and the name of its log."""
@@ -25,7 +29,7 @@ volumes: [{{type: bind, source: /tmp, target: /tmp}}]
 command: [--cid=111]
 x-dodo-process: [python, -m, {BRIDGE_MODULE}]
 """
-_SHORT = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([A-Za-z][A-Za-z0-9]*)")
+_SHORT = re.compile(r"\A(\w+)/(\w+)\Z")
 """A type as some tools accept it."""
 
 Word = tuple[str, Span]
@@ -33,64 +37,37 @@ Word = tuple[str, Span]
 
 @dataclass(frozen=True)
 class RosTopic:
-    """A topic as it is written, with its place; it is ``given`` to the node, or else sent by it.
+    """A topic as it is written, with its places; it is ``given`` to the node, or else sent by it.
 
-    ``type`` is ``package/msg/Name``; ``ports`` are the words of ``from`` or ``to``.
+    ``ports`` are the words of ``from`` or ``to``.
     """
 
-    name: str
-    span: Span
+    topic: Topic
     given: bool
-    type: str
+    span: Span
     type_span: Span
     ports: tuple[Word, ...] = ()
-    encoding: str = ""
-    frame_id: str = ""
-    reliability: str = ""
-    durability: str = ""
-    depth: int = 10
-    rate: float = 0.0
-    fields: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def messages(self) -> tuple[Word, ...]:
         """The messages that a sent topic becomes, by what is written or by its type."""
-        return self.ports or tuple((name, self.span) for name in SENT.get(self.type, ()))
+        return self.ports or tuple((name, self.span) for name in SENT.get(self.topic.type, ()))
 
 
-def ros_topics(node: Node | None) -> tuple[RosTopic, ...]:
+def ros_topics(node: Node | None) -> Iterator[RosTopic]:
     """The topics of the value of ``ros``, as far as they fit the schema."""
-    return tuple(topic for key in ("in", "out") for topic in _topics(source.part(node, key), key == "in"))
-
-
-def _topics(node: Node | None, given: bool) -> Iterator[RosTopic]:
-    for name, entry in source.entries(node).items():
-        about = entry.value
-        written = about if isinstance(about, Scalar) else source.part(about, "type")
-        if not isinstance(written, Scalar):
-            continue
-        qos = source.part(about, "qos")
-        texts = {
-            key: word.text
-            for key in ("encoding", "frame-id", "rate")
-            if isinstance(word := source.part(about, key), Scalar)
-        }
-        quality = {key: source.plain(e.value) for key, e in source.entries(qos).items()}
-        yield RosTopic(
-            name,
-            entry.key,
-            given,
-            _SHORT.sub(r"\1/msg/\2", written.text) if _SHORT.fullmatch(written.text) else written.text,
-            written.span,
-            tuple(_words(source.part(about, "from" if given else "to"))),
-            texts.get("encoding", ""),
-            texts.get("frame-id", ""),
-            quality.get("reliability", ""),
-            quality.get("durability", ""),
-            quality.get("depth", 10),
-            float(quantity.convert(texts["rate"], "Hz")) if "rate" in texts else 0.0,
-            {key: str(source.plain(e.value)) for key, e in source.entries(about, "fields").items()},
-        )
+    for key, ports in (("in", "from"), ("out", "to")):
+        for name, entry in source.entries(node, key).items():
+            about = source.plain(entry.value)
+            keys: dict[str, Any] = {"type": about} if isinstance(about, str) else about
+            word = entry.value if isinstance(about, str) else source.part(entry.value, "type")
+            with contextlib.suppress(AttributeError, KeyError, QuantityError, TypeError, msgspec.ValidationError):
+                keys |= {"topic": name, "bus": (), **keys.pop("qos", {})}
+                keys["type"] = _SHORT.sub(r"\1/msg/\2", keys["type"])
+                keys["rate"] = float(convert(keys["rate"], "Hz")) if "rate" in keys else 0.0
+                topic = msgspec.convert(keys, Topic)
+                place = word.span if word else entry.key
+                yield RosTopic(topic, key == "in", entry.key, place, tuple(_words(source.part(entry.value, ports))))
 
 
 def _words(node: Node | None) -> Iterator[Word]:

@@ -46,10 +46,10 @@ def check_topics(context: RuleContext) -> Iterator[Diagnostic]:
     if not context.test.is_complete:
         return
     for problem in ros_topics.problems(context.wiring.topics):
-        wanted = ros_topics.wanted(context.wiring.topics, problem) if not problem.hint else ()
+        wanted = {name for each in context.wiring.topics if each.problem == problem for name in each.wanted}
         makers = (m.name for name in wanted for m in context.manifests.values() if _sends(m, name))
         names = ", ".join(sorted(set(makers)))
-        yield replace(problem, hint=f"add a service that makes it: {names}") if names else problem
+        yield replace(problem, hint=f"add a service that makes it: {names}") if names and not problem.hint else problem
 
 
 def check_hidden_messages(context: RuleContext) -> Iterator[Diagnostic]:
