@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -208,6 +209,28 @@ def test_poses_and_log(tmp_path: Path, record: Callable[..., Path]) -> None:
         ("DEBUG", "level 7", "sender 5"),
         ("UNKNOWN", "level 9", "sender 5"),
     ]
+
+
+def test_what_robots_measure_and_believe(tmp_path: Path, record: Callable[..., Path]) -> None:
+    half, ranges = math.sqrt(0.5), np.array([1, math.inf, 2], "<f4").tobytes()
+    scan = {"angleMin": -0.5, "angleIncrement": 0.5, "ranges": ranges}
+    odometry = {"x": 1.0, "y": 2.0, "yaw": math.pi / 2}
+    envelopes = [
+        message("robot.PlanarScan", BEGIN, 3, **scan),
+        message("robot.PlanarScan", BEGIN, 3, ranges=b"123"),
+        message("robot.OdometryReading", BEGIN, **odometry),
+        message("robot.OdometryReading", BEGIN, yaw=math.inf),
+        message("robot.PoseEstimate", BEGIN, x=1, qz=half, qw=half),
+    ]
+    beside = assert_same_values(record(envelopes), tmp_path, "--messages=1.0")
+    ((_, laser),) = beside["/scan/3"]
+    assert (laser.frame_id, laser.start_angle, laser.end_angle, *laser.ranges) == ("frame-3", -0.5, 0.5, 1, math.inf, 2)
+    poses = [decoded for name in ("/odom/0", "/estimate/0") for _, decoded in beside[name]]
+    assert [(each.frame_id, each.pose.position.x, each.pose.position.y) for each in poses] == [
+        ("odom", 1.0, 2.0),
+        ("world", 1.0, 0.0),
+    ]
+    assert [each.pose.orientation.z for each in poses] == pytest.approx([half, half])
 
 
 ANGLE = st.floats(-3.125, 3.125, width=32)
