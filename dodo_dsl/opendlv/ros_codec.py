@@ -17,6 +17,7 @@ Fields = dict[str, Any]
 HEADER = "std_msgs/msg/Header"
 _BASE, _NAME, _ARRAY = 1, 2, 3
 _DTYPES = {"bool": "bool_", "char": "uint8", "byte": "int8"}
+_OCTETS = (4, ((_BASE, ("uint8", 0)), 0))
 _MISFITS = (
     ArithmeticError,
     AssertionError,
@@ -84,9 +85,15 @@ class Codec:
         """The bytes of a message; fields that are left out are 0 or empty. Raises RosTypeError."""
         from rosbags.serde import SerdeError
 
+        last, desc = self._store.fielddefs[self._known(type_)][1][-1]
+        octets = fields.get(last) if desc == _OCTETS else None
         try:
-            message = self._built(self._known(type_), fields, type_)
-            return bytes(self._store.serialize_cdr(message, type_, little_endian=True))
+            if octets is None:
+                message = self._built(type_, fields, type_)
+                return bytes(self._store.serialize_cdr(message, type_, little_endian=True))
+            data = _array("uint8", octets, 0, f"{type_}.{last}")
+            head = self.encode(type_, {name: each for name, each in fields.items() if name != last})
+            return b"".join((head[:-4], len(data).to_bytes(4, "little"), data.data))  # a picture is copied once
         except RosTypeError:
             raise
         except (SerdeError, *_MISFITS) as error:
