@@ -73,9 +73,6 @@ class Codec:
         for name in own:
             self._refuse_unknown_parts(name)
 
-    def __contains__(self, type_: str) -> bool:
-        return type_ in self._store.fielddefs
-
     @property
     def store(self) -> Any:
         """The typestore of rosbags, for bags."""
