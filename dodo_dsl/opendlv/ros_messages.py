@@ -16,7 +16,7 @@ from dodo_dsl.opendlv import ros_fields as ros
 from dodo_dsl.opendlv.attitude import heading_of, quaternion
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.ros_codec import Codec, Fields, RosTypeError, require_ros
-from dodo_dsl.opendlv.ros_pictures import PICTURES, CameraPicture, picture_fields
+from dodo_dsl.opendlv.ros_pictures import PICTURES, CameraPicture, encoding_of, picture_fields
 from dodo_dsl.opendlv.ros_types import CLOCK_TYPE, NUMBERS, POSE_ESTIMATE, CameraView, StaticFrame, Topic
 
 __all__ = ["BusMessage", "CameraPicture", "RosTypeError", "Types", "messages_of", "require_ros", "stamp_of", "time_of"]
@@ -49,6 +49,8 @@ class Types(Codec):
     def check(self, topic: Topic) -> None:
         """Raises RosTypeError for a topic whose type, messages, fields or paths there are not."""
         self.fields(topic.type)
+        if topic.type in PICTURES:
+            encoding_of(topic)
         if topic.type in (*PICTURES, ros.CAMERA_INFO, CLOCK_TYPE):
             return
         used: set[str] = set()

@@ -20,8 +20,8 @@ PICTURES = (IMAGE, COMPRESSED)
 _SAME = {"argb": "bgra8", "bgr": "bgr8", "rgb": "rgb8"}
 _CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "mono8": 1}
 _ORDER = {"bgr8": "BGR", "rgb8": "RGB", "bgra8": "BGRA", "rgba8": "RGBA", "mono8": "GRAY"}
-ENCODINGS = {IMAGE: ("bgr8", "rgb8", "bgra8", "mono8"), COMPRESSED: ("jpeg", "png")}
-"""Of topics that are given."""
+ENCODINGS = {IMAGE: ("bgr8", "rgb8", "bgra8", "mono8"), COMPRESSED: ("png", "jpeg")}
+"""Of topics that are given, the default first."""
 _JPEG_QUALITY = 95
 
 
@@ -45,16 +45,21 @@ def picture_fields(topic: Topic, picture: CameraPicture | None) -> Fields:
         return _camera_info(topic.camera)
     if picture is None:
         raise RosTypeError(f"{topic.topic} needs a picture")
-    known = ENCODINGS[topic.type]
-    if topic.encoding and topic.encoding not in known:
-        raise RosTypeError(f"{topic.topic} has the encoding '{topic.encoding}', expected one of {', '.join(known)}")
+    encoding = encoding_of(topic)
     if topic.type == COMPRESSED:
-        return _compressed(topic.encoding or known[0], picture)
-    encoding = topic.encoding or _SAME.get(picture.format, known[0])
+        return _compressed(encoding, picture)
     image = _ordered(picture, encoding)
     height, width = image.shape[:2]
     step = width * _CHANNELS[encoding]
     return {"height": height, "width": width, "encoding": encoding, "is_bigendian": 0, "step": step, "data": image}
+
+
+def encoding_of(topic: Topic) -> str:
+    """That of a topic's pictures; raises RosTypeError for one that its type does not have."""
+    known = ENCODINGS[topic.type]
+    if topic.encoding and topic.encoding not in known:
+        raise RosTypeError(f"{topic.topic} has the encoding '{topic.encoding}', expected one of {', '.join(known)}")
+    return topic.encoding or known[0]
 
 
 def picture_of(type_: str, fields: Fields) -> Picture:

@@ -241,8 +241,14 @@ def test_pictures(type_: str, format_: str, encoding: str) -> None:
         assert (found["step"], found["height"], found["width"]) == (24, 6, 8)
 
 
-def test_jpeg_is_the_default_and_rows_may_have_a_rest() -> None:
-    wanted = topic(COMPRESSED, "video0.bgr")
+@pytest.mark.parametrize(("type_", "key", "expected"), [(IMAGE, "encoding", "bgr8"), (COMPRESSED, "format", "png")])
+def test_the_default_of_pictures(type_: str, key: str, expected: str) -> None:
+    fields = TYPES.given(topic(type_, "video0.argb"), {}, TIME, CameraPicture(np.zeros((8, 8, 4), np.uint8), "argb"))
+    assert fields[key] == expected
+
+
+def test_jpeg_and_rows_with_a_rest() -> None:
+    wanted = topic(COMPRESSED, "video0.bgr", encoding="jpeg")
     fields = TYPES.given(wanted, {}, TIME, CameraPicture(np.full((8, 8, 3), 90, np.uint8), "bgr"))
     assert fields["format"] == "jpeg" and (picture_of(COMPRESSED, fields) == 90).all()
     padded = {"encoding": "mono8", "width": 2, "height": 2, "step": 3, "data": np.array([1, 2, 9, 3, 4, 9], np.uint8)}
@@ -306,6 +312,7 @@ def test_what_is_sent_and_cannot_be_taken(wanted: Topic, fields: dict[str, Any],
             "3 bytes",
         ),
         (topic(IMAGE, "video0.bgr"), [], "/t needs a picture"),
+        (topic(IMAGE, "video0.bgr", encoding="png"), [], "the encoding 'png', expected one of bgr8, rgb8"),
         (topic("sensor_msgs/msg/CameraInfo", "video0.bgr"), [], "needs its camera's size and opening angle"),
         (topic("sensor_msgs/msg/CameraInfo", "v", camera=CameraView(width=8, height=6)), [], "needs its camera's size"),
         (topic("sensor_msgs/msg/Rage", DISTANCE), [], "did you mean 'sensor_msgs/msg/Range'?"),
