@@ -153,13 +153,13 @@ def _shout(raw: list[tuple[str, str, str, int]]) -> None:
     if not raw:
         return
     from dodo_dsl.opendlv.ros_messages import Types
-    from services.ros_bridge.graph import Endpoint, Graph, readers_of, write
+    from services.ros_bridge.graph import Endpoint, Graph, write
 
     joined = Graph(Types())
     for topic, type_, data, often in raw:
         writer = joined.writer(Endpoint(b"", topic, type_, True), 1000)
         end = time.monotonic() + PATIENCE_S / 3
-        while not readers_of(writer) and time.monotonic() < end:
+        while not writer.get_matched_subscriptions() and time.monotonic() < end:
             time.sleep(0.01)
         for _ in range(often):
             write(writer, bytes.fromhex(data))
