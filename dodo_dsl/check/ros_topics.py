@@ -227,7 +227,8 @@ def _frames(resolved: Iterable[Resolved]) -> Iterator[StaticFrame]:
         place = {key: float(texts.get(key, "0").split(",")[0]) for key in ("x", "y", "z")}
         roll, pitch, yaw = (math.radians(float(texts.get(key, "0").split(",")[0])) for key in ("roll", "pitch", "yaw"))
         body = child.removesuffix("_optical_frame") + "_link" if each.is_picture else child
-        # pitch is positive downwards in REP 103
-        yield StaticFrame(parent=_ROBOT, child=body, **place, roll=roll, pitch=0.0 - pitch, yaw=yaw)
+        if each.is_picture:
+            pitch = 0.0 - pitch  # a camera's is positive upwards, in REP 103 downwards
+        yield StaticFrame(parent=_ROBOT, child=body, **place, roll=roll, pitch=pitch, yaw=yaw)
         if each.is_picture:
             yield StaticFrame(parent=body, child=child, roll=-math.pi / 2, yaw=-math.pi / 2)
