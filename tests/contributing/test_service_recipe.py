@@ -136,4 +136,4 @@ def test_what_checks_every_service_has_nothing_to_say(checkout: Path) -> None:
 def test_the_contract_of_independence_names_every_service() -> None:
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     (named,) = [contract["modules"] for contract in contracts if contract["type"] == "independence"]
-    assert sorted(named) == sorted(f"services.{path.parent.name}" for path in ROOT.glob("services/*/service.yml"))
+    assert sorted(named) == sorted(f"services.{path.parent.name}" for path in ROOT.glob("services/*/__main__.py"))

@@ -35,10 +35,12 @@ def test_services_stand_on_what_they_import_and_start_as_their_manifest_says() -
 def test_every_requirement_is_locked() -> None:
     folder, names = ROOT / "services" / "requirements", []
     for file in folder.glob("*.txt"):
-        words = ["sh", str(folder / "locked"), str(file), str(ROOT / "locks" / "base.txt")]
+        locks = [str(ROOT / "locks" / name) for name in ("base.txt", "extras.txt")]
+        words = ["sh", str(folder / "locked"), str(file), *locks]
         lines = subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()
-        names += [line.partition("==")[0].lower() for line in lines if not line.startswith(" ")]
-        assert len([line for line in lines if line.strip().startswith("--hash=sha256:")]) >= len(names) > 0
+        found = [line.partition("==")[0].lower() for line in lines if not line.startswith(" ")]
+        assert len([line for line in lines if line.strip().startswith("--hash=sha256:")]) >= len(found) > 0
+        names += found
         wanted = [line.lower() for line in file.read_text().splitlines() if not line.startswith("#")]
         assert sorted(names[-len(wanted) :]) == sorted(wanted)
     assert len(names) >= 7
