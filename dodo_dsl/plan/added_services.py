@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from dodo_dsl.application.model import Declared
+from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.check.resolve import ResolvedTest
 from dodo_dsl.check.wiring import ANYTHING, Wiring, answers, cameras_of, other_inputs, rates, step_hz
 from dodo_dsl.plan.model import STARTED, ApplicationService, Flag, Lockstep, PlannedService
@@ -54,11 +55,16 @@ _PATIENCE_S, _MOST_PATIENCE_S = 3, 40
 """How long time waits for services that have not begun: shortly where one waits for what another has to do before."""
 
 
+_MEETING_S = 3
+"""How long nodes of ROS have before the test to find each other: their discovery goes by timers."""
+
+
 def agent_flags(services: Sequence[ApplicationService], seed: int, folder: str = OWN_TIME) -> tuple[str, ...]:
     """The flags of what gives the ``services`` of an application the test's time."""
-    start = _EPOCH_S * _SECOND
+    begin = _EPOCH_S * _SECOND
+    start = begin - _MEETING_S * _SECOND * any(service.name == BRIDGE for service in services)
     waits = any(how != STARTED for service in services for how in service.after.values())
-    own = {"folder": folder, "services": len(services), "start": start, "begin": start, "seed": seed}
+    own = {"folder": folder, "services": len(services), "start": start, "begin": begin, "seed": seed}
     own["patience"] = _PATIENCE_S if waits else _MOST_PATIENCE_S
     return tuple(f"--{name}={value}" for name, value in own.items())
 
