@@ -16,6 +16,8 @@ from dodo_dsl.cli.new_files import (
     COMPOSE_FILES,
     LANGUAGES,
     REGISTRY,
+    ROS,
+    ROS_PYTHON,
     New,
     application_files,
     deployment_files,
@@ -23,6 +25,7 @@ from dodo_dsl.cli.new_files import (
     included,
     missing_schemas,
     own_compose_file,
+    ros_python,
     say_next,
     write_new,
 )
@@ -158,7 +161,7 @@ def _registry(deployment: Deployment, diagnostics: Sequence[Diagnostic]) -> Path
 _FIRST = "sil-first"
 _BUILDS = {"cpp": ("cmake -B build", "cmake --build build --parallel --target steering")}
 """How programs are built that have to be."""
-_TESTS = {"wheels": f"application/wheels/{_FIRST}.dodo.yml"}
+_TESTS = {answers: f"application/{answers}/{_FIRST}.dodo.yml" for answers in ("wheels", ROS)}
 """Templates of first tests other than the usual one, by how the application answers."""
 _PUSH = "commit and push; GitLab runs the tests, on a runner with the tag sil"
 
@@ -173,15 +176,23 @@ def new_application(language: str, answers: str, stdout: TextIO, stderr: TextIO)
         advice = "dodo new --deployment keeps what there is"
         raise UsageError(f"'{shown_path(str(there[0]))}' exists already; nothing was written; {advice}")
     made = {file.path for file in own}
-    images = language in _BUILDS
-    around = [file for file in deployment_files(root, images=images) if file.path not in made]
+    images = language in _BUILDS or answers == ROS
+    around = [file for file in deployment_files(root, images=images, ros=answers == ROS) if file.path not in made]
     kept = [file for file in around if file.path.exists()]
     write_new([*own, *(file for file in around if file not in kept), *first], stdout)
     included = _say_kept(kept, images, stdout, stderr)
     program = next(file.path.name for file in own if file.path.stem == "steering")
-    steps = [*_BUILDS.get(language, ()), f"dodo run {_FIRST}", f"make {program} and the test yours"]
+    builds = _ros_builds(language) if answers == ROS else _BUILDS.get(language, ())
+    steps = [*builds, f"dodo run {_FIRST}", f"make {program} and the test yours"]
     say_next([*steps, *included, _PUSH], stdout)
     return Exit.OK
+
+
+def _ros_builds(language: str) -> tuple[str, ...]:
+    if language == "cpp":
+        return (". /opt/ros/kilted/setup.bash && colcon build",)
+    script = f"PATH-OF-DODO'S-CHECKOUT/scripts/install-ros {ROS_PYTHON.partition('/')[0]}"
+    return () if ros_python() != ROS_PYTHON else (f"{script}  (or take ROS' own Python, in dodo.yml)",)
 
 
 def new_deployment(stdout: TextIO, stderr: TextIO) -> int:
@@ -233,6 +244,7 @@ EXAMPLES = """examples:
   dodo new sil-mine --extends sil-closed-kiwi-track    a copy of a shipped test and its files
   dodo new --application                               an application that drives, with a test that it passes
   dodo new --application --language cpp                the same in C++, on libcluon
+  dodo new --application --ros                         a ROS 2 node, in Python or with --language cpp
   dodo new --application --answers printed             one that prints its answers; wheels: two wheels, range sensors
   dodo new --deployment                                dodo.yml, application and pipeline in this folder
 """
@@ -258,6 +270,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="how that application answers: steering and pedal on the bus, the same printed, or a pedal for each of "
         "two wheels, by range sensors (default: bus)",
     )
+    parser.add_argument("--ros", action="store_true", help="that application is a ROS 2 node: pictures in, Twist out")
     parser.add_argument(
         "--level", choices=LEVELS, help="level of the new test: software, data or hardware in the loop (default: sil)"
     )
@@ -272,16 +285,19 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    for flag in ("language", "answers"):
+    for flag in ("language", "answers", "ros"):
         if getattr(options, flag) and not options.application:
             raise UsageError(f"--{flag} applies to --application")
+    if options.ros and options.answers:
+        raise UsageError("--answers applies to OpenDLV applications: with --ros the answer is a Twist")
     if options.deployment or options.application:
         if options.level or options.kind or options.extends or options.rec:
             words = "--level, --kind, --extends and --rec"
             raise UsageError(f"{words} apply to a test, not to --deployment and --application")
         if options.deployment:
             return new_deployment(stdout, stderr)
-        return new_application(options.language or LANGUAGES[0], options.answers or ANSWERS[0], stdout, stderr)
+        answers = ROS if options.ros else options.answers or ANSWERS[0]
+        return new_application(options.language or LANGUAGES[0], answers, stdout, stderr)
     return _test(options, stdout)
 
 

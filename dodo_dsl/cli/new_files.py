@@ -4,6 +4,7 @@ Of a file that is kept it says what it lacks, and what in it meets DoDo's pipeli
 """
 
 import functools
+import importlib.util
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,6 +56,15 @@ ANSWERS = ("bus", "printed", "wheels")
 """Of the application that ``dodo new --application`` writes, as are its languages."""
 _SPEC_SCHEMA = "dodo.schema.json"
 _MESSAGES = "messages.odvd"
+ROS = "ros"
+"""How an application answers that is a ROS 2 node."""
+ROS_PYTHON = ".ros/bin/python"
+_OF_ROS = {
+    "python": ("steering.py", "setup.py", "setup.cfg", "resource/steering"),
+    "cpp": ("steering.cpp", "CMakeLists.txt"),
+}
+_PACKAGE_OF_ROS = ("package.xml", "Dockerfile", FILE_NAME, COMPOSE_FILES[0])
+_RUN_COLCON = '"bash", "-c", ". install/setup.bash && exec install/steering/lib/steering/steering"'
 
 
 def compose_file(root: Path) -> str:
@@ -117,6 +127,12 @@ def dodo_yml(root: Path, application: str) -> New:
 
 def application_files(root: Path, language: str, answers: str) -> list[New]:
     """A small application that drives, and how it starts; what ``answers`` changes stands in a folder of that name."""
+    if answers == ROS:
+        process = f"{ros_python()}, steering.py" if language == "python" else _RUN_COLCON
+        names = (*_OF_ROS[language], *_PACKAGE_OF_ROS)
+        return [
+            New(root / name, filled(f"application/ros/{name}", language=language, process=process)) for name in names
+        ]
     values = {"base": f"dodo/vision:{__version__}", "process": _PROCESSES[language], "answers": answers}
     folder = package_data.templates() / "new/application"
     usual = [path for path in (folder / language).iterdir() if path.is_file()]  # an installed one has __pycache__
@@ -129,12 +145,17 @@ def application_files(root: Path, language: str, answers: str) -> list[New]:
     return [New(root / name, filled(f"application/{place}", **values)) for name, place in sources.items()]
 
 
+def ros_python() -> str:
+    """The interpreter of a ROS 2 node: DoDo's own if it has ROS, else one that ``scripts/install-ros`` makes."""
+    return "python" if importlib.util.find_spec("rclpy") else ROS_PYTHON
+
+
 def included(images: bool) -> tuple[str, ...]:
     """The templates that a repository's pipeline includes to run its tests, and with ``images`` to build them first."""
     return ("deployment", "application") if images else ("deployment",)
 
 
-def deployment_files(root: Path, *, images: bool = False) -> list[New]:
+def deployment_files(root: Path, *, images: bool = False, ros: bool = False) -> list[New]:
     """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas.
 
     With ``images`` the pipeline builds them, as the application has to be built.
@@ -150,7 +171,7 @@ def deployment_files(root: Path, *, images: bool = False) -> list[New]:
             for name in package_data.PIPELINES
         ),
         *_schemas(root),
-        New(root / ".gitignore", filled("deployment/gitignore", builds=images)),
+        New(root / ".gitignore", filled("deployment/gitignore", builds=images, ros=ros)),
     ]
 
 
