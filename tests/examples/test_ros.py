@@ -1,0 +1,141 @@
+"""ROS 2 applications: real nodes on Fast DDS pass their tests in lockstep, the same way each time."""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+from dodo_dsl.opendlv.message_set import MessageSet
+from dodo_dsl.opendlv.recording import read_envelopes
+from dodo_dsl.opendlv.ros_types import FRAME_IDS, GIVEN, SENT
+from tests.examples.ros import NODES, PYTHON, ROOT, copy, dodo, needs_ros, run
+
+ANSWERS = {
+    "lane": "opendlv.proxy.GroundMotionRequest",
+    "corridor": "opendlv.proxy.GroundSteeringRequest",
+    "detector": "opendlv.logic.perception.DetectionBoundingBox",
+}
+
+
+def answers(folder: Path, test: str, message: str) -> tuple[int, str]:
+    """How many the application gave, and a hash of their values and times since the first of all messages."""
+    recorded = list(read_envelopes(folder / "report" / test / "test.rec"))
+    began, id_ = min(one.sample_time for one in recorded), MessageSet.standard().id(message)
+    own = [(one.sample_time - began, one.payload) for one in recorded if (one.data_type, one.sender_stamp) == (id_, 0)]
+    return len(own), hashlib.sha256(repr(own).encode()).hexdigest()
+
+
+@needs_ros
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NODES)
+@pytest.mark.parametrize("times", [2, pytest.param(20, marks=pytest.mark.proof)])
+def test_an_application_passes_its_test_the_same_way_each_time(name: str, times: int, tmp_path: Path) -> None:
+    folder = copy(name, tmp_path)
+    found = []
+    for _ in range(times):
+        test = run(folder)
+        assert test["outcome"] == "passed", test["reason"]
+        found.append((json.dumps(test["checks"]), *answers(folder, f"sil-{name}", ANSWERS[name])))
+    assert len(set(found)) == 1
+    assert found[0][1] > 30
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_nodes_know_nothing_of_dodo(name: str) -> None:
+    """Neither they nor their compose files; what DoDo needs are a few lines of dodo.yml."""
+    folder = ROOT / "examples" / "ros" / name
+    for file in (folder / f"{NODES[name]}.py", folder / "docker-compose.yml"):
+        assert "dodo" not in file.read_text().lower(), file
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_their_tests_compile(name: str, tmp_path: Path) -> None:
+    assert "1 test checked: no problems" in dodo(copy(name, tmp_path), "compile", "--check")
+
+
+@pytest.mark.slow
+def test_without_ros_the_result_says_what_is_missing(tmp_path: Path) -> None:
+    folder = copy("lane", tmp_path)
+    deployment = folder / "dodo.yml"
+    deployment.write_text(deployment.read_text().replace(str(ROOT / "build/ros"), "../ros"))
+    test = run(folder)
+    assert test["outcome"] == "error" and "../ros/bin/python" in test["reason"], test["reason"]
+
+
+@needs_ros
+@pytest.mark.slow
+def test_the_new_application_passes_its_first_test(tmp_path: Path) -> None:
+    written = dodo(tmp_path, "new", "--application", "--ros")
+    assert "next: PATH-OF-DODO'S-CHECKOUT/scripts/install-ros .ros" in written
+    shutil.copytree(PYTHON.parents[1], tmp_path / ".ros", symlinks=True, copy_function=os.link)
+    assert "1 test checked: no problems" in dodo(tmp_path, "compile", "--check")
+    test = run(tmp_path)
+    assert test["outcome"] == "passed", test["reason"]
+
+
+PAGE = (ROOT / "docs/reference/ros2.md").read_text()
+
+
+def test_the_page_has_every_type_with_its_frame() -> None:
+    rows = {}
+    for what, made, frame in re.findall(r"^\| (\w+: .+?) \| (.+?) \| (.+?) \|$", PAGE, re.MULTILINE):
+        for package, names in re.findall(r"(\w+): ([^;]+)", what):
+            rows |= {f"{package}/msg/{name.strip()}": (made, frame) for name in names.split(",")}
+    assert rows.keys() == GIVEN.keys() | SENT.keys()
+    for type_, messages in SENT.items():
+        assert type_ in GIVEN or all(name.rpartition(".")[2] in rows[type_][0] for name in messages), type_
+    assert all(f"`{frame}`" in rows[type_][1] for type_, frame in FRAME_IDS.items() if type_ not in SENT)
+
+
+@pytest.mark.parametrize("page", ["docs/reference/ros2.md", "docs/tutorial/ros2.md"])
+def test_mappings_of_pages_fit_the_schema(page: str) -> None:
+    schema = Draft202012Validator(json.loads((ROOT / "schemas/application.schema.json").read_text()))
+    blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
+    written = [yaml.safe_load(block)["application"]["services"] for block in blocks]
+    mappings = [service["ros"] for services in written for service in services.values()]
+    assert mappings
+    for mapping in mappings:
+        schema.validate({"services": {"node": {"image": "node", "x-dodo": {"ros": mapping}}}})
+
+
+RCLCPP = """
+#include <functional>
+#include <memory>
+#include <string>
+namespace rclcpp {
+struct SensorDataQoS {};
+template <typename M> struct Publisher { using SharedPtr = std::shared_ptr<Publisher>; void publish(const M &) {} };
+template <typename M> struct Subscription { using SharedPtr = std::shared_ptr<Subscription>; };
+struct Node {
+    explicit Node(const std::string &) {}
+    template <typename M> typename Publisher<M>::SharedPtr create_publisher(const std::string &, int) { return {}; }
+    template <typename M> typename Subscription<M>::SharedPtr create_subscription(
+        const std::string &, SensorDataQoS, std::function<void(typename M::ConstSharedPtr)>) { return {}; }
+};
+inline void init(int, char **) {}
+inline void spin(std::shared_ptr<Node>) {}
+inline void shutdown() {}
+}
+"""
+
+
+@needs_ros
+@pytest.mark.thorough
+def test_the_new_application_in_cpp_is_sound(tmp_path: Path) -> None:
+    """As far as can be seen where rclcpp is not: with the real messages, and its names alone."""
+    written = dodo(tmp_path, "new", "--application", "--ros", "--language", "cpp")
+    assert "colcon build" in written
+    (tmp_path / "stand-in/rclcpp").mkdir(parents=True)
+    (tmp_path / "stand-in/rclcpp/rclcpp.hpp").write_text(RCLCPP)
+    headers = [tmp_path / "stand-in", *(PYTHON.parents[1] / "include").iterdir()]
+    flags = ["-std=c++17", "-Wall", "-Wextra", "-Werror", *(f"-I{path}" for path in headers)]
+    command = ["g++", "-fsyntax-only", *flags, "steering.cpp"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
