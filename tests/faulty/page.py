@@ -9,7 +9,7 @@ import yaml
 from dodo_dsl.atomic import write_text
 from tests.faulty.makes import GOOD
 from tests.faulty.matrix import Cell, Cells, ShippedTest
-from tests.faulty.table import FAULTS, RANGES, Fault
+from tests.faulty.table import FAULTS, RANGES, ROS, Fault
 
 GAPS: Mapping[str, Mapping[str, str]] = yaml.safe_load(Path(__file__).with_name("gaps.yml").read_text(encoding="utf-8"))
 MARKS = {"failed": "**F**", "passed": "·", "error": "E"}
@@ -40,7 +40,13 @@ def problems(cells: Cells, tests: Sequence[ShippedTest]) -> list[str]:
 def write(path: Path, cells: Cells, tests: Sequence[ShippedTest]) -> None:
     """The page of what has run."""
     kinds = list(dict.fromkeys(fault.kind for fault in FAULTS.values()))
-    parts = [_head(cells, tests), _legend(tests), *(_table(kind, cells, tests) for kind in kinds), of_ranges()]
+    parts = [
+        _head(cells, tests),
+        _legend(tests),
+        *(_table(kind, cells, tests) for kind in kinds),
+        of_ranges(),
+        of_ros(),
+    ]
     write_text(path, "\n".join([*parts, _reasons(cells), _gaps(cells, tests)]))
 
 
@@ -109,6 +115,18 @@ def of_ranges() -> str:
         "",
     ]
     return "\n".join([*head, "| fault | what it does | test |", "|---|---|---|", *rows, ""])
+
+
+def of_ros() -> str:
+    rows = [f"| `{fault.name}` | {fault.does} | {fault.test} | {fault.words} |" for fault in ROS.values()]
+    head = [
+        "## Faults of ROS 2 nodes",
+        "",
+        "Those of [examples/ros](../../examples/ros/README.md), on real rclpy and Fast DDS; its tests catch each,",
+        "and the result has these words:",
+        "",
+    ]
+    return "\n".join([*head, "| fault | what it does | test | words |", "|---|---|---|---|", *rows, ""])
 
 
 def _mark(cells: Cells, fault: str, slug: str) -> str:

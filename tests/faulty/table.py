@@ -1,11 +1,11 @@
-"""The faults of ``faults.yml`` and ``faults_of_ranges.yml``: what the tests have to find."""
+"""The faults of ``faults.yml``, ``faults_of_ranges.yml`` and ``faults_of_ros.yml``: what the tests have to find."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
-TABLE, RANGES_TABLE = (Path(__file__).with_name(name) for name in ("faults.yml", "faults_of_ranges.yml"))
+TABLE, RANGES_TABLE, ROS_TABLE = (Path(__file__).with_name(f"faults{of}.yml") for of in ("", "_of_ranges", "_of_ros"))
 
 
 @dataclass(frozen=True)
@@ -28,4 +28,5 @@ def _faults(table: Path) -> dict[str, Fault]:
 
 FAULTS = _faults(TABLE)
 RANGES = _faults(RANGES_TABLE)
-"""Of examples/ranges, which has a test of its own."""
+ROS = _faults(ROS_TABLE)
+"""Of examples/ranges and examples/ros, which have tests of their own."""

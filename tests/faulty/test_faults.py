@@ -6,15 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.faulty import of_ros
 from tests.faulty.kiwi import STEERING
 from tests.faulty.makes import NAMES, fault_of
 from tests.faulty.of_ranges import RANGE_FAULTS
 from tests.faulty.page import GAPS
-from tests.faulty.table import FAULTS, RANGES
+from tests.faulty.table import FAULTS, RANGES, ROS
 
 
 def test_the_table_is_complete_and_names_real_tests() -> None:
-    assert set(FAULTS) == set(NAMES) and set(RANGES) == set(RANGE_FAULTS)
+    assert set(FAULTS) == set(NAMES) and set(RANGES) == set(RANGE_FAULTS) and set(ROS) == set(of_ros.FAULTS)
     assert len(FAULTS) >= 40
     for fault in FAULTS.values():
         folder = fault.test.partition("--")[0]

@@ -9,8 +9,9 @@ import pytest
 
 from tests.drive.applications import ROOT, dodo, results
 from tests.drive.variants import registry, variant
+from tests.examples.ros import NODES, copy, needs_ros, run
 from tests.faulty.matrix import APPLICATION
-from tests.faulty.table import FAULTS, RANGES, Fault
+from tests.faulty.table import FAULTS, RANGES, ROS, Fault
 
 LONG = {"slow-computing", "slow-sleeping"}  # take half a minute each: scripts/kill-matrix runs them
 CAUGHT = sorted((fault for fault in FAULTS.values() if fault.name not in LONG), key=lambda fault: fault.name)
@@ -18,6 +19,9 @@ FEW = [FAULTS[name] for name in ("pedal-zero", "steering-whole-degrees", "wrong-
 """One of each kind, by each kind of evaluator."""
 FIRST_CID = 128
 SILENT = "4"  # tests at a time, as some of them only wait until an application has been silent for too long
+
+ROS_FEW = ("ros-frame-ignored", "ros-degrees", "ros-unstamped")
+SMALL_BUFFERS = "environment: {FASTDDS_BUILTIN_TRANSPORTS: 'UDPv4?max_msg_size=65500&sockets_size=65536'}"
 
 SHORTER = "12 s"  # for applications that stand still; the example needs 5.71 s
 
@@ -50,6 +54,28 @@ def test_faults_of_range_sensors_are_caught(tmp_path: Path, monkeypatch: pytest.
     application = Path(__file__).with_name("ranges.compose.yml")
     (good,) = caught(faults, specs, application, tmp_path / "report", monkeypatch)
     assert (good["slug"], good["outcome"]) == ("sil-closed-corridor", "passed"), good["reason"]
+
+
+@needs_ros
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", [name if name in ROS_FEW else pytest.param(name, marks=pytest.mark.proof) for name in sorted(ROS)]
+)
+def test_faults_of_ros_nodes_are_caught(name: str, tmp_path: Path) -> None:
+    fault = ROS[name]
+    application = fault.test.removeprefix("sil-")
+    folder = copy(application, tmp_path)
+    shutil.copy(Path(__file__).with_name("of_ros.py"), folder)
+    deployment, compose = folder / "dodo.yml", folder / "docker-compose.yml"
+    node = NODES[application]
+    deployment.write_text(deployment.read_text().replace(f"{node}.py]", f"of_ros.py, {node}, {name}]"))
+    if name == "ros-best-effort-lost":
+        compose.write_text(
+            compose.read_text().replace("network_mode: host", f"network_mode: host\n    {SMALL_BUFFERS}")
+        )
+    test = run(folder)
+    about = f"{test['reason']} {test['notes']}"
+    assert test["outcome"] == "failed" and re.search(fault.words, about), about
 
 
 def caught(

@@ -44,4 +44,5 @@ def test_the_page_has_marks_reasons_and_gaps(tmp_path: Path) -> None:
     assert "| `steering-nan` | Sends NaN | **F** | · |" in text
     assert "| `steering-nan` | `sil-open-straight` | steering was not a finite number in 55 samples |" in text
     assert "| perception | `steering-nan` | perception tests do not look at steering |" in text
-    assert page.of_ranges() in (ROOT / "docs" / "reference" / "kill-matrix.md").read_text(encoding="utf-8")
+    written = (ROOT / "docs" / "reference" / "kill-matrix.md").read_text(encoding="utf-8")
+    assert page.of_ranges() in written and page.of_ros() in written
