@@ -1,5 +1,6 @@
 """The tutorial and the page for existing projects are what happens."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.contributing.tutorial import Command, Edit, New, follow, steps
+from tests.examples.ros import PYTHON, needs_ros
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -17,6 +19,13 @@ DOCS = Path(__file__).parents[2] / "docs"
 @pytest.mark.parametrize("page", ["tutorial/python.md", "how-to/existing-project.md"])
 def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
     follow(DOCS / page, tmp_path, Path(sys.executable).parent)
+
+
+@needs_ros
+@pytest.mark.slow
+def test_the_page_for_ros_can_be_followed(tmp_path: Path) -> None:
+    shutil.copytree(PYTHON.parents[1], tmp_path / ".ros", symlinks=True, copy_function=os.link)
+    follow(DOCS / "tutorial" / "ros2.md", tmp_path, Path(sys.executable).parent)
 
 
 EXAMPLES = ["README.md", "docs/reference/language.md", "docs/reference/maps.md"]
