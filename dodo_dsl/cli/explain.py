@@ -171,11 +171,10 @@ def _lines(wiring: Wiring) -> Iterator[dict[str, Any]]:
 
 def _topic(topic: Resolved) -> dict[str, Any]:
     written = topic.written
-    direction = "in" if written.given else "out"
     return {
-        "topic": written.name,
-        "type": written.type,
-        "direction": direction,
+        "topic": written.topic.topic,
+        "type": written.topic.type,
+        "direction": "in" if written.given else "out",
         "node": topic.service,
         "bus": list(topic.bus),
     }

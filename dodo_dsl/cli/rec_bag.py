@@ -9,6 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+import msgspec
+
 from dodo_dsl import advice, atomic
 from dodo_dsl.atomic import refuse_existing
 from dodo_dsl.cli.display import progress_bar
@@ -102,15 +104,10 @@ def _of_application(what: str, messages: MessageSet | None = None) -> "tuple[lis
         return [], Types(messages=messages)
     checked = compiler.load([], services_only=True)
     declared = checked.application.declared.values() if checked.application else ()
-    topics = {topic.name: topic for each in declared if each for topic in each.topics}
+    topics = {each.topic.topic: each for one in declared if one for each in one.topics}
     known = [
-        Topic(
-            topic=name,
-            type=topic.type,
-            bus=tuple(word for word, _ in topic.messages if "." in word),
-            fields=dict(topic.fields),
-        )
-        for name, topic in topics.items()
+        msgspec.structs.replace(each.topic, bus=tuple(word for word, _ in each.messages if "." in word))
+        for each in topics.values()
     ]
     deployment = checked.deployment
     return known, Types(deployment.ros_types, messages or MessageSet.load(*deployment.messages))

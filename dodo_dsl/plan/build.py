@@ -21,7 +21,6 @@ from dodo_dsl.check.resolve import WITHOUT, ResolvedTest, isolation
 from dodo_dsl.check.senders import senders, truth
 from dodo_dsl.check.spec_rules import containers, resolved_goals
 from dodo_dsl.diagnostics import Span
-from dodo_dsl.opendlv.ros_types import RosGraph
 from dodo_dsl.plan import added_services, addresses
 from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.application import plan_application
@@ -231,19 +230,13 @@ class _Builder:
 
     def _bridge(self) -> Iterator[str]:
         """The flags of what stands between the bus and the application's ROS graph."""
-        resolved, services = self.test.wiring.topics, self.test.services
-        topics = tuple(ros_topics.topics(resolved))
-        given = {each.written.name: each for each in resolved if each.written.given}
-        yield from (f"--name={each.bus[0]}" for each in topics if (one := given.get(each.topic)) and one.is_picture)
-        graph = RosGraph(
-            given=tuple(each for each in topics if each.topic in given),
-            sent=tuple(each for each in topics if each.topic not in given),
-            frames=tuple(ros_topics.frames(resolved, services)),
-            services=ros_topics.by_topic(resolved),
-            types=dict(map(_ros_type, self.deployment.ros_types)),
-            messages="\n".join(path.read_text(encoding="utf-8") for path in self.deployment.messages),
-        )
-        yield f"--topics={msgspec.json.encode(graph).decode()}"
+        graph = ros_topics.graph(self.test.wiring.topics)
+        yield from (f"--name={topic.bus[0]}" for topic in graph.given if topic.camera)
+        own = {
+            "types": dict(map(_ros_type, self.deployment.ros_types)),
+            "messages": "\n".join(path.read_text(encoding="utf-8") for path in self.deployment.messages),
+        }
+        yield f"--topics={msgspec.json.encode(msgspec.structs.replace(graph, **own)).decode()}"
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)

@@ -26,7 +26,7 @@ from dodo_dsl.opendlv.ros_types import CLOCK, CLOCK_TYPE, RosGraph, Topic
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.ros_bridge.findings import Finding, Findings, end_of, frame_problem, loss, lost_datagrams, stamp_problem
-from services.ros_bridge.graph import BridgeError, Endpoint, Graph, readers_of, taken, write
+from services.ros_bridge.graph import BridgeError, Endpoint, Graph, taken, write
 
 START_PATIENCE = 5.0
 """Seconds for which the first picture and the first time wait for nodes that are to hear them."""
@@ -190,8 +190,9 @@ class Bridge:
         while True:
             self._graph.wait(LOOK)
             for given in self._given:
-                given.heard = readers_of(given.writer)
-            (self._clock_heard.set if readers_of(self._clock) else self._clock_heard.clear)()
+                given.heard = given.writer.get_publication_matched_status().current_count
+            is_heard = self._clock.get_publication_matched_status().current_count
+            (self._clock_heard.set if is_heard else self._clock_heard.clear)()
             if not self._ready.is_set() and self._is_met():
                 self._ready.set()
             for sent in self._sent:
@@ -199,9 +200,8 @@ class Bridge:
                     sent.reliable = all(each.reliable for each in self._seen.of(sent.topic.topic, True))
                     if not sent.reliable:
                         self._graph.drop(sent.reader)
-                        sent.reader = self._graph.reader(
-                            replace(end_of(sent.topic, False), reliable=False), sent.topic.depth
-                        )
+                        own = replace(end_of(sent.topic, False), reliable=False)
+                        sent.reader = self._graph.reader(own, sent.topic.depth)
                 for data in taken(sent.reader):
                     self._take(sent.topic, data)
             if time.monotonic() - looked >= LOOK:
@@ -263,5 +263,7 @@ def _guarded(work: Callable[[], None]) -> None:
         text = str(error)
     except OSError as error:
         text = f"the bus is lost: {error.strerror or error}"
+    except Exception as error:  # noqa: BLE001 - whatever it is, no other part can go on
+        text = f"{type(error).__name__}: {error}"
     print(f"ros-bridge: {text}", file=sys.stderr, flush=True)
     os._exit(1)

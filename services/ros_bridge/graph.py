@@ -32,10 +32,9 @@ _CONFIGURATION = """<CycloneDDS><Domain>
 <Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>
 </Domain></CycloneDDS>"""
 _NODES, _NODES_TYPE = "ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo"
-_ANY = 0x7F  # samples, whatever their state
 _KINDS = "Participant", "Publication", "Subscription"
-_AT_ONCE = 100
-_MOST = 10_000
+_ANY = 0x7F  # samples, whatever their state
+_AT_ONCE, _MOST = 100, 10_000
 PREFIX_BYTES = 12  # of a GUID: the participant's
 
 
@@ -194,10 +193,6 @@ def write(writer: Any, data: bytes) -> bool:
 def taken(reader: Any) -> list[bytes]:
     samples = ddspy_take(reader._ref, _ANY, _AT_ONCE)
     return [] if isinstance(samples, int) else [data for data, info in samples if info.valid_data]
-
-
-def readers_of(writer: Any) -> int:
-    return int(writer.get_publication_matched_status().current_count)
 
 
 def _endpoint(sample: Any, writes: bool) -> Endpoint:
