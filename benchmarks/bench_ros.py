@@ -4,21 +4,23 @@
 
 The node is the same. Ours go from shared memory to the node, and its Twist to the bus; theirs from one rclpy program to
 the other, by shared memory as Fast DDS has it by default. The processor time is that of the bridge, and of the program
-that sends. Then drives of the example in a minute. It needs a Python with rclpy, build/ros/bin/python or that in
+that sends. Then a drive of a shipped test. It needs a Python with rclpy, build/ros/bin/python or that in
 DODO_ROS_PYTHON, and network namespaces.
 """
 
 import json
 import os
+import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this checkout
 
-from players import ROOT, Measured
+from players import ROOT, Measured, finished
 
 from benchmarks.ledger.budget import Budget
 from benchmarks.ledger.row import Goal, Row, attempt, cost_row, plan, report
@@ -56,6 +58,49 @@ def alone(role: str) -> Round:
     done = subprocess.run(words, check=True, capture_output=True, text=True, timeout=60)
     times, cost = json.loads(done.stdout.splitlines()[-1])
     return times, cost
+
+
+TEST, APPLICATION = (
+    "sil-closed-straight",
+    """\
+services:
+  lane:
+    image: team/lane
+    x-dodo:
+      ros:
+        in: {/camera: {type: sensor_msgs/msg/Image, encoding: bgr8}}
+        out: {/cmd_vel: geometry_msgs/msg/Twist}
+    x-dodo-process: [v/bin/python, ros_node.py, drive]
+""",
+)
+
+
+def drive_row(rounds: list[tuple[float, float]]) -> Row:
+    """Seconds of a drive in lockstep, beside its own time."""
+    own, test = ([each[number] for each in rounds] for number in (0, 1))
+    return cost_row(f"ROS 2, {TEST} by Twist in lockstep", "s", own, "real time", test, goal=Goal(3))
+
+
+def drives(budget: Budget) -> None:
+    """The drive of a test, again and again, of an application beside a copy of the Python with rclpy."""
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as name:
+        folder = Path(name)
+        shutil.copytree(PYTHON.parent.parent, folder / "v", symlinks=True, copy_function=os.link)
+        shutil.copy(NODE, folder)
+        (folder / "compose.yml").write_text(APPLICATION)
+        (folder / "dodo.yml").write_text(f"dodo: 1\nregistry: [{ROOT / 'tests_registry'}]\napplication: compose.yml\n")
+        words = [sys.executable, "-m", "dodo_dsl", "run", TEST, "--report", "report"]
+        rounds: list[tuple[float, float]] = []
+        for _ in budget.rounds(ROUNDS):
+            if code := finished(words, folder):
+                raise RuntimeError(f"{TEST} ended with {code}")
+            (test,) = json.loads((folder / "report" / "results.json").read_text())["tests"]
+            rounds.append((test["execution_s"], test["sim_s"]))
+            report(drive_row(rounds))
+        alone, real = (statistics.median(column) for column in zip(*rounds, strict=True))
+        print(
+            f"{TEST}: {alone:.2f} s in lockstep, {real / alone:.1f} times real time, {60 / alone:.0f} drives a minute"
+        )
 
 
 def theirs() -> None:
@@ -112,19 +157,21 @@ def refusal() -> str:
 
 def main() -> int:
     budget = Budget.given()
-    plan(*rows([], []))
+    plan(*rows([], []), drive_row([]))
     if why_not := refusal():
-        plan(*rows([], []), note=why_not)
+        plan(*rows([], []), drive_row([]), note=why_not)
         print(f"not measured: {why_not}")
         return 0
     own: list[Round] = []
     other: list[Round] = []
     with attempt(*rows([], [])):
-        for _ in budget.rounds(ROUNDS):
+        for _ in budget.rounds(ROUNDS, until=0.6):
             own.append(alone("ours"))
             other.append(alone("theirs"))
             report(*rows(own, other))
-    for row in rows(own, other):
+    with attempt(drive_row([])):
+        drives(budget)
+    for row in rows(own, other) if own else ():
         print(f"{row.what}: {statistics.median(row.ours):.2f} ms, {PEER} {statistics.median(row.theirs):.2f} ms")
     return 0
 

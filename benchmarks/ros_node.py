@@ -1,4 +1,5 @@
-"""Programs with rclpy alone: ``node`` answers each picture by a Twist, ``pictures N`` sends N and waits for answers.
+"""Programs with rclpy alone: ``node`` answers each picture by a Twist, ``drive`` so that it stays on a shipped track,
+and ``pictures N`` sends N and waits for answers.
 
 They need no DoDo. ``pictures`` prints the times of its round trips and the processor time a picture, in ms, as JSON.
 """
@@ -8,6 +9,7 @@ import json
 import sys
 import time
 
+import numpy as np
 import rclpy
 from geometry_msgs.msg import Twist
 from rclpy.executors import ExternalShutdownException
@@ -24,6 +26,26 @@ def answer() -> None:
     def take(image: Image) -> None:
         twist = Twist()
         twist.linear.x = float(image.data[-1])
+        out.publish(twist)
+
+    node.create_subscription(Image, "/camera", take, 10)
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(node)
+
+
+def drive() -> None:
+    node = Node("lane")
+    out = node.create_publisher(Twist, "/cmd_vel", 10)
+
+    def middle(colour: np.ndarray, otherwise: float) -> float:
+        return float(np.nonzero(colour)[1].mean() / WIDTH - 0.5) if colour.any() else otherwise
+
+    def take(image: Image) -> None:
+        rows = np.frombuffer(bytes(image.data), np.uint8).reshape(image.height, image.width, 3)[280:340].astype(int)
+        blue, green, red = rows[..., 0], rows[..., 1], rows[..., 2]
+        twist = Twist()
+        twist.linear.x = 0.6
+        twist.angular.z = -3 * (middle(green - blue > 30, -0.5) + middle(blue - red > 30, 0.5))
         out.publish(twist)
 
     node.create_subscription(Image, "/camera", take, 10)
@@ -54,7 +76,7 @@ def pictures(count: int) -> None:
 
 
 rclpy.init()
-if sys.argv[1] == "node":
-    answer()
-else:
+if sys.argv[1] == "pictures":
     pictures(int(sys.argv[2]))
+else:
+    {"node": answer, "drive": drive}[sys.argv[1]]()
