@@ -47,6 +47,54 @@ def test_an_application_passes_its_test_the_same_way_each_time(name: str, times:
     assert found[0][1] > 30
 
 
+NEIGHBOUR = """
+import rclpy
+from geometry_msgs.msg import Twist
+rclpy.init()
+node, turn = rclpy.create_node("neighbour"), Twist()
+turn.angular.z = 3.0
+heard = node.create_subscription(Twist, "/cmd_vel", lambda twist: twist == turn or print(twist, flush=True), 10)
+publisher = node.create_publisher(Twist, "/cmd_vel", 10)
+node.create_timer(0.02, lambda: publisher.publish(turn))
+print("ready", flush=True)
+rclpy.spin(node)
+"""
+
+
+@needs_ros
+@pytest.mark.slow
+@pytest.mark.parametrize("at_once", [2, pytest.param(8, marks=pytest.mark.proof)])
+def test_no_graph_hears_another_one(at_once: int, tmp_path: Path) -> None:
+    """Tests at once, and a node on the host's network that steers on the same topic of the same domain."""
+    folder = copy("lane", tmp_path)
+    alone = run(folder)
+    environment = {**os.environ, "ROS_DOMAIN_ID": "0"}
+    words = [PYTHON, "-c", NEIGHBOUR]
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment
+    ) as neighbour:
+        assert neighbour.stdout and neighbour.stdout.readline() == "ready\n"
+        count = str(at_once)
+        dodo(folder, "run", "--repeat", count, "-j", count, "--report", "report")
+        neighbour.terminate()
+        assert neighbour.stdout.read() == ""
+    found = json.loads((folder / "report/results.json").read_text())["tests"]
+    assert len(found) == at_once
+    assert all((each["outcome"], each["checks"]) == ("passed", alone["checks"]) for each in found)
+
+
+@needs_ros
+@pytest.mark.slow
+def test_a_topic_that_nobody_hears_is_the_reason(tmp_path: Path) -> None:
+    folder = copy("lane", tmp_path)
+    deployment = folder / "dodo.yml"
+    deployment.write_text(deployment.read_text().replace("/camera/image_raw:", "/image:"))
+    test = run(folder)
+    remap = "'lane_follower' listens to /camera/image_raw: remap it (--ros-args -r /camera/image_raw:=/image)"
+    assert test["outcome"] == "failed"
+    assert test["reason"].startswith(f"nobody listens to /image (sensor_msgs/msg/Image); {remap}")
+
+
 @pytest.mark.parametrize("name", NODES)
 def test_nodes_know_nothing_of_dodo(name: str) -> None:
     """Neither they nor their compose files; what DoDo needs are a few lines of dodo.yml."""
