@@ -163,6 +163,7 @@ class Findings:
         self._left: dict[bytes, float] = {}
         self._lock = threading.RLock()
         self._changes, self._changed, self._first = 0, 0.0, 0.0
+        self._removals, self._removed = 0, 0.0
 
     def say(self, finding: Finding) -> None:
         with self._lock:
@@ -180,16 +181,19 @@ class Findings:
                 self._later.setdefault((kind, topic.topic), (topic, text))
 
     def look(self, now: float, last: bool = False) -> None:
-        """Judges the graph when it has settled, or at the ``last``; ``now`` in seconds."""
+        """Judges the graph when it has settled, or at the ``last`` unless it ends; ``now`` in seconds."""
         if not self._first or (self._seen.participants and not self._changes):
             self._first = now
         if self._seen.changes != self._changes:
             self._changes, self._changed = self._seen.changes, now
+        if self._seen.removals != self._removals:
+            self._removals, self._removed = self._seen.removals, now
         is_named = self._seen.participants <= self._seen.nodes.keys()
         if not last and now - self._changed < (SETTLED if is_named else NAMELESS):
             return
-        for finding in problems(self._graph, self._seen, now - self._first + last * PATIENCE):
-            self.say(finding)
+        if not last or now - self._removed >= SETTLED:
+            for finding in problems(self._graph, self._seen, now - self._first + last * PATIENCE):
+                self.say(finding)
         with self._lock:
             later, self._later = self._later, {}
         for key, (topic, text) in later.items():

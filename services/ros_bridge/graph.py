@@ -70,6 +70,7 @@ class Discovered:
     participants: set[bytes] = field(default_factory=set)
     left: set[bytes] = field(default_factory=set)
     changes: int = 0
+    removals: int = 0
 
     def add(self, endpoint: Endpoint) -> None:
         if len(self.endpoints) < _MOST:
@@ -165,9 +166,10 @@ class Graph:
         while samples := source.take(_AT_ONCE):
             for each in samples:
                 if each.key.bytes[:PREFIX_BYTES] != self._own:
-                    self.seen.changes += 1
                     info = each.sample_info
-                    yield each, info.valid_data and info.instance_state == InstanceState.Alive
+                    is_alive = info.valid_data and info.instance_state == InstanceState.Alive
+                    self.seen.changes, self.seen.removals = self.seen.changes + 1, self.seen.removals + (not is_alive)
+                    yield each, is_alive
 
     def _made(self, kind: Any, own: Endpoint, depth: int) -> Any:
         package, folder, name = own.type.split("/")

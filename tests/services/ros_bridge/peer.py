@@ -64,4 +64,6 @@ class Peer(Node):
 
 rclpy.init()
 with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-    rclpy.spin(Peer(sys.argv[1], json.loads(sys.argv[2])))
+    peer = Peer(sys.argv[1], json.loads(sys.argv[2]))
+    print(json.dumps({"node": sys.argv[1]}), flush=True)
+    rclpy.spin(peer)

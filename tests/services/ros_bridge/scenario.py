@@ -10,14 +10,17 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from dodo_dsl.opendlv.ros_types import STATIC_FRAMES, STATIC_FRAMES_TYPE, RosGraph
+from dodo_dsl.opendlv.ros_messages import Types
+from dodo_dsl.opendlv.ros_types import NODE_ENVIRONMENT, STATIC_FRAMES, STATIC_FRAMES_TYPE, RosGraph
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
+from services.ros_bridge.graph import Endpoint, Graph, taken, write
 
 ROOT = Path(__file__).parents[3]
 PYTHON = Path(os.environ.get("DODO_ROS_PYTHON") or ROOT / "build/ros/bin/python")
@@ -36,7 +39,7 @@ class Scenario(msgspec.Struct, kw_only=True):
     messages: list[tuple[str, int, dict[str, Any]]] = []
     size: tuple[int, int] = (WIDTH, HEIGHT)
     seconds: float = 4.0
-    environment: dict[str, str] = {}
+    environment: dict[str, str] | None = None
     leaves: str = ""
     """A peer that is ended after half of the time."""
     raw: list[tuple[str, str, str, int]] = []
@@ -69,17 +72,9 @@ def refusal() -> str:
 
 
 def played(scenario: Scenario) -> Played:
-    words = [sys.executable, str(Path(__file__))]
-    shell = [*NAMESPACES, "sh", "-c", f'{NETWORK} && exec "$@"', "sh", *words]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        shell,
-        input=msgspec.json.encode(scenario),
-        capture_output=True,
-        timeout=PATIENCE_S + scenario.seconds,
-        env=environment,
-        check=False,
-    )
+    shell = [*NAMESPACES, "sh", "-c", f'{NETWORK} && exec "$@"', "sh", sys.executable, __file__]
+    given: dict[str, Any] = {"input": msgspec.json.encode(scenario), "env": {**os.environ, "PYTHONPATH": str(ROOT)}}
+    done = subprocess.run(shell, capture_output=True, timeout=PATIENCE_S + scenario.seconds, check=False, **given)
     assert done.returncode == 0, done.stderr.decode()
     return msgspec.json.decode(done.stdout, type=Played)
 
@@ -97,26 +92,26 @@ def _main(scenario: Scenario) -> Played:
         names = [f"--name={name}"] if "MEMORY" in graph else []
         words = [sys.executable, "-m", "services.ros_bridge", f"--cid={CID}", f"--topics={graph}", *names]
         with places["bridge"].open("w") as out, places["log"].open("w") as log:
-            bridge = subprocess.Popen(
-                [word.replace("MEMORY", name) for word in words], cwd=ROOT, stdout=out, stderr=log
-            )
+            words = [word.replace("MEMORY", name) for word in words]
+            bridge = subprocess.Popen(words, cwd=ROOT, stdout=out, stderr=log)
         peers = {
             who: subprocess.Popen(
                 [PYTHON, Path(__file__).with_name("peer.py"), who, json.dumps(endpoints)],
                 stdout=places[who].open("w"),
-                env={**os.environ, "PYTHONPATH": "", **scenario.environment},
+                env={**os.environ, "PYTHONPATH": "", **(NODE_ENVIRONMENT if scenario.environment is None else {})},
             )
             for who, endpoints in scenario.peers.items()
         }
         sent: list[tuple[str, int, int, str]] = []
         threading.Thread(target=_listen, args=(sent,), daemon=True).start()
+        _await(lambda: all(places[who].stat().st_size for who in peers))
         pictures, begin, is_over = 0, time.monotonic(), False
         while time.monotonic() - begin < scenario.seconds and bridge.poll() is None:
             if not is_over and time.monotonic() - begin > scenario.seconds / 2:
                 is_over = True
                 if scenario.leaves:
                     peers[scenario.leaves].terminate()
-                _shout(scenario.raw)
+                _shout(scenario.raw, Graph(Types()))
                 if scenario.loses_memory:
                     memory.close()
                     names = []
@@ -131,14 +126,14 @@ def _main(scenario: Scenario) -> Played:
                     memory.notify_all()
                 pictures += 1
             time.sleep(0.05)
-        frames = _frames(scenario.graph)
+        frames = _frames(Graph(Types())) if scenario.graph.frames else []
         bridge.terminate()
         code = bridge.wait(PATIENCE_S)
         for peer in peers.values():
             peer.kill()
         lines = [json.loads(line) for line in places["bridge"].read_text().splitlines()]
         return Played(
-            heard=[json.loads(line) for who in peers for line in places[who].read_text().splitlines()],
+            heard=[json.loads(line) for who in peers for line in places[who].read_text().splitlines()[1:]],
             sent=sent,
             findings=[(line["severity"], line["finding"]) for line in lines],
             code=code,
@@ -148,39 +143,28 @@ def _main(scenario: Scenario) -> Played:
         )
 
 
-def _shout(raw: list[tuple[str, str, str, int]]) -> None:
+def _shout(raw: list[tuple[str, str, str, int]], joined: Graph) -> None:
     """Bytes on topics, whatever they are."""
-    if not raw:
-        return
-    from dodo_dsl.opendlv.ros_messages import Types
-    from services.ros_bridge.graph import Endpoint, Graph, write
-
-    joined = Graph(Types())
     for topic, type_, data, often in raw:
         writer = joined.writer(Endpoint(b"", topic, type_, True), 1000)
-        end = time.monotonic() + PATIENCE_S / 3
-        while not writer.get_matched_subscriptions() and time.monotonic() < end:
-            time.sleep(0.01)
+        _await(writer.get_matched_subscriptions)
         for _ in range(often):
             write(writer, bytes.fromhex(data))
         time.sleep(0.5)
 
 
-def _frames(graph: RosGraph) -> list[str]:
+def _frames(joined: Graph) -> list[str]:
     """What somebody who comes late hears on /tf_static."""
-    if not graph.frames:
-        return []
-    from dodo_dsl.opendlv.ros_messages import Types
-    from services.ros_bridge.graph import Endpoint, Graph, taken
-
-    joined = Graph(Types())
     reader = joined.reader(Endpoint(b"", STATIC_FRAMES, STATIC_FRAMES_TYPE, False, durable=True))
+    found = Types().decode(STATIC_FRAMES_TYPE, _await(lambda: taken(reader))[0])
+    return [each["child_frame_id"] for each in found["transforms"]]
+
+
+def _await(what: Callable[[], Any]) -> Any:
     end = time.monotonic() + PATIENCE_S / 3
-    while time.monotonic() < end:
-        for data in taken(reader):
-            return [each["child_frame_id"] for each in Types().decode(STATIC_FRAMES_TYPE, data)["transforms"]]
+    while not (found := what()) and time.monotonic() < end:
         time.sleep(0.05)
-    return []
+    return found
 
 
 def _listen(sent: list[tuple[str, int, int, str]]) -> None:
