@@ -28,6 +28,7 @@ from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.ros_bridge.findings import Finding, Findings, end_of, frame_problem, loss, lost_datagrams, stamp_problem
 from services.ros_bridge.graph import BridgeError, Endpoint, Graph, taken, write
 
+_ENDS = {signal.SIGTERM, signal.SIGINT}
 START_PATIENCE = 5.0
 """Seconds for which the first picture and the first time wait for nodes that are to hear them."""
 CLOCK_STEP = 10_000
@@ -98,10 +99,12 @@ class Bridge:
 
     def run(self) -> NoReturn:
         """Until SIGTERM ends it, or the bus or a memory is lost."""
-        signal.signal(signal.SIGTERM, self._end)
-        signal.signal(signal.SIGINT, self._end)
+        for number in _ENDS:
+            signal.signal(number, self._end)
+        signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)  # this thread alone takes them, also when it waits for its turn
         for work in (self._hear_graph, self._give_time, *(partial(self._show, name) for name in self._names)):
             threading.Thread(target=_guarded, args=(work,), daemon=True).start()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
         _guarded(self._hear_bus)
         raise AssertionError
 
