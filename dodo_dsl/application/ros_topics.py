@@ -84,7 +84,7 @@ _DOMAINS = 102
 def variables(cid: int, *, own_network: bool) -> tuple[dict[str, str], dict[str, str]]:
     """Environment variables of all nodes of a test: those that it sets, and those that a service may set otherwise.
 
-    On the host's network, tests have domains of their own.
+    On the host's network, each test has another domain.
     """
     return {**_GRAPH, "ROS_DOMAIN_ID": "0" if own_network else str(cid % _DOMAINS)}, dict(NODE_ENVIRONMENT)
 
