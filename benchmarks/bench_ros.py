@@ -53,7 +53,7 @@ def rows(ours: list[Round], theirs: list[Round]) -> list[Row]:
 
 
 def alone(role: str) -> Round:
-    """A round in a network of its own."""
+    """A round in its own network."""
     words = [*NAMESPACES, "sh", "-c", f'{NETWORK} && exec "$@"', "sh", sys.executable, __file__, role]
     done = subprocess.run(words, check=True, capture_output=True, text=True, timeout=60)
     times, cost = json.loads(done.stdout.splitlines()[-1])

@@ -28,7 +28,7 @@ def main(arguments: list[str]) -> str:
             bridge = Bridge(flags.cid, topics, Path(folder), flags.name)
         bridge.run()
     except msgspec.DecodeError as error:
-        return f"--topics is no graph: {error}"
+        return f"--topics has no RosGraph: {error}"
     except (RosTypeError, SessionError, ValueError) as error:  # also of the graph, messages and their files
         return str(error)
 

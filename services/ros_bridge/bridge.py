@@ -1,7 +1,7 @@
 """Between the test's bus and shared memories and the application's ROS graph.
 
-One thread takes messages of the bus, one each a memory's pictures, one what the graph sends and tells, one gives the
-time. The bridge has the application's clock, so that its times are those of frames and messages.
+One thread takes messages of the bus, one each a memory's pictures, one what the graph sends, and one gives the time.
+The bridge has the application's clock, so that its times are those of frames and messages.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ class Given:
 
 @dataclass
 class Sent:
-    """A topic that the application publishes."""
+    """A topic that the application publishes, and whether all do so reliably."""
 
     topic: Topic
     reader: Any
@@ -114,12 +114,10 @@ class Bridge:
         os._exit(0)
 
     def _giving(self, topic: Topic) -> Given:
-        keys = {} if is_picture(topic) else {name: self._session.messages.key(name) for name in topic.bus}
-        return Given(
-            topic,
-            self._graph.writer(end_of(topic, True), topic.depth),
-            {name.partition("/")[0]: (id_, at or 0) for name, (id_, at) in keys.items()},
-        )
+        names = () if is_picture(topic) else topic.bus
+        keys = ((name.partition("/")[0], *self._session.messages.key(name)) for name in names)
+        writer = self._graph.writer(end_of(topic, True), topic.depth)
+        return Given(topic, writer, {name: (id_, stamp or 0) for name, id_, stamp in keys})
 
     def _hear_bus(self) -> None:
         """Publishes a topic when each of its messages has come again."""
@@ -212,7 +210,7 @@ class Bridge:
                 self._look()
 
     def _is_met(self) -> bool:
-        """Whether all readers are met that discovery tells of, and the application's services have a program each."""
+        """Whether all readers are met that were discovered, and the application's services have a program each."""
         services = {name for names in self._topics.services.values() for name in names}
         shown = {given.topic.bus[0] for given in self._given if given.heard and is_picture(given.topic)}
         for given in self._given:
@@ -264,9 +262,7 @@ def _guarded(work: Callable[[], None]) -> None:
         work()
     except (BridgeError, SharedMemoryError, PixelError, RosTypeError) as error:
         text = str(error)
-    except OSError as error:
-        text = f"the bus is lost: {error.strerror or error}"
     except Exception as error:  # noqa: BLE001 - whatever it is, no other part can go on
-        text = f"{type(error).__name__}: {error}"
+        text = f"the bus or the graph is lost ({type(error).__name__}: {error})"
     print(f"ros-bridge: {text}", file=sys.stderr, flush=True)
     os._exit(1)

@@ -13,11 +13,11 @@ from dodo_dsl.opendlv.ros_types import RosGraph, Topic
 from services.ros_bridge.graph import PREFIX_BYTES, Discovered, Endpoint, listed
 
 SETTLED, NAMELESS = 1.0, 5.0
-"""Seconds without a change of the graph after which it is judged; nodes may tell their names late."""
+"""Seconds without a change of the graph after which it is judged; nodes may give their names late."""
 PATIENCE, ALONE = 3.0, 15.0
 """Seconds for which a topic may lack its other end, and a graph any node."""
 AGE, AHEAD, ANOTHER_CLOCK = 2.0, 0.2, 600.0
-"""Seconds by which a stamp may lie before and after its message's arrival, and those that tell another clock."""
+"""Seconds by which a stamp may lie before and after its message's arrival, and those of another clock."""
 _NEAR = 0.6
 _MOST = 100
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -105,10 +105,8 @@ def _missing(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
 def _nearest(topic: Topic, others: Iterable[Endpoint]) -> Endpoint | None:
     """Of the same type, or else of nearly the same name."""
 
-    def nearness(other: Endpoint) -> tuple[bool, float, str]:
-        return other.type == topic.type, SequenceMatcher(None, topic.topic, other.topic).ratio(), other.topic
-
-    return max((each for each in others if nearness(each) >= (False, _NEAR, "")), key=nearness, default=None)
+    ranked = ((e.type == topic.type, SequenceMatcher(None, topic.topic, e.topic).ratio(), e.topic, e) for e in others)
+    return max((each for each in ranked if each >= (False, _NEAR)), key=lambda each: each[:3], default=(None,))[-1]
 
 
 def frame_problem(topic: Topic, frame_id: str, expected: str) -> str:

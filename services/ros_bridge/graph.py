@@ -1,4 +1,4 @@
-"""The application's ROS graph by DDS: writers and readers of raw CDR, and what discovery tells.
+"""The application's ROS graph by DDS: writers and readers of raw CDR, and discovery.
 
 On DDS a topic ``/camera`` is ``rt/camera``, a type ``a/msg/B`` is ``a::msg::dds_::B_``. Cyclone takes a type by its
 name alone, so that bytes pass as they are. ``ros_discovery_info`` says which node has which endpoints.
@@ -62,7 +62,7 @@ class Endpoint:
 
 @dataclass
 class Discovered:
-    """What discovery has told, at most so much; ``nodes`` by their participants, also of those that have ``left``."""
+    """What was discovered, at most so much; ``nodes`` by their participants, also of those that have ``left``."""
 
     endpoints: dict[bytes, Endpoint] = field(default_factory=dict)
     names: dict[bytes, str] = field(default_factory=dict)
@@ -117,23 +117,22 @@ class Graph:
             self._participant = DomainParticipant(domain)
             self._waits = WaitSet(self._participant)
             kinds = (getattr(builtin, f"BuiltinTopicDcps{name}") for name in _KINDS)
-            self._told = [builtin.BuiltinDataReader(self._participant, kind) for kind in kinds]
-            for each in self._told:
+            self._discovery = [builtin.BuiltinDataReader(self._participant, kind) for kind in kinds]
+            for each in self._discovery:
                 self._waits.attach(ReadCondition(each, _ANY))
         except DDSException as error:
             raise BridgeError(f"the ROS graph cannot be joined: {error} Is there a network with multicast?") from None
         self._own = self._participant.get_guid().bytes[:PREFIX_BYTES]
         self._nodes = self.reader(Endpoint(b"", _NODES, _NODES_TYPE, False, durable=True), _AT_ONCE)
 
-    def writer(self, own: Endpoint, depth: int = 10) -> Any:
-        """Of a ROS topic; a durable one gives a reader that comes late the last messages."""
+    def writer(self, own: Endpoint, depth: int) -> Any:
         writer = self._made(DataWriter, own, depth)
         writer.set_status_mask(DDSStatus.PublicationMatched)
         self._waits.attach(writer)
         return writer
 
-    def reader(self, own: Endpoint, depth: int = 10) -> Any:
-        """Of a ROS topic; one that is not reliable hears both kinds of writers."""
+    def reader(self, own: Endpoint, depth: int) -> Any:
+        """One that is not reliable hears both kinds of writers."""
         reader = self._made(DataReader, own, depth)
         reader.condition = ReadCondition(reader, _ANY)
         self._waits.attach(reader.condition)
@@ -147,7 +146,7 @@ class Graph:
     def wait(self, seconds: float) -> None:
         """Until something is heard, discovered or matched, at most so long; then ``seen`` has what came and went."""
         self._waits.wait(duration(seconds=seconds))
-        for number, source in enumerate(self._told):
+        for number, source in enumerate(self._discovery):
             for each, is_alive in self._taken(source):
                 key = each.key.bytes
                 if number == 0:
@@ -162,24 +161,21 @@ class Graph:
             self.seen.changes += 1
 
     def _taken(self, source: builtin.BuiltinDataReader) -> Iterator[tuple[Any, bool]]:
-        """What discovery tells of others, and whether they are alive."""
+        """What was discovered of others, and whether they are alive."""
         while samples := source.take(_AT_ONCE):
             for each in samples:
                 if each.key.bytes[:PREFIX_BYTES] != self._own:
-                    info = each.sample_info
-                    is_alive = info.valid_data and info.instance_state == InstanceState.Alive
-                    self.seen.changes, self.seen.removals = self.seen.changes + 1, self.seen.removals + (not is_alive)
+                    is_alive = each.sample_info.valid_data and each.sample_info.instance_state == InstanceState.Alive
+                    self.seen.changes += 1
+                    self.seen.removals += not is_alive
                     yield each, is_alive
 
     def _made(self, kind: Any, own: Endpoint, depth: int) -> Any:
         package, folder, name = own.type.split("/")
         shape = make_idl_struct(f"{name}_", f"{package}::{folder}::dds_::{name}_", {"x": uint8})
-        blocked, lasting = duration(milliseconds=100), Policy.Durability
-        qos = Qos(
-            Policy.Reliability.Reliable(blocked) if own.reliable else Policy.Reliability.BestEffort,
-            lasting.TransientLocal if own.durable else lasting.Volatile,
-            Policy.History.KeepLast(depth),
-        )
+        kept, sure, lasting = Policy.History.KeepLast(depth), Policy.Reliability, Policy.Durability
+        how = sure.Reliable(duration(milliseconds=100)) if own.reliable else sure.BestEffort
+        qos = Qos(how, lasting.TransientLocal if own.durable else lasting.Volatile, kept)
         try:
             on: Any = Topic(self._participant, f"rt{own.topic}" if own.topic != _NODES else _NODES, shape)
             return kind(self._participant, on, qos)

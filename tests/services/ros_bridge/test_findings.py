@@ -1,4 +1,4 @@
-"""What is said of a graph, by what discovery told; and what strangers' messages do."""
+"""What is said of a graph, by what was discovered; and what strangers' messages do."""
 
 import json
 from pathlib import Path
