@@ -155,7 +155,7 @@ def _shout(raw: list[tuple[str, str, str, int]], joined: Graph) -> None:
 
 def _frames(joined: Graph) -> list[str]:
     """What somebody who comes late hears on /tf_static."""
-    reader = joined.reader(Endpoint(b"", STATIC_FRAMES, STATIC_FRAMES_TYPE, False, durable=True))
+    reader = joined.reader(Endpoint(b"", STATIC_FRAMES, STATIC_FRAMES_TYPE, False, durable=True), 1)
     found = Types().decode(STATIC_FRAMES_TYPE, _await(lambda: taken(reader))[0])
     return [each["child_frame_id"] for each in found["transforms"]]
 
