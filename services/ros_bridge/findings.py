@@ -98,13 +98,12 @@ def _missing(graph: RosGraph, seen: Discovered) -> Iterator[Finding]:
                 yield Finding(key, f"{lack}; {seen.name(other)} {verb} {other.topic}{of}: {remap}")
             elif topic.type != _CAMERA_INFO:
                 names = listed({f"'{name}'" for each in seen.participants for name in seen.nodes.get(each, ())})
-                severity = "warning" if given and is_heard else "error"
-                yield Finding(key, lack if given and is_heard else f"{lack}; the graph has {names}", severity)
+                rest = f"; the graph has {names or 'a node without a name'}"
+                yield Finding(key, lack, "warning") if given and is_heard else Finding(key, lack + rest)
 
 
 def _nearest(topic: Topic, others: Iterable[Endpoint]) -> Endpoint | None:
     """Of the same type, or else of nearly the same name."""
-
     ranked = ((e.type == topic.type, SequenceMatcher(None, topic.topic, e.topic).ratio(), e.topic, e) for e in others)
     return max((each for each in ranked if each >= (False, _NEAR)), key=lambda each: each[:3], default=(None,))[-1]
 
