@@ -3,6 +3,7 @@
 ``given`` makes the fields of a ROS message that an application gets, ``sent`` the messages that one of its own becomes.
 """
 
+import copy
 import functools
 import math
 import operator
@@ -12,28 +13,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dodo_dsl.opendlv import ros_fields as ros
+from dodo_dsl.opendlv import ros_types as ros
 from dodo_dsl.opendlv.attitude import heading_of, quaternion
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.ros_codec import Codec, Fields, RosTypeError, require_ros
+from dodo_dsl.opendlv.ros_fields import CONSTANTS, PATHS
 from dodo_dsl.opendlv.ros_pictures import PICTURES, CameraPicture, encoding_of, picture_fields
-from dodo_dsl.opendlv.ros_types import CLOCK_TYPE, NUMBERS, POSE_ESTIMATE, CameraView, StaticFrame, Topic
+from dodo_dsl.opendlv.ros_types import StaticFrame, Topic
 
 __all__ = ["BusMessage", "CameraPicture", "RosTypeError", "Types", "messages_of", "require_ros", "stamp_of", "time_of"]
 
 MICROSECONDS = 1_000_000
-_BOX, _PROPERTY, _CLASS = (f"opendlv.logic.perception.Detection{name}" for name in ("BoundingBox", "Property", "Type"))
-_DECIMAL = ("float", "double")
-_LATEST = 2**31 * MICROSECONDS
 
 
 class BusMessage(NamedTuple):
-    """A message for the bus: its full name, sender stamp, sample time in us and fields."""
+    """A message for the bus, its sample time in us and its sender stamp."""
 
-    name: str
-    stamp: int
+    message: Any
     sample_time: int
-    fields: Fields
+    stamp: int
 
 
 class Types(Codec):
@@ -51,14 +49,16 @@ class Types(Codec):
         self.fields(topic.type)
         if topic.type in PICTURES:
             encoding_of(topic)
-        if topic.type in (*PICTURES, ros.CAMERA_INFO, CLOCK_TYPE):
+        if topic.type in (*PICTURES, ros.CAMERA_INFO, ros.DETECTIONS):
             return
         used: set[str] = set()
         for name, _ in messages_of(topic):
-            for field, path in self._paths(topic, name).items():
+            if not (paths := self._paths(topic, name)):
+                raise RosTypeError(f"{topic.topic}: {topic.type} says nothing of {name} by itself, name its 'fields'")
+            for path in paths.values():
                 self.check_path(topic.type, path)
-                used.add(field)
-        if topic.type != ros.DETECTIONS and (left := topic.fields.keys() - used):
+            used |= paths.keys()
+        if left := topic.fields.keys() - used:
             raise RosTypeError(f"{topic.topic}: no message of {', '.join(topic.bus)} has the field '{min(left)}'")
 
     def given(
@@ -66,30 +66,33 @@ class Types(Codec):
     ) -> Fields:
         """The fields of a topic's message, made of the newest messages of the bus by their full names, or a picture.
 
-        ``time_us`` is the sample time, and becomes the stamp.
+        ``time_us`` is the sample time, and becomes the stamp. Of detections there are lists of messages.
         """
-        if topic.type == CLOCK_TYPE:
-            return {"clock": stamp_of(time_us)}
+        fields = copy.deepcopy(dict(CONSTANTS.get(topic.type, {}))) | self.given_header(topic, time_us)
         if topic.type in (*PICTURES, ros.CAMERA_INFO):
-            return self.given_header(topic, time_us) | picture_fields(topic, picture)
-        fields = _copied(ros.CONSTANTS.get(topic.type, {})) | self.given_header(topic, time_us)
-        names = [name for name, _ in messages_of(topic)]
-        for name in names:
+            return fields | picture_fields(topic, picture)
+        if topic.type == ros.DETECTIONS:
+            return fields | {"detections": list(_given_detections(topic, messages))}
+        for name, _ in messages_of(topic):
             if name not in messages:
-                raise RosTypeError(f"{topic.topic} is made of {' and '.join(names)}: there is no {name} yet")
+                raise RosTypeError(f"{topic.topic} is made of {name}, too: there is none yet")
             for field, path in self._paths(topic, name).items():
-                _put(fields, path, _to_ros(name, field, getattr(messages[name], field)))
-        return _completed(topic, fields, names)
+                *above, last = path.split(".")
+                inner = functools.reduce(lambda at, part: at.setdefault(part, {}), above, fields)
+                inner[last] = _to_ros(path, getattr(messages[name], field))
+        if topic.type == ros.LASER_SCAN and "ranges" in fields:
+            count = max(len(fields["ranges"]) - 1, 0)
+            fields["angle_max"] = fields["angle_min"] + fields["angle_increment"] * count
+        return fields
 
     def sent(self, topic: Topic, fields: Mapping[str, Any], received_us: int) -> list[BusMessage]:
         """The messages that a ROS message becomes, with the time of its stamp, or of receipt where it has none."""
-        time = time_of(fields) if self.has_header(topic.type) else 0
-        time = time or received_us
+        time = (time_of(fields) if self.has_header(topic.type) else 0) or received_us
+        stamps = dict(messages_of(topic))
         if topic.type == ros.DETECTIONS:
-            return list(_detections(topic, fields, time))
-        unknown = _not_measured(topic, fields)
-        bus = ((name, stamp) for name, stamp in messages_of(topic) if name not in unknown)
-        return [BusMessage(name, stamp, time, self._values(topic, name, fields)) for name, stamp in bus]
+            made = _sent_detections(topic, fields["detections"], stamps)
+            return [BusMessage(self.messages.type(name)(**values), time, stamps[name]) for name, values in made]
+        return [BusMessage(self._message(topic, name, fields), time, stamp) for name, stamp in stamps.items()]
 
     def frames(self, frames: Sequence[StaticFrame], time_us: int) -> Fields:
         """The message of ``/tf_static``."""
@@ -119,28 +122,30 @@ class Types(Codec):
         except MessageError as error:
             raise RosTypeError(f"{topic.topic}: {error}") from None
         own = {field: path for field, path in topic.fields.items() if field in known}
-        if topic.type in NUMBERS and not own:
+        if topic.type in ros.NUMBERS and not own:
             if len(known) != 1:
                 raise RosTypeError(f"{topic.topic}: {name} has {len(known)} fields, expected 'fields' to say which")
             return dict.fromkeys(known, "data")
-        return {**ros.PATHS.get((topic.type, name), {}), **own}
+        return {**PATHS.get((topic.type, name), {}), **own}
 
-    def _values(self, topic: Topic, name: str, fields: Mapping[str, Any]) -> Fields:
-        paths = self._paths(topic, name)
-        if not paths:
-            raise RosTypeError(f"{topic.topic}: {topic.type} does not become {name} by itself, name its 'fields'")
+    def _message(self, topic: Topic, name: str, fields: Mapping[str, Any]) -> Any:
+        message = self.messages.type(name)()
         types = {each.name: each.type for each in self.messages.layout(name).definition.fields}
-        found: Fields = {}
-        for field, path in paths.items():
-            value = functools.reduce(operator.getitem, path.split("."), fields)
-            found[field] = _of_ros(name, field, types[field], value, f"{path} of {topic.topic}")
-        return _unit(found, topic) if name == POSE_ESTIMATE else found
+        for field, path in self._paths(topic, name).items():
+            found = functools.reduce(operator.getitem, path.split("."), fields)
+            value = _of_ros(path, found)
+            if isinstance(value, bool | float) and types[field] not in ("float", "double") and value % 1 == 0:
+                value = int(value)
+            try:
+                setattr(message, field, value)
+            except (TypeError, ValueError):
+                known = f"{name}.{field} ({types[field]})"
+                raise RosTypeError(f"{path} of {topic.topic} is {found!r:.60}, which {known} cannot be") from None
+        return message
 
 
 def stamp_of(time_us: int) -> dict[str, int]:
     """A time in us as ROS has it."""
-    if not 0 <= time_us < _LATEST:
-        raise RosTypeError(f"{time_us} us is not a time of ROS, expected 1970 to 2038")
     seconds, rest = divmod(time_us, MICROSECONDS)
     return {"sec": seconds, "nanosec": rest * 1000}
 
@@ -158,108 +163,58 @@ def messages_of(topic: Topic) -> Iterator[tuple[str, int]]:
         yield name, int(stamp or 0)
 
 
-def _copied(constants: Mapping[str, Any]) -> Fields:
-    return {name: _copied(each) if isinstance(each, Mapping) else each for name, each in constants.items()}
-
-
-def _put(fields: Fields, path: str, value: Any) -> None:
-    *above, last = path.split(".")
-    for name in above:
-        fields = fields.setdefault(name, {})
-    fields[last] = value
-
-
-def _to_ros(name: str, field: str, value: Any) -> Any:
-    if (name, field) == (ros.SCAN, "ranges"):
-        if len(value) % 4:
-            raise RosTypeError(f"{name}.{field} has {len(value)} bytes, expected 4 for each range")
-        return np.frombuffer(value, "<f4")
-    _refuse_not_finite(name, field, value, f"{name}.{field}")
-    if (name, field) == (ros.ODOMETRY, "yaw"):
+def _to_ros(path: str, value: Any) -> Any:
+    if path == "pose.pose.orientation":
         return dict(zip("xyzw", quaternion(0.0, 0.0, value), strict=True))
+    return np.frombuffer(value, "<f4") if isinstance(value, bytes) else value
+
+
+def _of_ros(path: str, value: Any) -> Any:
+    if isinstance(value, dict) and value.keys() == set("xyzw"):
+        return heading_of(*(value[axis] for axis in "xyzw"))
+    if isinstance(value, np.ndarray):
+        return value.astype("<f4").tobytes()
+    if isinstance(value, float) and math.isnan(value):
+        return 0.0 if path == "altitude" else None
     return value
 
 
-def _of_ros(name: str, field: str, type_: str, value: Any, place: str) -> Any:
-    if (name, field) == (ros.SCAN, "ranges"):
-        return np.asarray(value, "<f4").tobytes()
-    if (name, field) == (ros.ODOMETRY, "yaw"):
-        heading = heading_of(*(value[axis] for axis in "xyzw"))
-        if heading is None:
-            raise RosTypeError(f"{place} is not an attitude: its length is 0, or not finite")
-        return heading
-    if (name, field) == (ros.GEOLOCATION, "altitude") and math.isnan(value):
-        return 0.0
-    _refuse_not_finite(name, field, value, place)
-    is_text = type_ == "string"
-    if is_text != isinstance(value, str) or (not is_text and type_ not in _DECIMAL and value != int(value)):
-        raise RosTypeError(f"{place} is {value!r:.60}, and {name}.{field} is {type_}")
-    return value if is_text else float(value) if type_ in _DECIMAL else int(value)
+def _given_detections(topic: Topic, messages: Mapping[str, Any]) -> Iterator[Fields]:
+    """Boxes in pixels with their class; its score is 1, as the bus has none."""
+    width, height = _pixels(topic)
+    labels = {each.detectionId: str(each.type) for each in messages.get(ros.CLASS, ())}
+    labels |= {each.detectionId: each.property for each in messages.get(ros.PROPERTY, ())}
+    for box in messages.get(ros.BOX, ()):
+        center = {"x": (box.x + box.width / 2) * width, "y": (box.y + box.height / 2) * height}
+        bbox = {"center": {"position": center}, "size_x": box.width * width, "size_y": box.height * height}
+        label = labels.get(box.detectionId)
+        yield {"bbox": bbox, "results": [{"hypothesis": {"class_id": label, "score": 1.0}}] if label else []}
 
 
-def _refuse_not_finite(name: str, field: str, value: Any, place: str) -> None:
-    if not isinstance(value, float | np.floating) or math.isfinite(value):
-        return
-    if math.isnan(value) or (name, field) not in ros.MAY_BE_INFINITE:
-        raise RosTypeError(f"{place} is {value}, not a finite number")
-
-
-def _completed(topic: Topic, fields: Fields, names: Sequence[str]) -> Fields:
-    if topic.type == ros.LASER_SCAN and "ranges" in fields:
-        last = max(len(fields["ranges"]) - 1, 0)
-        fields["angle_max"] = fields["angle_min"] + fields["angle_increment"] * last
-        fields["scan_time"] = 1 / topic.rate if topic.rate else 0.0
-    for name, covariance in _COVARIANCES.items():
-        if topic.type == ros.IMU and name not in names:
-            fields[covariance] = ros.UNKNOWN
-    return fields
-
-
-_COVARIANCES = {ros.ANGULAR: "angular_velocity_covariance", ros.ACCELERATION: "linear_acceleration_covariance"}
-
-
-def _not_measured(topic: Topic, fields: Mapping[str, Any]) -> list[str]:
-    """The messages of which an Imu has nothing, as its covariances say."""
-    return [name for name, each in _COVARIANCES.items() if topic.type == ros.IMU and fields[each][0] == -1]
-
-
-def _unit(found: Fields, topic: Topic) -> Fields:
-    """An estimate with a quaternion of length 1."""
-    length = math.hypot(*(found[f"q{axis}"] for axis in "xyzw"))
-    if not length:
-        raise RosTypeError(f"the orientation of {topic.topic} is 0, expected a unit quaternion")
-    return found if abs(length - 1) < 1e-6 else found | {f"q{axis}": found[f"q{axis}"] / length for axis in "xyzw"}
-
-
-def _detections(topic: Topic, fields: Mapping[str, Any], time: int) -> Iterator[BusMessage]:
+def _sent_detections(
+    topic: Topic, detections: Sequence[Fields], wanted: Mapping[str, int]
+) -> Iterator[tuple[str, Fields]]:
     """Boxes as fractions of the picture, and classes: a whole number is a DetectionType, a name a DetectionProperty."""
+    width, height = _pixels(topic)
+    best: Mapping[str, Any]
+    for number, each in enumerate(detections):
+        common, box, results = {"sampleId": 0, "detectionId": number}, each["bbox"], each["results"]
+        center, angle = box["center"]["position"], box["center"]["theta"]
+        cosine, sine = abs(math.cos(angle)), abs(math.sin(angle))
+        across = (box["size_x"] * cosine + box["size_y"] * sine) / width  # upright around a box that is turned
+        down = (box["size_x"] * sine + box["size_y"] * cosine) / height
+        place = {"x": center["x"] / width - across / 2, "y": center["y"] / height - down / 2}
+        if ros.BOX in wanted:
+            yield ros.BOX, {**common, **place, "width": across, "height": down}
+        best = max((result["hypothesis"] for result in results), key=operator.itemgetter("score"), default={})
+        label = best.get("class_id", "")
+        if label.isascii() and label.isdigit() and int(label) < 2**32 and ros.CLASS in wanted:
+            yield ros.CLASS, {**common, "type": int(label)}
+        elif label and ros.PROPERTY in wanted:
+            yield ros.PROPERTY, {**common, "property": label}
+
+
+def _pixels(topic: Topic) -> tuple[int, int]:
     if topic.camera is None or not topic.camera.width * topic.camera.height:
         raise RosTypeError(f"{topic.topic} needs its camera's size: boxes are in pixels")
-    stamps = dict(messages_of(topic))
-    for number, each in enumerate(fields["detections"]):
-        place = f"detections[{number}] of {topic.topic}"
-        common = {"sampleId": 0, "detectionId": number}
-        if _BOX in stamps:
-            yield BusMessage(_BOX, stamps[_BOX], time, common | _box(each["bbox"], topic.camera, place))
-        best = max(each["results"], key=lambda result: float(result["hypothesis"]["score"]), default=None)
-        label = best["hypothesis"]["class_id"] if best else ""
-        if label.isascii() and label.isdigit() and int(label) < 2**32 and _CLASS in stamps:
-            yield BusMessage(_CLASS, stamps[_CLASS], time, common | {"type": int(label)})
-        elif label and _PROPERTY in stamps:
-            yield BusMessage(_PROPERTY, stamps[_PROPERTY], time, common | {"property": label})
-
-
-def _box(box: Mapping[str, Any], camera: CameraView, place: str) -> Fields:
-    """The upright box around one that may be turned."""
-    center = box["center"]["position"]
-    angle, size_x, size_y = box["center"]["theta"], box["size_x"], box["size_y"]
-    if not all(map(math.isfinite, (center["x"], center["y"], angle, size_x, size_y))):
-        raise RosTypeError(f"{place} has a box that is not finite")
-    cosine, sine = abs(math.cos(angle)), abs(math.sin(angle))
-    width, height = size_x * cosine + size_y * sine, size_x * sine + size_y * cosine
-    return {
-        "x": (center["x"] - width / 2) / camera.width,
-        "y": (center["y"] - height / 2) / camera.height,
-        "width": width / camera.width,
-        "height": height / camera.height,
-    }
+    return topic.camera.width, topic.camera.height

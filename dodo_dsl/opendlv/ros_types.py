@@ -15,64 +15,50 @@ CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 STATIC_FRAMES, STATIC_FRAMES_TYPE = "/tf_static", "tf2_msgs/msg/TFMessage"
 """Topics that are always there."""
 
-MOTION_REQUEST = "opendlv.proxy.GroundMotionRequest"
-POSE_ESTIMATE = "robot.PoseEstimate"
+IMAGE, COMPRESSED, CAMERA_INFO = (f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "CameraInfo"))
+LASER_SCAN, RANGE, IMU, NAV_SAT_FIX = (f"sensor_msgs/msg/{name}" for name in ("LaserScan", "Range", "Imu", "NavSatFix"))
+TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+POSE_STAMPED, POSE_COVARIANCE = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped"
+ACKERMANN, ACKERMANN_STAMPED = "ackermann_msgs/msg/AckermannDrive", "ackermann_msgs/msg/AckermannDriveStamped"
+ODOMETRY, DETECTIONS = "nav_msgs/msg/Odometry", "vision_msgs/msg/Detection2DArray"
+
+ANGULAR, ACCELERATION = "opendlv.proxy.AngularVelocityReading", "opendlv.proxy.AccelerationReading"
+DISTANCE, GROUND_SPEED = "opendlv.proxy.DistanceReading", "opendlv.proxy.GroundSpeedReading"
+GEOLOCATION, WGS84 = "opendlv.logic.sensation.Geolocation", "opendlv.proxy.GeodeticWgs84PositionReading"
+STEERING, SPEED = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.GroundSpeedRequest"
+MOTION_REQUEST, POSE_ESTIMATE = "opendlv.proxy.GroundMotionRequest", "robot.PoseEstimate"
+ODOMETRY_READING, PLANAR_SCAN = "robot.OdometryReading", "robot.PlanarScan"
+BOX, PROPERTY, CLASS = (f"opendlv.logic.perception.Detection{name}" for name in ("BoundingBox", "Property", "Type"))
 
 GIVEN: Mapping[str, tuple[tuple[str, ...], ...]] = {
-    "sensor_msgs/msg/Image": ((MEMORY,),),
-    "sensor_msgs/msg/CompressedImage": ((MEMORY,),),
-    "sensor_msgs/msg/CameraInfo": ((MEMORY,),),
-    "sensor_msgs/msg/LaserScan": (("robot.PlanarScan",),),
-    "sensor_msgs/msg/Range": (("opendlv.proxy.DistanceReading",),),
-    "sensor_msgs/msg/Imu": (("opendlv.proxy.AngularVelocityReading", "opendlv.proxy.AccelerationReading"),),
-    "sensor_msgs/msg/NavSatFix": (
-        ("opendlv.logic.sensation.Geolocation",),
-        ("opendlv.proxy.GeodeticWgs84PositionReading",),
-    ),
-    "nav_msgs/msg/Odometry": (("robot.OdometryReading",),),
-    "geometry_msgs/msg/TwistStamped": (
-        ("robot.OdometryReading",),
-        ("opendlv.proxy.GroundSpeedReading", "opendlv.proxy.AngularVelocityReading"),
-    ),
+    **dict.fromkeys((IMAGE, COMPRESSED, CAMERA_INFO), ((MEMORY,),)),
+    LASER_SCAN: ((PLANAR_SCAN,),),
+    RANGE: ((DISTANCE,),),
+    IMU: ((ANGULAR, ACCELERATION),),
+    NAV_SAT_FIX: ((GEOLOCATION,), (WGS84,)),
+    ODOMETRY: ((ODOMETRY_READING,),),
+    TWIST_STAMPED: ((ODOMETRY_READING,), (GROUND_SPEED, ANGULAR)),
 }
 """The types of ``in``: what each is made of, the first that the test has of several ways."""
 
 SENT: Mapping[str, tuple[str, ...]] = {
-    "geometry_msgs/msg/Twist": (MOTION_REQUEST,),
-    "geometry_msgs/msg/TwistStamped": (MOTION_REQUEST,),
-    "ackermann_msgs/msg/AckermannDrive": ("opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.GroundSpeedRequest"),
-    "ackermann_msgs/msg/AckermannDriveStamped": (
-        "opendlv.proxy.GroundSteeringRequest",
-        "opendlv.proxy.GroundSpeedRequest",
-    ),
-    "vision_msgs/msg/Detection2DArray": (
-        "opendlv.logic.perception.DetectionBoundingBox",
-        "opendlv.logic.perception.DetectionProperty",
-        "opendlv.logic.perception.DetectionType",
-    ),
-    "nav_msgs/msg/Odometry": (POSE_ESTIMATE,),
-    "geometry_msgs/msg/PoseStamped": (POSE_ESTIMATE,),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": (POSE_ESTIMATE,),
+    **dict.fromkeys((TWIST, TWIST_STAMPED), (MOTION_REQUEST,)),
+    **dict.fromkeys((ACKERMANN, ACKERMANN_STAMPED), (STEERING, SPEED)),
+    DETECTIONS: (BOX, PROPERTY, CLASS),
+    **dict.fromkeys((ODOMETRY, POSE_STAMPED, POSE_COVARIANCE), (POSE_ESTIMATE,)),
 }
 """The types of ``out``: the messages that each becomes."""
 
 NUMBERS = ("std_msgs/msg/Float32", "std_msgs/msg/Float64")
 """Types of one number: they need ``from`` or ``to``, a message with one number."""
 
-
 FRAME_IDS: Mapping[str, str] = {
-    "sensor_msgs/msg/Image": "camera_optical_frame",
-    "sensor_msgs/msg/CompressedImage": "camera_optical_frame",
-    "sensor_msgs/msg/CameraInfo": "camera_optical_frame",
-    "sensor_msgs/msg/LaserScan": "laser",
-    "sensor_msgs/msg/Range": "range",
-    "sensor_msgs/msg/Imu": "imu",
-    "sensor_msgs/msg/NavSatFix": "gps",
-    "nav_msgs/msg/Odometry": "odom",
-    "geometry_msgs/msg/TwistStamped": "base_link",
+    **dict.fromkeys((IMAGE, COMPRESSED, CAMERA_INFO, DETECTIONS), "camera_optical_frame"),
+    **{LASER_SCAN: "laser", RANGE: "range", IMU: "imu", NAV_SAT_FIX: "gps", ODOMETRY: "odom"},
+    **dict.fromkeys((TWIST_STAMPED, ACKERMANN_STAMPED), "base_link"),
+    **dict.fromkeys((POSE_STAMPED, POSE_COVARIANCE), "map"),
 }
-"""The frame of what a test gives, by type (REP 103 and 105)."""
-
+"""``header.frame_id`` by type where a topic does not say it, also of what a node sends (REP 103 and 105)."""
 
 NODE_ENVIRONMENT: Mapping[str, str] = {
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4?max_msg_size=65500&sockets_size=16777216",

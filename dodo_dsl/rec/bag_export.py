@@ -1,7 +1,7 @@
 """A recording as a bag of ROS 2, with a topic for each message that has a type there."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,16 +11,13 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.ros_codec import Fields, RosTypeError
-from dodo_dsl.opendlv.ros_fields import COMPRESSED, DETECTIONS
-from dodo_dsl.opendlv.ros_fields import IMAGE as IMAGE_TYPE
-from dodo_dsl.opendlv.ros_messages import CameraPicture, Types, messages_of
-from dodo_dsl.opendlv.ros_types import SENT, CameraView, Topic
+from dodo_dsl.opendlv.ros_codec import Fields
+from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
+from dodo_dsl.opendlv.ros_types import COMPRESSED, DETECTIONS, CameraView, Topic
+from dodo_dsl.opendlv.ros_types import IMAGE as IMAGE_TYPE
 from dodo_dsl.opendlv.video import CODECS, VideoDecoder, VideoError
-from dodo_dsl.rec.bag import WRITTEN, BagWriter
+from dodo_dsl.rec.bag import WRITTEN, Key
 from dodo_dsl.rec.frames import IMAGE, packets
-
-_BOX, _PROPERTY, _CLASS = SENT[DETECTIONS]
 
 
 @dataclass
@@ -29,116 +26,110 @@ class _Gathered:
 
     topic: Topic
     time: int = 0
-    fresh: list[tuple[str, Any]] = field(default_factory=list)
+    fresh: set[str] = field(default_factory=set)
     latest: dict[str, Any] = field(default_factory=dict)
+    """Of each name the last message, or of detections a list of those with the same time."""
 
 
 class BagExport:
-    """Writes messages in the order of their times, stored at their sample times.
+    """Writes messages in the order of their times, stored at their sample times; ``counts`` are those of each topic.
 
     ``left_out`` are those without a counterpart, by their ids; ``skipped`` those that do not fit, by topic, with the
-    first of the ``reasons``. Topics that are ``known`` keep their names, if they are the only one of their type.
+    first of the ``reasons``.
     """
 
-    def __init__(self, recording: Recording, types: Types, writer: BagWriter, known: Sequence[Topic]) -> None:
-        self.left_out, self.skipped, self.reasons = Counter[int](), Counter[str](), dict[str, str]()
-        self._recording, self._messages, self._types = recording, types.messages, types
-        self._writer, self._known = writer, known
+    def __init__(self, recording: Recording, types: Types, writer: Any) -> None:
+        self.counts, self.left_out = Counter[Key](), Counter[int]()
+        self.skipped, self.reasons = Counter[str](), dict[str, str]()
+        self._recording, self._types, self._messages, self._writer = recording, types, types.messages, writer
+        self._connections: dict[str, Any] = {}
         self._decoders: dict[tuple[int, str], VideoDecoder] = {}
 
     def write(self, rows: Numbers, progress: Callable[[int], None]) -> None:
         """Write the messages of some rows; ``progress`` gets how many are done."""
-        routes, cameras = self._routes(rows), self._stamps(rows, IMAGE)
-        ordered = rows[np.argsort(self._recording.index["time"][rows], kind="stable")]
-        for done, envelope in enumerate(self._recording.envelopes(ordered), 1):
+        index = self._recording.index[rows]
+        there = sorted(set(zip(index["data_type"].tolist(), index["sender_stamp"].tolist(), strict=True)))
+        first = next((stamp for id_, stamp in there if id_ == IMAGE), None)
+        routes = defaultdict[tuple[int, int], list[_Gathered]](list)
+        for topic in self._topics(there, rows[index["data_type"] == IMAGE][:1]):
+            gathered = _Gathered(topic)
+            for name in topic.bus:
+                id_, stamp = self._messages.key(name)
+                routes[id_, stamp or 0].append(gathered)
+        for done, envelope in enumerate(self._recording.envelopes(rows[np.argsort(index["time"], kind="stable")]), 1):
             key = envelope.data_type, envelope.sender_stamp
             if envelope.data_type == IMAGE:
-                self._picture(envelope, is_first=key[1] == cameras[0])
-            elif key in routes:
-                self._gather(routes[key], envelope)
-            else:
+                self._picture(envelope, "/camera" if key[1] == first else f"/camera_{key[1]}")
+            elif key not in routes:
                 self.left_out[envelope.data_type] += 1
+            for gathered in routes.get(key, ()):
+                self._gather(gathered, envelope)
             progress(done)
         for gathered in (each for some in routes.values() for each in some):
             self._store(gathered)
 
-    def _stamps(self, rows: Numbers, id_: int) -> list[int]:
-        index = self._recording.index[rows]
-        return sorted(set(index["sender_stamp"][index["data_type"] == id_].tolist()))
-
-    def _routes(self, rows: Numbers) -> dict[tuple[int, int], list[_Gathered]]:
-        """The topics that each message, by id and sender stamp, is part of."""
-        images = rows[self._recording.index["data_type"][rows] == IMAGE][:1]
-        sizes = (CameraView(width=each.width, height=each.height) for each in packets(self._recording, images))
+    def _topics(self, there: list[tuple[int, int]], images: Numbers) -> Iterator[Topic]:
+        """Those of which there are all messages, or of detections any; ``there`` are ids with their senders."""
+        sizes = [CameraView(width=each.width, height=each.height) for each in packets(self._recording, images)]
         camera = next((each for each in sizes if each.width and each.height), None)
-        found = defaultdict[tuple[int, int], list[_Gathered]](list)
         known = set(self._messages.names())  # set 0.9 lacks some
-        for way in (each for each in WRITTEN if known.issuperset(each.messages)):
-            stamps = {name: self._stamps(rows, self._messages.id(name)) for name in way.messages}
-            for number, stamp in enumerate(sorted({one for some in stamps.values() for one in some})):
-                parts = [name for name in way.messages if stamp in stamps[name]]
-                if (len(parts) < len(way.messages) and not way.is_any) or (way.type == DETECTIONS and not camera):
-                    continue
-                bus = tuple(f"{name}/{stamp}" for name in parts)
-                usual = self._name(way.type, way.topic, way.messages)
-                topic = f"{usual}_{stamp}" if number else usual
-                gathered = _Gathered(Topic(topic=topic, type=way.type, bus=bus, camera=camera))
-                for name in parts:
-                    found[self._messages.id(name), stamp].append(gathered)
-        return found
+        for name, (type_, messages) in WRITTEN.items():
+            ids = {self._messages.id(each): each for each in messages} if known.issuperset(messages) else {}
+            for number, stamp in enumerate(sorted({stamp for id_, stamp in there if id_ in ids})):
+                bus = tuple(f"{each}/{stamp}" for id_, each in ids.items() if (id_, stamp) in there)
+                if len(bus) == len(ids) or (type_ == DETECTIONS and camera):
+                    yield Topic(topic=f"{name}_{stamp}" if number else name, type=type_, bus=bus, camera=camera)
 
-    def _gather(self, routes: Iterable[_Gathered], envelope: Envelope) -> None:
+    def _gather(self, gathered: _Gathered, envelope: Envelope) -> None:
         time, name = _time(envelope), self._messages.name(envelope.data_type)
-        for gathered in routes:
-            try:
-                message = self._messages.decode(envelope.data_type, envelope.payload)
-            except MessageError as error:
-                self._skip(gathered.topic.topic, error)
-                continue
-            is_list = gathered.topic.type == DETECTIONS
-            if gathered.time != time or (name in dict(gathered.fresh) and not is_list):
-                self._store(gathered)
-            gathered.time, gathered.latest[name] = time, message
-            gathered.fresh.append((name, message))
-            if len(gathered.fresh) == len(gathered.topic.bus) and not is_list:
-                self._store(gathered)
+        is_list = gathered.topic.type == DETECTIONS
+        try:
+            message = self._messages.decode(envelope.data_type, envelope.payload)
+        except MessageError as error:
+            self._skip(gathered.topic.topic, error)
+            return
+        if gathered.time != time or (name in gathered.fresh and not is_list):
+            self._store(gathered)
+        gathered.time = time
+        gathered.fresh.add(name)
+        gathered.latest[name] = [*gathered.latest.get(name, ()), message] if is_list else message
+        if len(gathered.fresh) == len(gathered.topic.bus) and not is_list:
+            self._store(gathered)
 
     def _store(self, gathered: _Gathered) -> None:
         """Write what was gathered, if anything was."""
-        fresh, gathered.fresh = gathered.fresh, []
         topic, time = gathered.topic, gathered.time
-        if not fresh:
-            return
         try:
-            if topic.type == DETECTIONS:
-                fields = self._types.given_header(topic, time) | _detections(topic, fresh)
-            else:
-                fields = self._types.given(topic, gathered.latest, time)
-            self._writer.write(topic.topic, topic.type, time, self._types.encode(topic.type, fields))
-        except RosTypeError as error:
+            if gathered.fresh:
+                self._write(topic, time, self._types.given(topic, gathered.latest, time))
+        except ValueError as error:
             self._skip(topic.topic, error)
+        gathered.fresh.clear()
+        if topic.type == DETECTIONS:
+            gathered.latest.clear()
 
-    def _picture(self, envelope: Envelope, is_first: bool) -> None:
+    def _picture(self, envelope: Envelope, camera: str) -> None:
         """A JPEG stays as it is, others are decoded."""
-        time, name = _time(envelope), "/camera/image_raw" if is_first else f"/camera_{envelope.sender_stamp}/image_raw"
+        time, topic = _time(envelope), Topic(topic=f"{camera}/image_raw", type=IMAGE_TYPE, bus=())
         try:
             image = MessageSet.standard().decode(IMAGE, envelope.payload)  # set 0.9 has the same numbers
             if CODECS.get(image.format) == "mjpeg":
-                name = f"{name}/compressed"
-                topic = Topic(topic=self._name(COMPRESSED, name) if is_first else name, type=COMPRESSED, bus=())
-                fields = self._types.given_header(topic, time) | {"format": "jpeg", "data": image.data}
+                topic = Topic(topic=f"{topic.topic}/compressed", type=COMPRESSED, bus=())
+                data = {"format": "jpeg", "data": np.frombuffer(image.data, np.uint8)}
+                fields = self._types.given_header(topic, time) | data
             else:
-                topic = Topic(topic=self._name(IMAGE_TYPE, name) if is_first else name, type=IMAGE_TYPE, bus=())
                 fields = self._types.given(topic, {}, time, self._decoded(image, envelope.sender_stamp))
-            self._writer.write(topic.topic, topic.type, time, self._types.encode(topic.type, fields))
-        except (MessageError, RosTypeError, VideoError) as error:
-            self._skip(name, error)
+            self._write(topic, time, fields)
+        except ValueError as error:
+            self._skip(topic.topic, error)
 
-    def _name(self, type_: str, usual: str, messages: Sequence[str] = ()) -> str:
-        """That of the application's only topic of a type, if it is of no other messages."""
-        own = [each for each in self._known if each.type == type_]
-        fits = len(own) == 1 and {name for name, _ in messages_of(own[0])} in (set(), set(messages))
-        return own[0].topic if fits else usual
+    def _write(self, topic: Topic, time: int, fields: Fields) -> None:
+        data = self._types.encode(topic.type, fields)
+        if topic.topic not in self._connections:
+            made = self._writer.add_connection(topic.topic, topic.type, typestore=self._types.store)
+            self._connections[topic.topic] = made
+        self._writer.write(self._connections[topic.topic], time * 1000, data)
+        self.counts[topic.topic, topic.type] += 1
 
     def _decoded(self, image: Any, stamp: int) -> CameraPicture:
         key = stamp, image.format
@@ -156,19 +147,3 @@ class BagExport:
 
 def _time(envelope: Envelope) -> int:
     return envelope.sample_time or envelope.received or envelope.sent
-
-
-def _detections(topic: Topic, found: list[tuple[str, Any]]) -> Fields:
-    """Boxes in pixels with their class; its score is 1, as the bus has none."""
-    assert topic.camera is not None
-    width, height = topic.camera.width, topic.camera.height
-    labels = {each.detectionId: str(each.type) for name, each in found if name == _CLASS}
-    labels |= {each.detectionId: each.property for name, each in found if name == _PROPERTY}
-    detections = []
-    for box in (each for name, each in found if name == _BOX):
-        center = {"x": (box.x + box.width / 2) * width, "y": (box.y + box.height / 2) * height}
-        bbox = {"center": {"position": center}, "size_x": box.width * width, "size_y": box.height * height}
-        label = labels.get(box.detectionId)
-        results = [{"hypothesis": {"class_id": label, "score": 1.0}}] if label else []
-        detections.append({"bbox": bbox, "results": results})
-    return {"detections": detections}

@@ -19,10 +19,9 @@ from typing import Any, NoReturn
 
 from dodo_dsl.opendlv import ros_types
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
-from dodo_dsl.opendlv.pixels import PixelError
-from dodo_dsl.opendlv.ros_fields import FRAME_IDS
+from dodo_dsl.opendlv.pixels import PixelError, view
 from dodo_dsl.opendlv.ros_messages import CameraPicture, RosTypeError, Types, stamp_of, time_of
-from dodo_dsl.opendlv.ros_types import CLOCK, CLOCK_TYPE, RosGraph, Topic
+from dodo_dsl.opendlv.ros_types import CLOCK, CLOCK_TYPE, FRAME_IDS, RosGraph, Topic
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory, SharedMemoryError
 from services.ros_bridge.findings import Finding, Findings, end_of, frame_problem, loss, lost_datagrams, stamp_problem
@@ -152,7 +151,7 @@ class Bridge:
         given.last = time_us
         try:
             data = self._types.encode(topic.type, self._types.given(topic, messages, time_us, picture))
-        except RosTypeError as error:
+        except ValueError as error:
             self._findings.say(Finding(("given", topic.topic), str(error), "warning"))
             return
         if not write(given.writer, data):
@@ -172,7 +171,7 @@ class Bridge:
                     with memory.lock():
                         data, time_us = bytes(memory.buffer), memory.sample_time()
                     format_ = camera.format or name.rpartition(".")[2]
-                    picture = CameraPicture.of(data, format_, camera.width, camera.height)
+                    picture = CameraPicture(view(data, format_, camera.width, camera.height), format_)
                     for given in topics:
                         self._publish(given, {}, time_us, picture)
 
@@ -236,9 +235,8 @@ class Bridge:
                     return
                 self._findings.say_later("stamp", topic, stamp_problem(topic, time_of(fields), now))
             for message in self._types.sent(topic, fields, now):
-                made = self._session.messages.type(message.name)(**message.fields)
-                self._session.send(made, message.sample_time, message.stamp)
-        except (RosTypeError, MessageError, TypeError, ValueError) as error:
+                self._session.send(*message)
+        except (TypeError, ValueError) as error:
             self._findings.say_later("broken", topic, f"a message on {topic.topic} is not taken: {error}")
 
     def _look(self, last: bool = False) -> None:

@@ -58,7 +58,7 @@ def fields_of(topic: str, number: int) -> dict[str, Any]:
             {
                 "orientation": {"w": 1.0},
                 "orientation_covariance": [-1.0, *[0.0] * 8],
-                "angular_velocity_covariance": [-1.0, *[0.0] * 8],
+                "angular_velocity": {"x": 0.25},
                 "linear_acceleration": {"z": 9.8125},
             },
         ),
@@ -192,7 +192,7 @@ def test_an_interrupt_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(bag_import._Converter, "envelopes", interrupt)
+    monkeypatch.setattr(bag_import.BagImport, "_envelopes", interrupt)
     dodo_rec("import", tmp_path / "bag", "-o", tmp_path / "a.rec")
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
 
@@ -224,7 +224,6 @@ application:
   services:
     car:
       ros:
-        in: {/front: sensor_msgs/msg/Image}
         out:
           /estimate: nav_msgs/msg/Odometry
           /lane: {type: lane_msgs/msg/Lane, to: opendlv.proxy.GroundSteeringRequest/3, fields: {groundSteering: offset}}
@@ -256,14 +255,6 @@ def test_topics_of_the_application_become_what_it_says(tmp_path: Path, monkeypat
         "robot.OdometryReading/0",
         "robot.PoseEstimate",
     ]
-    code, stdout, _ = dodo_rec("export", "a.rec", "--ros", "-o", "b")
     (tmp_path / "dodo.yml").write_text(MAPPING.replace("offset", "ofset"))
     failed = dodo_rec("import", "bag", "-o", "a.rec", "--force")
     assert (failed.code, failed.stdout) == (2, "") and "there is no 'ofset' among offset" in failed.stderr
-    assert code == 0
-    assert {line.split()[0] for line in stdout.splitlines()[1:]} == {
-        "/front",
-        "/odom",
-        "/pose",
-        "opendlv.proxy.GroundSteeringRequest:",
-    }

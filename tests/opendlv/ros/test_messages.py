@@ -14,17 +14,26 @@ from scipy.spatial.transform import Rotation
 
 from dodo_dsl.opendlv import pixels
 from dodo_dsl.opendlv.message_set import MessageSet
-from dodo_dsl.opendlv.ros_fields import COMPRESSED, DETECTIONS, FRAME_IDS, IMAGE, PATHS
+from dodo_dsl.opendlv.ros_fields import PATHS
 from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
 from dodo_dsl.opendlv.ros_pictures import picture_of
+from dodo_dsl.opendlv.ros_types import ANGULAR as GYRO
 from dodo_dsl.opendlv.ros_types import (
-    CLOCK_TYPE,
+    COMPRESSED,
+    DETECTIONS,
+    DISTANCE,
+    FRAME_IDS,
+    GEOLOCATION,
     GIVEN,
+    IMAGE,
     MEMORY,
     MOTION_REQUEST,
     NUMBERS,
+    ODOMETRY,
     SENT,
     STATIC_FRAMES_TYPE,
+    STEERING,
+    WGS84,
     CameraView,
     StaticFrame,
     Topic,
@@ -34,9 +43,6 @@ from tests.opendlv.ros.values import plain
 TYPES, MESSAGES = Types(), MessageSet.standard()
 TIME, RECEIVED = 1_700_000_000_123_456, 1_700_000_001_000_000
 CAMERA = CameraView(width=640, height=480, fovy=48.8)
-STEERING, DISTANCE = "opendlv.proxy.GroundSteeringRequest", "opendlv.proxy.DistanceReading"
-GYRO = "opendlv.proxy.AngularVelocityReading"
-PLACE = "opendlv.logic.sensation.Geolocation"
 WAYS = [(type_, bus) for type_, ways in GIVEN.items() for bus in ways if bus != (MEMORY,)]
 WAYS += [(type_, bus) for type_, bus in SENT.items() if type_ != DETECTIONS]
 WAYS += [(type_, (STEERING,)) for type_ in NUMBERS]
@@ -77,15 +83,12 @@ def test_what_is_given_and_sent_again_is_the_same(type_: str, bus: tuple[str, ..
     messages = [some_message(name, rng) for name in bus]
     wanted = topic(type_, *(f"{name}/{number}" for number, name in enumerate(bus)))
     found = TYPES.sent(wanted, through(wanted, *messages), RECEIVED)
-    assert [(each.name, each.stamp) for each in found] == [(name, number) for number, name in enumerate(bus)]
-    for each, original in zip(found, messages, strict=True):
+    assert [each.stamp for each in found] == list(range(len(bus)))
+    for each, original, name in zip(found, messages, bus, strict=True):
         assert each.sample_time == (TIME if TYPES.has_header(type_) else RECEIVED)
-        paths = {"data": ""} if type_ in NUMBERS else PATHS[type_, each.name]
-        assert type_ in NUMBERS or each.fields.keys() == paths.keys()
-        for field, value in each.fields.items():
-            expected = getattr(original, field)
+        for field in ["groundSteering"] if type_ in NUMBERS else PATHS[type_, name]:
+            expected, value = getattr(original, field), getattr(each.message, field)
             assert value == (expected if isinstance(expected, bytes) else pytest.approx(expected, abs=1e-9))
-        MESSAGES.encode(message(each.name, **each.fields))
 
 
 def test_each_type_with_a_header_has_a_frame() -> None:
@@ -94,21 +97,16 @@ def test_each_type_with_a_header_has_a_frame() -> None:
 
 SCAN = {"angleMin": -0.5, "angleIncrement": 0.25, "rangeMin": 0.125, "rangeMax": 30.0}
 RANGES = np.array([1, np.inf, 2.5, 0.25, 3], "<f4").tobytes()
-UNKNOWN = [-1.0] + [0.0] * 8
+UNKNOWN = [-1.0, *[0.0] * 8]
 
 
 @pytest.mark.parametrize(
     ("wanted", "messages", "expected"),
     [
         (
-            topic("sensor_msgs/msg/LaserScan", "robot.PlanarScan", rate=40.0),
+            topic("sensor_msgs/msg/LaserScan", "robot.PlanarScan"),
             [message("robot.PlanarScan", ranges=RANGES, **SCAN)],
-            {
-                "angle_max": 0.5,
-                "range_max": 30.0,
-                "scan_time": np.float32(0.025),
-                "ranges": [1.0, math.inf, 2.5, 0.25, 3.0],
-            },
+            {"angle_max": 0.5, "range_max": 30.0, "ranges": [1.0, math.inf, 2.5, 0.25, 3.0]},
         ),
         (
             topic("sensor_msgs/msg/Range", DISTANCE, frame_id="left"),
@@ -116,20 +114,18 @@ UNKNOWN = [-1.0] + [0.0] * 8
             {"range": math.inf, "min_range": 0.0, "max_range": math.inf, "header": {"frame_id": "left"}},
         ),
         (
-            topic("sensor_msgs/msg/Imu", GYRO),
-            [message(GYRO, angularVelocityZ=0.5)],
+            topic("sensor_msgs/msg/Imu", *GIVEN["sensor_msgs/msg/Imu"][0]),
+            [message(GYRO, angularVelocityZ=0.5), message("opendlv.proxy.AccelerationReading")],
             {
                 "angular_velocity": {"z": 0.5},
                 "orientation": {"w": 1.0},
                 "orientation_covariance": UNKNOWN,
-                "angular_velocity_covariance": [0.0] * 9,
-                "linear_acceleration_covariance": UNKNOWN,
                 "header": {"frame_id": "imu", "stamp": {"sec": 1_700_000_000, "nanosec": 123_456_000}},
             },
         ),
         (
-            topic("sensor_msgs/msg/NavSatFix", PLACE),
-            [message(PLACE, latitude=57.5, longitude=11.5, altitude=4)],
+            topic("sensor_msgs/msg/NavSatFix", GEOLOCATION),
+            [message(GEOLOCATION, latitude=57.5, longitude=11.5, altitude=4)],
             {"latitude": 57.5, "altitude": 4.0, "status": {"status": 0, "service": 1}, "position_covariance_type": 0},
         ),
         (
@@ -142,7 +138,6 @@ UNKNOWN = [-1.0] + [0.0] * 8
                 "twist": {"twist": {"linear": {"x": 0.5}, "angular": {"z": -0.25}}},
             },
         ),
-        (topic(CLOCK_TYPE), [], {"clock": {"sec": 1_700_000_000, "nanosec": 123_456_000}}),
         (topic("std_msgs/msg/Float64", DISTANCE), [message(DISTANCE, distance=2)], {"data": 2.0}),
         (
             topic("std_msgs/msg/Float32", GYRO, fields={"angularVelocityY": "data"}),
@@ -173,11 +168,10 @@ def test_what_is_given(wanted: Topic, messages: list[Any], expected: dict[str, A
 
 
 def test_a_place_without_altitude() -> None:
-    name = "opendlv.proxy.GeodeticWgs84PositionReading"
-    found = through(topic("sensor_msgs/msg/NavSatFix", name), message(name, latitude=1))
+    found = through(topic("sensor_msgs/msg/NavSatFix", WGS84), message(WGS84, latitude=1))
     assert math.isnan(found["altitude"])
-    (back,) = TYPES.sent(topic("sensor_msgs/msg/NavSatFix", PLACE), found, RECEIVED)
-    assert back.fields["altitude"] == 0.0
+    (back,) = TYPES.sent(topic("sensor_msgs/msg/NavSatFix", GEOLOCATION), found, RECEIVED)
+    assert back.message.altitude == 0.0
 
 
 def test_static_frames_turn_as_three_rotations() -> None:
@@ -209,27 +203,32 @@ def test_detections_are_fractions_of_the_picture(kept: tuple[int, ...]) -> None:
         {"bbox": detected(x=0, y=0, width=64, height=48)},
     ]
     fields = {"header": {"stamp": {"sec": 5, "nanosec": 10_000}}, "detections": detections}
-    TYPES.check(wanted)
     found = TYPES.sent(wanted, TYPES.decode(DETECTIONS, TYPES.encode(DETECTIONS, fields)), RECEIVED)
     assert {(each.stamp, each.sample_time) for each in found} == {(3, 5_000_010)}
-    rows = [(each.name.rpartition(".")[2], *list(each.fields.values())[1:]) for each in found]
+    rows = [
+        (
+            each.message.DESCRIPTOR.name,
+            *[getattr(each.message, field.name) for field in each.message.DESCRIPTOR.fields][1:],
+        )
+        for each in found
+    ]
     number = ("DetectionType", 1, 7) if 2 in kept else ("DetectionProperty", 1, "7")
     assert rows == [
-        ("DetectionBoundingBox", 0, 0.45, pytest.approx(0.2), 0.1, 0.1),
+        ("DetectionBoundingBox", 0, *map(pytest.approx, (0.45, 0.2, 0.1, 0.1))),
         ("DetectionProperty", 0, "yellow"),
         ("DetectionBoundingBox", 1, *map(pytest.approx, (0.4625, 0.5 - 32 / 480, 48 / 640, 64 / 480))),
         number,
-        ("DetectionBoundingBox", 2, -0.05, -0.05, 0.1, 0.1),
+        ("DetectionBoundingBox", 2, *map(pytest.approx, (-0.05, -0.05, 0.1, 0.1))),
     ]
 
 
 @pytest.mark.parametrize("encoding", ["", "bgr8", "rgb8", "bgra8", "mono8"])
-@pytest.mark.parametrize("format_", pixels.FORMATS)
+@pytest.mark.parametrize("format_", ["argb", "bgr", "rgb"])
 @pytest.mark.parametrize("type_", [IMAGE, COMPRESSED])
 def test_pictures(type_: str, format_: str, encoding: str) -> None:
     memory = pixels.from_bgr(np.random.default_rng(47).integers(0, 255, (6, 8, 3), np.uint8), format_)
     original = pixels.to_bgr(memory, format_)
-    picture = CameraPicture.of(memory.tobytes() + b"behind", format_, 8, 6)
+    picture = CameraPicture(pixels.view(memory.tobytes() + b"behind", format_, 8, 6), format_)
     wanted = topic(type_, f"video0.{format_}", encoding="png" if type_ == COMPRESSED else encoding)
     TYPES.check(wanted)
     found = TYPES.decode(type_, TYPES.encode(type_, TYPES.given(wanted, {}, TIME, picture)))
@@ -255,37 +254,13 @@ def test_jpeg_and_rows_with_a_rest() -> None:
     assert picture_of(IMAGE, padded)[:, :, 0].tolist() == [[1, 2], [3, 4]]
 
 
+SWITCH = "opendlv.proxy.SwitchStateReading"
 REFUSED = [
-    (
-        topic("geometry_msgs/msg/Twist", MOTION_REQUEST),
-        {"linear": {"x": math.nan}},
-        "linear.x of /t is nan, not a finite",
-    ),
-    (
-        topic("std_msgs/msg/Float64", "opendlv.proxy.SwitchStateReading"),
-        {"data": 0.5},
-        "is 0.5, and opendlv.proxy.SwitchStateReading.state is int16",
-    ),
-    (topic("std_msgs/msg/String", STEERING, fields={"groundSteering": "data"}), {"data": "1"}, "is '1', and"),
-    (
-        topic("std_msgs/msg/Float64", "opendlv.system.LogMessage", fields={"description": "data"}),
-        {},
-        "description is string",
-    ),
-    (topic("geometry_msgs/msg/Twist", STEERING), {}, "does not become opendlv.proxy.GroundSteeringRequest by itself"),
-    (
-        topic("geometry_msgs/msg/PoseStamped", "robot.PoseEstimate"),
-        {"pose": {"orientation": {"w": 0.0}}},
-        "expected a unit",
-    ),
-    (topic("nav_msgs/msg/Odometry", "robot.OdometryReading"), {}, "pose.pose.orientation of /t is not an attitude"),
-    (topic(DETECTIONS, SENT[DETECTIONS][0]), {}, "needs its camera's size"),
+    (topic("geometry_msgs/msg/Twist", MOTION_REQUEST), {"linear": {"x": math.nan}}, "linear.x of /t is nan, which"),
+    (topic("std_msgs/msg/Float64", SWITCH), {"data": 0.5}, f"is 0.5, which {SWITCH}.state (int16) cannot be"),
+    (topic("std_msgs/msg/String", STEERING, fields={"groundSteering": "data"}), {"data": "1"}, "is '1', which"),
+    (topic(ODOMETRY, "robot.OdometryReading"), {}, "pose.pose.orientation of /t is {'x': 0.0"),
     (topic(DETECTIONS, SENT[DETECTIONS][0], camera=CameraView(width=0, height=0)), {}, "needs its camera's size"),
-    (
-        topic(DETECTIONS, SENT[DETECTIONS][0], camera=CAMERA),
-        {"detections": [{"bbox": detected(x=math.nan, y=1, width=1, height=1)}]},
-        "detections[0] of /t has a box that is not finite",
-    ),
 ]
 
 
@@ -300,22 +275,12 @@ def test_what_is_sent_and_cannot_be_taken(wanted: Topic, fields: dict[str, Any],
 @pytest.mark.parametrize(
     ("wanted", "messages", "said"),
     [
-        (topic("sensor_msgs/msg/Range", DISTANCE), [], f"there is no {DISTANCE} yet"),
-        (
-            topic("sensor_msgs/msg/Range", DISTANCE),
-            [message(DISTANCE, distance=math.nan)],
-            "distance is nan, not a finite",
-        ),
-        (
-            topic("sensor_msgs/msg/LaserScan", "robot.PlanarScan"),
-            [message("robot.PlanarScan", ranges=b"123")],
-            "3 bytes",
-        ),
+        (topic("sensor_msgs/msg/Range", DISTANCE), [], f"is made of {DISTANCE}, too: there is none yet"),
         (topic(IMAGE, "video0.bgr"), [], "/t needs a picture"),
         (topic(IMAGE, "video0.bgr", encoding="png"), [], "the encoding 'png', expected one of bgr8, rgb8"),
-        (topic("sensor_msgs/msg/CameraInfo", "video0.bgr"), [], "needs its camera's size and opening angle"),
-        (topic("sensor_msgs/msg/CameraInfo", "v", camera=CameraView(width=8, height=6)), [], "needs its camera's size"),
-        (topic("sensor_msgs/msg/Rage", DISTANCE), [], "did you mean 'sensor_msgs/msg/Range'?"),
+        (topic("sensor_msgs/msg/CameraInfo", "video0.bgr"), [], "or its camera"),
+        (topic("sensor_msgs/msg/Rage", DISTANCE), [], "the ROS type 'sensor_msgs/msg/Rage' is not known"),
+        (topic("geometry_msgs/msg/Twist", STEERING), [], f"says nothing of {STEERING} by itself"),
         (topic("sensor_msgs/msg/Range", "opendlv.proxy.DistanceRead"), [], "there is no message"),
         (topic("sensor_msgs/msg/Range", DISTANCE, fields={"distance": "rang"}), [], "there is no 'rang' among header"),
         (topic("sensor_msgs/msg/Range", DISTANCE, fields={"far": "range"}), [], "has the field 'far'"),
@@ -359,4 +324,4 @@ def test_an_own_type_by_its_fields(tmp_path: Path) -> None:
     fields = types.given(wanted, {STEERING: message(STEERING, groundSteering=0.5)}, TIME)
     decoded = types.decode(wanted.type, types.encode(wanted.type, fields))
     assert decoded["lane"] == {"offset": 0.5, "number": 0} and decoded["header"]["frame_id"] == "lane"
-    assert types.sent(wanted, decoded, RECEIVED) == [(STEERING, 2, TIME, {"groundSteering": 0.5})]
+    assert types.sent(wanted, decoded, RECEIVED) == [(message(STEERING, groundSteering=0.5), TIME, 2)]

@@ -169,7 +169,7 @@ NODES = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 
 def test_names_nodes_and_takes_no_broken_names() -> None:
     types, seen = Types(), Discovered()
-    gids = [{"data": letter * 16} for letter in (b"P", b"R", b"W")]
+    gids = [{"data": [letter] * 16} for letter in b"PRW"]
     nodes = [
         {"node_namespace": space, "node_name": name, "reader_gid_seq": gids[1:2], "writer_gid_seq": gids[2:]}
         for space, name in (("/", "lane"), ("/team", "lane"))
