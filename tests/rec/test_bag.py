@@ -12,7 +12,6 @@ from dodo_dsl.opendlv.envelope import encode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.recording import read_envelopes
 from dodo_dsl.opendlv.ros_messages import Types
-from dodo_dsl.rec import bag_import
 from tests.cli.new.test_command import dodo
 from tests.opendlv.ros.values import plain
 from tests.rec.conftest import BEGIN, dodo_rec, message, video
@@ -184,17 +183,6 @@ def test_what_is_refused(words: tuple[str, ...], said: str, tmp_path: Path, monk
     code, _, stderr = dodo_rec(*words)
     assert code == 2 and said in stderr, stderr
     assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_an_interrupt_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write(tmp_path / "bag", "mcap", CompressionMode.NONE, {"/cmd_vel": TOPICS["/cmd_vel"]}, 3)
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(bag_import.BagImport, "_envelopes", interrupt)
-    dodo_rec("import", tmp_path / "bag", "-o", tmp_path / "a.rec")
-    assert [path.name for path in tmp_path.iterdir()] == ["bag"]
 
 
 @pytest.mark.thorough

@@ -7,28 +7,9 @@ from typing import Any
 import numpy as np
 
 from dodo_dsl.opendlv.ros_codec import Codec
+from dodo_dsl.opendlv.ros_types import CLOCK_TYPE, GIVEN, NUMBERS, SENT, STATIC_FRAMES_TYPE
 
-CARRIED = (
-    "rosgraph_msgs/msg/Clock",
-    "tf2_msgs/msg/TFMessage",
-    "sensor_msgs/msg/Image",
-    "sensor_msgs/msg/CompressedImage",
-    "sensor_msgs/msg/CameraInfo",
-    "sensor_msgs/msg/LaserScan",
-    "sensor_msgs/msg/Range",
-    "sensor_msgs/msg/Imu",
-    "sensor_msgs/msg/NavSatFix",
-    "nav_msgs/msg/Odometry",
-    "geometry_msgs/msg/Twist",
-    "geometry_msgs/msg/TwistStamped",
-    "geometry_msgs/msg/PoseStamped",
-    "geometry_msgs/msg/PoseWithCovarianceStamped",
-    "ackermann_msgs/msg/AckermannDrive",
-    "ackermann_msgs/msg/AckermannDriveStamped",
-    "vision_msgs/msg/Detection2DArray",
-    "std_msgs/msg/Float32",
-    "std_msgs/msg/Float64",
-)
+CARRIED = sorted({CLOCK_TYPE, STATIC_FRAMES_TYPE, *GIVEN, *SENT, *NUMBERS})
 
 
 def some_fields(codec: Codec, type_: str, rng: random.Random) -> dict[str, Any]:
