@@ -27,7 +27,6 @@ MEANINGS = {
     "false-positives": "detections that match no true box",
     "frame-share": "share of the frames whose sample is within the band around the target",
     "frames": "frames that were judged",
-    "future": "estimates that are stamped later than they came",
     "gap": "longest time without a sample or an answer",
     "gates": "gates that the vehicle crossed in their order",
     "highest": "largest value that was sent",

@@ -47,9 +47,9 @@ def nearest(known: Times, times: Times, most: int) -> Times:
 
 
 def is_open(points: Values, others: Values) -> bool:
-    """Whether they leave open how to turn points onto others: on a line in space, or on a point in the plane."""
+    """Whether they leave open how to turn points onto others, as those on a line do."""
     sizes = np.linalg.svd(_covariance(points, others), compute_uv=False)
-    return bool((sizes > max(np.finfo(float).eps, _LINE * sizes[0])).sum() < points.shape[1] - 1)
+    return bool(sizes[1] <= max(np.finfo(float).eps, _LINE * sizes[0]))
 
 
 def moved_by_first(estimates: Poses, truth: Poses) -> Poses:
@@ -58,15 +58,12 @@ def moved_by_first(estimates: Poses, truth: Poses) -> Poses:
     return estimates.moved(rotation, truth.positions[0] - rotation @ estimates.positions[0])
 
 
-def moved_by_all(estimates: Poses, truth: Poses, size: int) -> Poses:
-    """The estimates moved in ``size`` dimensions so that the sum of squared distances is least (Umeyama 1991)."""
-    rotation, translation = np.eye(3), np.zeros(3)
-    points, others = estimates.positions[:, :size], truth.positions[:, :size]
-    left, _, right = np.linalg.svd(_covariance(others, points))
+def moved_by_all(estimates: Poses, truth: Poses) -> Poses:
+    """The estimates moved so that the sum of squared distances is least (Umeyama 1991)."""
+    left, _, right = np.linalg.svd(_covariance(truth.positions, estimates.positions))
     left[:, -1] *= np.sign(np.linalg.det(left) * np.linalg.det(right))
-    rotation[:size, :size] = left @ right
-    translation[:size] = others.mean(0) - rotation[:size, :size] @ points.mean(0)
-    return estimates.moved(rotation, translation)
+    rotation = left @ right
+    return estimates.moved(rotation, truth.positions.mean(0) - rotation @ estimates.positions.mean(0))
 
 
 def absolute(truth: Poses, estimates: Poses) -> tuple[Values, Values]:

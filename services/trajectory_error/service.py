@@ -7,11 +7,9 @@ import numpy as np
 
 from services.base import Check, Context, Evaluator, JudgedTime, UnjudgeableError, Verdict
 from services.base.clock import MICROSECONDS
-from services.base.evaluator import EARLY
 from services.trajectory_error import model
 from services.trajectory_error.model import Poses, Times
 
-MOST_POSES = 500_000
 _DIGITS, _FAR, _SHORT = 9, 1e12, 1e-12
 _LIMITS = ("ate", "error", "rotation", "rpe", "rpe-rotation")
 _MEASURES = {
@@ -26,8 +24,6 @@ _MEASURES = {
     "gap": ("s", "the longest time without an estimate is {value}"),
     "broken": ("", "estimates that are not finite or have no attitude: {value}, the first {when}"),
     "repeated": ("", "estimates with the time of another one: {value}, the first {when}"),
-    "future": ("", "estimates of the future: {value}, the first {when}"),
-    "late": ("", "estimates that came too late and do not count: {value}, the first {when}"),
     "unmatched": ("", ""),
 }
 """Unit and sentence of each check."""
@@ -48,7 +44,7 @@ class TrajectoryError(Evaluator):
             raise ValueError(f"no limit: give one or more of {', '.join(f'--max-{name}' for name in _LIMITS)}")
         if flags["delta-unit"] == "frames" and not flags["delta"].is_integer():
             raise ValueError(f"--delta={flags['delta']:g} is not a whole number of frames")
-        self._most |= {"gap": flags["max-gap"], "broken": 0, "repeated": 0, "future": 0}
+        self._most |= {"gap": flags["max-gap"], "broken": 0, "repeated": 0}
         self._name = f"robot.PoseEstimate/{flags['sender']}"
         self.inputs = {
             ("opendlv.sim.Frame", flags["frame-id"]): self._take_truth,
@@ -61,9 +57,8 @@ class TrajectoryError(Evaluator):
     def forget(self, now: int) -> None:
         self._truth: dict[int, list[float]] = {}
         self._estimates: dict[int, list[float]] = {}
-        self._counts = dict.fromkeys(("broken", "repeated", "future", "late", "unmatched"), 0)
-        self._first: dict[str, int] = {}
-        self._shift, self._newest = 0, (0, 0)
+        self._faults: dict[str, list[int]] = {"broken": [], "repeated": []}
+        self._shift = 0
         self._asides: list[str] = []
         self._evidence: dict[str, float | str | None] = {}
 
@@ -74,22 +69,13 @@ class TrajectoryError(Evaluator):
         if not self._truth and abs(arrival - time) > MICROSECONDS:
             self._shift = arrival - time
         self._truth[time] = row
-        self._newest = max(self._newest, (time, arrival))
 
     def _take(self, message: Any, time: int) -> None:
-        now = (time if self.arrival is None else self.arrival) + self._newest[0] - self._newest[1]
-        row, is_late = _row(message), time < now - self._flags["max-delay"] * MICROSECONDS
-        faults = {"broken": row is None, "future": time > now + EARLY, "late": is_late}
-        fault = next((name for name, is_one in faults.items() if is_one), "repeated")
-        if row is not None and not any(faults.values()) and time not in self._estimates:
-            self._estimates[time] = row
+        row = _row(message)
+        if row is None or time in self._estimates:
+            self._faults["broken" if row is None else "repeated"].append(time)
         else:
-            self._counts[fault] += 1
-            self._first.setdefault(fault, time)
-
-    def advance(self, now: int) -> None:
-        if max(len(self._truth), len(self._estimates)) >= MOST_POSES:
-            self.conclude(JudgedTime(f"in {self.elapsed(now):.2f} s, until memory was full", ""))
+            self._estimates[time] = row
 
     def decide(self, span: JudgedTime) -> Verdict:
         if not self._truth:
@@ -99,16 +85,15 @@ class TrajectoryError(Evaluator):
         number = model.nearest(known, times, round(most * MICROSECONDS))
         if len(times) and (number < 0).all() and np.diff(known, prepend=known[0]).max() > 2 * most * MICROSECONDS:
             raise UnjudgeableError(f"no true pose is within max-diff, {most:g} s, of an estimate: they are too rare")
-        self._counts["unmatched"] = int((number < 0).sum())
+        counts = {name: len(each) for name, each in self._faults.items()} | {"unmatched": int((number < 0).sum())}
         times = times[number >= 0]
         found = self._errors(times, known[number[number >= 0]]) if len(times) else {}
         hidden = self.hidden_samples if self._shift else self.hidden
         edges = [hidden.shown(time) for time in (int(known[0]), *times.tolist(), int(known[-1]))]
-        counts = {**self._counts, "estimates": len(times), "gap": float(np.diff(edges).max()) / MICROSECONDS}
-        checks = tuple(self.checks({**found, **counts}))
-        if not len(times) and not any(self._counts.values()):
+        gap = float(np.diff(edges).max()) / MICROSECONDS
+        checks = tuple(self.checks({**found, **counts, "estimates": len(times), "gap": gap}))
+        if not len(times) and not any(counts.values()):
             return Verdict("failed", f"no {self._name} came {span.within}", checks, silent=True)
-        self._asides += [self._say(check) for check in checks if check.name == "late" and check.value]
         is_kept = all(check.ok for check in checks)
         told = [self._say(check) for check in checks if not check.ok and (check.value is not None or found)]
         if is_kept:
@@ -121,16 +106,17 @@ class TrajectoryError(Evaluator):
         """Errors by their names; none where the estimates cannot be aligned. Raises UnjudgeableError if none can."""
         truth = model.poses(np.array([self._truth[time] for time in known.tolist()]))
         given = model.poses(np.array([self._estimates[time] for time in times.tolist()]))
-        align, size = self._flags["align"], 2 if self._flags["align"] == "se2" else 3
-        if align in ("none", "origin"):
-            return self._compare(times, truth, model.moved_by_first(given, truth) if align == "origin" else given)
-        way, what = np.array([row[:size] for row in self._truth.values()]), "is straight" if size == 3 else "stands"
-        if model.is_open(way, way):
-            raise UnjudgeableError(f"the true way {what}, which leaves 'align: {align}' open")
-        if model.is_open(given.positions[:, :size], truth.positions[:, :size]):
-            self._asides.append(f"the way of the estimates {what}, which leaves 'align: {align}' open")
-            return {}
-        return self._compare(times, truth, model.moved_by_all(given, truth, size))
+        if self._flags["align"] == "origin":
+            given = model.moved_by_first(given, truth)
+        elif self._flags["align"] == "se3":
+            way = np.array([row[:3] for row in self._truth.values()])
+            if model.is_open(way, way):
+                raise UnjudgeableError("the true way is straight, which leaves 'align: se3' open")
+            if model.is_open(given.positions, truth.positions):
+                self._asides.append("the way of the estimates is straight, which leaves 'align: se3' open")
+                return {}
+            given = model.moved_by_all(given, truth)
+        return self._compare(times, truth, given)
 
     def _compare(self, times: Times, truth: Poses, moved: Poses) -> dict[str, float]:
         away, turned = model.absolute(truth, moved)
@@ -144,9 +130,6 @@ class TrajectoryError(Evaluator):
         self._evidence |= {"estimate-x": guess_x, "estimate-y": guess_y}
         found = {"ate": model.rmse(away), "mean": float(away.mean()), "error": float(away.max()),
                  "rotation": model.rmse(turned), "rotation-error": float(turned.max())}  # fmt: skip
-        least = model.rmse(model.absolute(truth, model.moved_by_first(moved, truth))[0])
-        if found["ate"] > max(2 * least, self._most.get("ate", np.inf)):
-            self._asides.append(f"with 'align: origin' the absolute trajectory error is {least:.3f} m")
         steps = {"frames": np.ones(len(times) - 1), "s": np.diff(times),
                  "m": np.linalg.norm(np.diff(moved.positions, axis=0), axis=1)}  # fmt: skip
         unit = self._flags["delta-unit"]
@@ -165,7 +148,10 @@ class TrajectoryError(Evaluator):
             yield Check(name, value, {} if limit is None else {side: limit}, unit, ok)
 
     def _say(self, check: Check) -> str:
-        delta, when = "{delta:g} {delta-unit}".format(**self._flags), self._when(self._first.get(check.name, 0))
+        delta, when = (
+            "{delta:g} {delta-unit}".format(**self._flags),
+            self._when([*self._faults.get(check.name, ()), 0][0]),
+        )
         return _MEASURES[check.name][1].format(value=_told(check), delta=delta, when=when)
 
     def _when(self, time: int) -> str:
