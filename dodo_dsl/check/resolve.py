@@ -190,6 +190,8 @@ def resolve(
             if (manifest := manifests.get(use.uses.text)) is not None and use.layer in manifest.layers
         )
         services = tuple(_at_camera_rate(each, services) for each in services)
+        judged, is_judged = ",".join(_lines_of_judges(services)), operator.attrgetter("parameter.judged")
+        services = tuple(_with_default(each, judged, is_judged) for each in services)
         types = own_types(deployment.ros_types)
         services, wiring = _driven(services, wire(services, declared, types), declared, types)
         if takes_old_frames(wiring, deployment.messages):
@@ -221,6 +223,13 @@ def _at_camera_rate(service: ResolvedService, others: Iterable[ResolvedService])
         found = (each.arguments["freq"].value for each in others if each.use.uses.text == rate.parameter.shared)
         return replace(service, arguments={**service.arguments, "freq": replace(rate, value=next(found, None))})
     return service
+
+
+def _lines_of_judges(services: Iterable[ResolvedService]) -> Iterable[str]:
+    """Goals and gates of the evaluators, each once: lines of a map that a vehicle crosses."""
+    texts = [service.texts for service in services if service.use.layer == "evaluation"]
+    names = (name for each in texts for key in ("goal", "gates") for name in each.get(key, "").split(","))
+    return dict.fromkeys(filter(None, names))
 
 
 def _driven(

@@ -294,7 +294,8 @@ def resolved(
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
         entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
-        has_effect, is_of_test = holds(parameter.when, texts), parameter.driving or parameter.within_timeout
+        has_effect = holds(parameter.when, texts)
+        is_of_test = parameter.driving or parameter.judged or parameter.within_timeout
         is_same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
         if known and is_same and not (parameter.when and has_effect is (known.value is None)):
             found = known

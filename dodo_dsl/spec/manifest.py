@@ -124,7 +124,8 @@ class Parameter:
     must not be empty; ``format`` shows what is in the file that a path names, which is checked as the service reads it;
     an amount with ``or_share`` may be ``25 %``. Items of a list are strings, or numbers if ``of`` asks for them; it
     has as many of them as the list that ``per`` names, or one. It has an effect only ``when`` others are so. The
-    messages that drive the vehicle take the place of the default of one that is ``driving``. ``deprecated`` is why.
+    messages that drive the vehicle take the place of the default of one that is ``driving``, and goals and gates of the
+    test's evaluators that of one that is ``judged``. ``deprecated`` is why.
     """
 
     name: str
@@ -151,6 +152,7 @@ class Parameter:
     example: Value = None
     when: When = field(default_factory=dict)
     driving: bool = False
+    judged: bool = False
     deprecated: str = ""
 
     @property

@@ -34,6 +34,6 @@ def build(context: Context) -> LidarService:
         raise ValueError(f"the range from {near:g} to {far:g} m is empty: --min-range has to be below --max-range")
     place = (flags["x"], flags["y"], flags["z"], math.radians(flags["yaw"]))
     lidar = Lidar(*place, math.radians(flags["field-of-view"]), flags["rays"], near, far, flags["noise"])
-    outlines = Outlines(Path(flags["map-path"]), flags["walls"], flags["frame-id"])
+    outlines = Outlines(Path(flags["map-path"]), flags["walls"], flags["frame-id"], flags["not-walls"])
     scanner = Scanner(outlines, lidar, flags["seed"], flags["id"])
     return LidarService(context, scanner, Places(flags["frame-id"], outlines.moving, context.log))

@@ -30,7 +30,7 @@ Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.intp]
 
 EVERY = "*"
-"""As a wall: all obstacles."""
+"""As a wall: all obstacles but those that are none."""
 _SLACK = 1e-9
 """By how much of its length a segment counts as longer, so that no ray slips through between two of them."""
 _NEAR = 1e-6
@@ -260,13 +260,16 @@ class Mesh:
 class Outlines:
     """All that stands in a map, and what moves in it: models at the frames of sender stamps."""
 
-    def __init__(self, path: Path, walls: Sequence[str] = (), own: int | None = None) -> None:
-        """``walls`` are obstacles whose lines stop rays, ``*`` for all.
+    def __init__(
+        self, path: Path, walls: Sequence[str] = (), own: int | None = None, not_walls: Sequence[str] = ()
+    ) -> None:
+        """``walls`` are obstacles whose lines stop rays, ``*`` for all but ``not_walls``.
 
         The model at the frame ``own`` is the vehicle itself, which its sensors do not see. Raises MapError.
         """
         self._map: MapFile = read_map(path)
-        names = list(read_obstacles(self._map.path)) if EVERY in walls else walls
+        every = [name for name in read_obstacles(self._map.path) if name not in not_walls] if EVERY in walls else []
+        names = [*every, *(name for name in walls if name != EVERY)]
         self._walls: list[Line] = picked_lines(path, names)
         files = dict.fromkeys(model.file for model in self._map.models)
         self._meshes = {file: Mesh.load(file) for file in files}

@@ -75,6 +75,20 @@ evaluation: {{track: {{uses: collision, with: {{goal: finish, requests: [{PEDAL}
     assert track.texts["requests"] == f"{PEDAL}/1"
 
 
+@pytest.mark.parametrize(
+    ("goal", "written", "expected"),
+    [("goal: finish, gates: [a, b, a]", "", "finish,a,b"), ("min-distance: 1 m", "", ""), ("goal: finish", "[]", "")],
+)
+def test_goals_and_gates_are_no_walls_of_sensors(tmp_path: Path, goal: str, written: str, expected: str) -> None:
+    own = f", not-walls: {written}" if written else ""
+    example = f"""\
+environment: {{scan: {{uses: lidar, with: {{map-path: map, walls: ['*']{own}}}}}}}
+evaluation: {{track: {{uses: collision, with: {{{goal}}}}}}}
+"""
+    (scan,) = (service for service in resolved(example, tmp_path).services if service.use.name == "scan")
+    assert scan.texts["not-walls"] == expected
+
+
 def test_instances_of_a_matrix_of_drives_have_the_parameters_of_their_own(tmp_path: Path) -> None:
     example = """\
 matrix: {drive: [kiwi, differential]}

@@ -108,6 +108,8 @@ def test_walls_are_obstacles_that_are_named(write_map):
     ), "through the hole and beside it"
     every = Outlines(write_map(content), ["*"]).at(0.1)
     assert every.distances(np.zeros((1, 2)), directions(np.zeros(1)), 6.0).tolist() == [1.0], "the finish, too"
+    rest = Outlines(write_map(content), ["*"], not_walls=["finish", "elsewhere"]).at(0.1)
+    assert rest.distances(np.zeros((1, 2)), directions(np.zeros(1)), 6.0).tolist() == [math.inf], "through the hole"
 
 
 def test_what_moves_stands_at_its_frame_and_the_vehicle_is_not_seen(write_map, cube_obj):
