@@ -18,6 +18,8 @@ PATIENCE, ALONE = 3.0, 15.0
 """Seconds for which a topic may lack its other end, and a graph any node."""
 AGE, AHEAD, ANOTHER_CLOCK = 2.0, 0.2, 600.0
 """Seconds by which a stamp may lie before and after its message's arrival, and those of another clock."""
+COMMANDS = frozenset({"geometry_msgs/msg/TwistStamped", "ackermann_msgs/msg/AckermannDriveStamped"})
+"""Types of which one without a stamp counts when it comes, as a Twist does; many nodes leave it out."""
 _NEAR = 0.6
 _MOST = 100
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -119,6 +121,8 @@ def frame_problem(topic: Topic, frame_id: str, expected: str) -> str:
 def stamp_problem(topic: Topic, stamp_us: int, now_us: int) -> str:
     """Of a message's ``header.stamp``; empty for none."""
     age = (now_us - stamp_us) / 1e6
+    if stamp_us == 0 and topic.type in COMMANDS:
+        return ""
     if stamp_us == 0:
         return f"{topic.topic} comes without a stamp; expected that of what it answers (header.stamp)"
     if -AHEAD <= age <= AGE:

@@ -147,6 +147,8 @@ def test_judges_stamps_and_frames() -> None:
     for frame, expected in (("odom", "map"), ("", "laser"), ("/laser", "laser"), ("x", "")):
         assert not findings.frame_problem(GRAPH.sent[0], frame, expected)
     assert "in frame 'base'; expected 'laser'" in findings.frame_problem(GRAPH.sent[0], "base", "laser")
+    drive = Topic(topic="/drive", type="ackermann_msgs/msg/AckermannDriveStamped", bus=GRAPH.sent[0].bus)
+    assert not findings.stamp_problem(drive, 0, 50_000_000), "a command counts when it comes"
 
 
 def test_says_what_a_larger_buffer_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
