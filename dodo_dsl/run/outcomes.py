@@ -151,6 +151,11 @@ def unstartable(plan: Plan, service: str, why: str) -> str:
     hint = "; build it first" if is_missing and "/" in program and not Path(program).is_absolute() else ""
     if is_missing and program == DISPLAY_SERVER[0]:
         hint = "; its 'display' needs Xvfb: apt install xvfb xauth"
+    path = Path(why.removesuffix(f": {os.strerror(errno.ENOENT)}"))
+    if ".." in path.parts and path.exists():
+        outside = Path(*path.parts[path.parts.index("..") :]).parent
+        folder = outside.parent if outside.name == "bin" else outside
+        hint = f"; it is there, but the test does not see it: write 'sandbox: {{read: [{folder}]}}' in dodo.yml"
     return f"service '{service}' could not be started: {why}{hint}"
 
 

@@ -106,6 +106,16 @@ def test_a_program_that_is_not_there_has_to_be_built(program: str, why: str, hin
     assert sentence == f"service 'app' could not be started: {why}{hint}"
 
 
+def test_a_program_outside_of_what_a_test_sees_has_to_be_named(tmp_path: Path) -> None:
+    program = tmp_path / "ros" / "bin" / "python"
+    program.parent.mkdir(parents=True)
+    (tmp_path / "app").mkdir()
+    why = f"{tmp_path}/app/../ros/bin/python: No such file or directory"
+    assert "'sandbox: {read: [../ros]}'" not in unstartable(plan(), "app", why)
+    program.touch()
+    assert unstartable(plan(), "app", why).endswith("write 'sandbox: {read: [../ros]}' in dodo.yml")
+
+
 def test_an_internal_error_leaves_its_traceback(tmp_path: Path) -> None:
     reason = error_reason(KeyError("a\nb" + "c" * 1000), tmp_path)
     assert reason.startswith("internal error: KeyError: 'a\\nbccc")
