@@ -140,6 +140,12 @@ def test_a_spinning_program_is_noted(built: Path) -> None:
         assert application.run(1)["notes"] == [{"kind": "spin", "service": 0, "name": "programs"}]
 
 
+def test_the_events_of_fast_dds_may_spin(built: Path) -> None:
+    (built / "dds.ev.0").symlink_to("programs")
+    with Application(built, [built / "dds.ev.0", "spins"]) as application:
+        assert application.run(1)["notes"] == []
+
+
 def test_who_wakes_again_and_again_is_named(built: Path) -> None:
     with Application(built, [built / "programs", "storm"]) as application:
         busy = application.run(1, "busy")["busy"]
