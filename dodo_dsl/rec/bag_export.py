@@ -9,7 +9,7 @@ import numpy as np
 
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
-from dodo_dsl.opendlv.message_set import MessageError, MessageSet
+from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.recording import Recording
 from dodo_dsl.opendlv.ros_codec import Fields
 from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
@@ -17,7 +17,7 @@ from dodo_dsl.opendlv.ros_types import COMPRESSED, DETECTIONS, CameraView, Topic
 from dodo_dsl.opendlv.ros_types import IMAGE as IMAGE_TYPE
 from dodo_dsl.opendlv.video import CODECS, VideoDecoder, VideoError
 from dodo_dsl.rec.bag import WRITTEN, Key
-from dodo_dsl.rec.frames import IMAGE, packets
+from dodo_dsl.rec.frames import IMAGE, decoder_of, packet_of, packets
 
 
 @dataclass
@@ -112,13 +112,15 @@ class BagExport:
         """A JPEG stays as it is, others are decoded."""
         time, topic = _time(envelope), Topic(topic=f"{camera}/image_raw", type=IMAGE_TYPE, bus=())
         try:
-            image = MessageSet.standard().decode(IMAGE, envelope.payload)  # set 0.9 has the same numbers
-            if CODECS.get(image.format) == "mjpeg":
+            packet = packet_of(envelope)
+            if CODECS.get(packet.format) == "mjpeg":
                 topic = Topic(topic=f"{topic.topic}/compressed", type=COMPRESSED, bus=())
-                data = {"format": "jpeg", "data": np.frombuffer(image.data, np.uint8)}
+                data = {"format": "jpeg", "data": np.frombuffer(packet.data, np.uint8)}
                 fields = self._types.given_header(topic, time) | data
             else:
-                fields = self._types.given(topic, {}, time, self._decoded(image, envelope.sender_stamp))
+                if (frame := decoder_of(self._decoders, packet).decode(packet.data)) is None:
+                    raise VideoError("a packet cannot be decoded")
+                fields = self._types.given(topic, {}, time, CameraPicture(frame.pixels("bgr"), "bgr"))
             self._write(topic, time, fields)
         except ValueError as error:
             self._skip(topic.topic, error)
@@ -130,15 +132,6 @@ class BagExport:
             self._connections[topic.topic] = made
         self._writer.write(self._connections[topic.topic], time * 1000, data)
         self.counts[topic.topic, topic.type] += 1
-
-    def _decoded(self, image: Any, stamp: int) -> CameraPicture:
-        key = stamp, image.format
-        if key not in self._decoders:
-            self._decoders[key] = VideoDecoder(image.format)
-        frame = self._decoders[key].decode(image.data)
-        if frame is None:
-            raise VideoError("a packet cannot be decoded")
-        return CameraPicture(frame.pixels("bgr"), "bgr")
 
     def _skip(self, topic: str, error: Exception) -> None:
         self.skipped[topic] += 1

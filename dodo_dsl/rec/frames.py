@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.recording import Recording
@@ -46,16 +47,17 @@ def images_of(recording: Recording, rows: Numbers, camera: int | None) -> Number
 
 def packets(recording: Recording, rows: Numbers) -> Iterator[Packet]:
     """The packets of image messages in the order of ``rows``; one that cannot be read has an empty format."""
-    messages = MessageSet.standard()
-    for envelope in recording.envelopes(rows):
-        try:
-            image = messages.decode(IMAGE, envelope.payload)  # set 0.9 has the same numbers under other names
-        except MessageError:
-            yield Packet(envelope.sender_stamp, envelope.sample_time, "", b"")
-        else:
-            yield Packet(
-                envelope.sender_stamp, envelope.sample_time, image.format, image.data, image.width, image.height
-            )
+    return map(packet_of, recording.envelopes(rows))
+
+
+def packet_of(envelope: Envelope) -> Packet:
+    """The packet of an image message; one that cannot be read has an empty format."""
+    stamp, time = envelope.sender_stamp, envelope.sample_time
+    try:
+        image = MessageSet.standard().decode(IMAGE, envelope.payload)  # set 0.9 has the same numbers under other names
+    except MessageError:
+        return Packet(stamp, time, "", b"")
+    return Packet(stamp, time, image.format, image.data, image.width, image.height)
 
 
 def decoded(
@@ -71,7 +73,7 @@ def decoded(
         frame = None
         try:
             if packet.format:
-                frame = _decoder(decoders, packet).decode(packet.data)
+                frame = decoder_of(decoders, packet).decode(packet.data)
         except VideoError as error:
             if str(error) not in reasons and len(reasons) < MOST_DECODERS:
                 reasons.add(str(error))
@@ -94,7 +96,7 @@ def write_picture(path: Path, frame: DecodedFrame) -> None:
     path.write_bytes(data.tobytes())
 
 
-def _decoder(decoders: dict[tuple[int, str], VideoDecoder], packet: Packet) -> VideoDecoder:
+def decoder_of(decoders: dict[tuple[int, str], VideoDecoder], packet: Packet) -> VideoDecoder:
     """The decoder of a packet's camera, a new one for the first packet; raises VideoError."""
     refuse_large(packet.width, packet.height)
     key = packet.sender_stamp, packet.format
