@@ -11,7 +11,7 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import MessageError
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.ros_codec import Fields
+from dodo_dsl.opendlv.ros_codec import Fields, RosTypeError
 from dodo_dsl.opendlv.ros_messages import CameraPicture, Types
 from dodo_dsl.opendlv.ros_types import COMPRESSED, DETECTIONS, CameraView, Topic
 from dodo_dsl.opendlv.ros_types import IMAGE as IMAGE_TYPE
@@ -127,6 +127,8 @@ class BagExport:
 
     def _write(self, topic: Topic, time: int, fields: Fields) -> None:
         data = self._types.encode(topic.type, fields)
+        if time < 0:
+            raise RosTypeError(f"{time} us is before 1970")
         if topic.topic not in self._connections:
             made = self._writer.add_connection(topic.topic, topic.type, typestore=self._types.store)
             self._connections[topic.topic] = made

@@ -128,10 +128,12 @@ def test_a_bag_becomes_a_recording_and_a_bag_again(storage: str, compression: Co
 def test_one_file_is_a_bag_and_jpeg_stays_as_it_is(tmp_path: Path) -> None:
     jpeg = message("opendlv.proxy.ImageReading", BEGIN, 0, format="mjpg", width=8, height=8, data=b"\xff\xd8\xff\xd9")
     lonely = message("opendlv.proxy.GroundSteeringRequest", BEGIN, 0, groundSteering=1)
-    (tmp_path / "a.rec").write_bytes(b"".join(map(encode_frame, [jpeg, lonely, *video(3, sender_stamp=2)])))
+    early = message("opendlv.proxy.DistanceReading", -1, 0)
+    (tmp_path / "a.rec").write_bytes(b"".join(map(encode_frame, [jpeg, lonely, early, *video(3, sender_stamp=2)])))
     words = "export", tmp_path / "a.rec", "--ros", "-o", tmp_path / "b", "--force"
     for version in ("0.9", "1.0"):
-        code, stdout, _ = dodo_rec(*words, "--messages", version)
+        code, stdout, stderr = dodo_rec(*words, "--messages", version)
+        assert stderr == "dodo rec: skipped 1 message of /range: -1 us is before 1970\n"
         assert code == 0 and "  opendlv.proxy.GroundSteeringRequest: 1 -> left out\n" in stdout
     with Reader(tmp_path / "b" / "b.mcap") as reader:
         found = {c.topic: TYPES.decode(c.msgtype, data) for c, _, data in reader.messages()}
