@@ -105,7 +105,8 @@ def test_nodes_know_nothing_of_dodo(name: str) -> None:
 
 @pytest.mark.parametrize("name", NODES)
 def test_their_tests_compile(name: str, tmp_path: Path) -> None:
-    assert "1 test checked: no problems" in dodo(copy(name, tmp_path), "compile", "--check")
+    said = dodo(copy(name, tmp_path), "compile", "--check")
+    assert "1 test checked" in said and "error" not in said, said
 
 
 @pytest.mark.slow
