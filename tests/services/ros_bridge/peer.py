@@ -58,7 +58,7 @@ class Peer(Node):
             at = message
             for name in above:
                 at = getattr(at, name)
-            setattr(at, last, value)
+            setattr(at, last, float(value) if value == "nan" else value)  # which JSON has not
         out.publish(message)
 
 

@@ -165,7 +165,7 @@ WRONG_PEERS = {
         end("/frame", POSE, age=0.0, fields={**QX, "header.frame_id": "camera"}),
         end("/unstamped", POSE, fields=QX),
         end("/old", POSE, age=7200.0, fields=QX),
-        end("/nothing", POSE, age=0.0, fields={"pose.orientation.w": float("nan")}),
+        end("/nothing", POSE, age=0.0, fields={"pose.orientation.w": "nan"}),
     ],
     "short": [end("/elsewhere", TWIST, fields=VX)],
 }
