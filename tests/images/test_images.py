@@ -66,7 +66,7 @@ def await_health(container: str, patience: float = 600.0) -> str:
 
 
 def test_there_is_an_image_for_each_service(built: dict[str, str]) -> None:
-    assert set(built) == {"base", "geometry", "vision", "sandbox", *(m.image for m in MANIFESTS.values())}
+    assert set(built) == {"base", "geometry", "vision", "sandbox", "ros-bridge", *(m.image for m in MANIFESTS.values())}
 
 
 @each_service
@@ -213,7 +213,8 @@ def test_layers_are_shared(built: dict[str, str]) -> None:
     found = {name: (int(size), json.loads(layers)) for name, (size, layers) in zip(built, rows, strict=True)}
     base, geometry, vision = (found[name][1] for name in ("base", "geometry", "vision"))
     assert geometry[: len(base) - 1] == base[:-1] and vision[: len(geometry) - 1] == geometry[:-1]
-    for name in {*built} - {"base", "geometry", "vision"}:
+    assert found["ros-bridge"][1][: len(geometry) - 1] == geometry[:-1], "its own stage is above vision's libraries"
+    for name in {*built} - {"base", "geometry", "vision", "ros-bridge"}:
         stage, (size, layers) = targets()[name]["args"]["STAGE"], found[name]
         size_below, below = found["base" if stage == "rig" else stage]
         assert layers[: len(below)] == below, name
