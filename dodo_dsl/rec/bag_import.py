@@ -54,7 +54,8 @@ class BagImport:
     def _chosen(self, known: Iterable[Topic]) -> Iterator[Topic]:
         """The topics that a recording can have; those of the same messages get sender stamps."""
         camera, counts = self._camera(), self._bag.counts
-        own = {(each.topic, each.type): each for each in known if (each.topic, each.type) in counts and each.bus}
+        known = (each for each in known if each.bus and each.type not in PICTURES)  # theirs is a shared memory
+        own = {(each.topic, each.type): each for each in known if (each.topic, each.type) in counts}
         used = Counter[str]({name: stamp + 1 for each in own.values() for name, stamp in messages_of(each)})
         for key in counts:
             topic, type_ = key
