@@ -78,7 +78,7 @@ def _words(node: Node | None) -> Iterator[Word]:
 
 _GRAPH = {"ROS_LOCALHOST_ONLY": "0", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 _DOMAINS = 102
-"""Domains whose ports lie below those that Linux gives programs."""
+"""Domains whose ports lie below those that Linux gives programs; beyond them, CIDs begin anew at 1."""
 
 
 def variables(cid: int, *, own_network: bool) -> tuple[dict[str, str], dict[str, str]]:
@@ -86,7 +86,8 @@ def variables(cid: int, *, own_network: bool) -> tuple[dict[str, str], dict[str,
 
     On the host's network, each test has another domain.
     """
-    return {**_GRAPH, "ROS_DOMAIN_ID": "0" if own_network else str(cid % _DOMAINS)}, dict(NODE_ENVIRONMENT)
+    domain = 0 if own_network else cid if cid < _DOMAINS else cid - _DOMAINS + 1
+    return {**_GRAPH, "ROS_DOMAIN_ID": str(domain)}, dict(NODE_ENVIRONMENT)
 
 
 def bridge() -> source.Mapping:

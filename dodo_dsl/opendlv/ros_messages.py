@@ -133,7 +133,8 @@ class Types(Codec):
         types = {each.name: each.type for each in self.messages.layout(name).definition.fields}
         for field, path in self._paths(topic, name).items():
             found = functools.reduce(operator.getitem, path.split("."), fields)
-            value = _of_ros(path, found)
+            is_judged = name == ros.POSE_ESTIMATE  # by its evaluator, also where it is not a number
+            value = found if is_judged else _of_ros(path, found)
             if isinstance(value, bool | float) and types[field] not in ("float", "double") and value % 1 == 0:
                 value = int(value)
             try:

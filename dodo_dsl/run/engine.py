@@ -18,6 +18,7 @@ from dodo_dsl.run.protocol import (
     Event,
     Exited,
     Foreign,
+    GraphFinding,
     Late,
     Noted,
     Overrun,
@@ -140,7 +141,7 @@ class Engine:
                 self.state.add_finding("failed", event.reason)
             if isinstance(event, Exited):
                 self.state.note_end(event, is_asked=True)
-            if isinstance(event, Overrun | Late | Paused | Noted | Time):
+            if isinstance(event, Overrun | Late | Paused | Noted | Time | GraphFinding):
                 self.state.take(event)
 
     async def _set_up(self) -> None:

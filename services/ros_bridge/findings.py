@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import sys
 import threading
 from collections.abc import Iterable, Iterator
@@ -24,7 +25,6 @@ _NEAR = 0.6
 _MOST = 100
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 _LIMIT, _SOCKETS = Path("/proc/sys/net/core/rmem_max"), Path("/proc/net/udp")
-_BUS_PORT = 12175
 
 Key = tuple[object, ...]
 
@@ -146,10 +146,11 @@ def loss(topic: Topic, node: str, size: int, lost: int) -> str:
 
 def lost_datagrams() -> int:
     """How many the kernel dropped for full buffers in this network, but those of the bus."""
-    lost = 0
+    lost, first = 0, 7400 + 250 * int(os.environ.get("ROS_DOMAIN_ID") or 0)
+    ports = range(first, first + 250)
     with contextlib.suppress(OSError):
         for words in map(str.split, _SOCKETS.read_text().splitlines()[1:]):
-            if len(words) > 12 and int(words[1].rpartition(":")[2], 16) != _BUS_PORT:
+            if len(words) > 12 and int(words[1].rpartition(":")[2], 16) in ports:
                 lost += int(words[12])
     return lost
 
@@ -173,7 +174,7 @@ class Findings:
             self._said.add(finding.key)
         record = {"dodo": "ros", "finding": finding.text, "severity": finding.severity}
         print(json.dumps(record, ensure_ascii=False), flush=True)
-        print(f"ros-bridge: {finding.severity}: {finding.text}", file=sys.stderr, flush=True)
+        print(f"ros-bridge: {finding.severity}: {' '.join(finding.text.split())}", file=sys.stderr, flush=True)
 
     def say_later(self, kind: str, topic: Topic, text: str) -> None:
         """An error of what a node sent, when its name is known; nothing for an empty text."""
@@ -193,7 +194,7 @@ class Findings:
         if not last and now - self._changed < (SETTLED if is_named else NAMELESS):
             return
         if not last or now - self._removed >= SETTLED:
-            for finding in problems(self._graph, self._seen, now - self._first + last * PATIENCE):
+            for finding in problems(self._graph, self._seen, now - self._first + last * ALONE):
                 self.say(finding)
         with self._lock:
             later, self._later = self._later, {}

@@ -10,6 +10,7 @@ from dodo_dsl.application.interpolation import EnvironmentProblem, dotenv_file, 
 from dodo_dsl.application.model import OFFSCREEN
 from dodo_dsl.application.opendlv_flags import CID_VARIABLES, memory_name, with_cid, with_cid_text, with_memory_prefix
 from dodo_dsl.application.ros_topics import BRIDGE
+from dodo_dsl.application.ros_topics import variables as ros_variables
 from dodo_dsl.emit.output_folder import FILES
 from dodo_dsl.opendlv.address import CHANNEL_VARIABLE
 from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, TIME, TIME_FOLDER
@@ -116,6 +117,8 @@ class Commands:
             own.update(dotenv_file(folder / expanded(path), {**given, **variables}, own, raw=raw))
         own.update(given)
         own = {name: cids.get(name, with_cid_text(value, self.slot.cid)) for name, value in own.items()}
+        if self.plan.isolation == "host" and any(each.name == BRIDGE for each in self.plan.application.services):
+            own |= ros_variables(self.slot.cid, own_network=False)[0]  # the slot's CID may be another than the plan's
         pairs = ((word, interpolate(word, variables)) for word in service.command)
         words = tuple(value for word, value in pairs if value or not word.startswith("$"))
         argv = with_memory_prefix(with_cid((*(service.process or ()), *words), self.slot.cid), self.slot.memory_prefix)

@@ -146,7 +146,7 @@ WRONG = RosGraph(
         topic("/frame", POSE, POSE_ESTIMATE),
         topic("/unstamped", POSE, POSE_ESTIMATE),
         topic("/old", POSE, POSE_ESTIMATE),
-        topic("/nothing", POSE, POSE_ESTIMATE),
+        topic("/nothing", TWIST, MOTION_REQUEST),
     ),
 )
 QX = {"pose.orientation.w": 1.0}
@@ -165,7 +165,7 @@ WRONG_PEERS = {
         end("/frame", POSE, age=0.0, fields={**QX, "header.frame_id": "camera"}),
         end("/unstamped", POSE, fields=QX),
         end("/old", POSE, age=7200.0, fields=QX),
-        end("/nothing", POSE, age=0.0, fields={"pose.orientation.w": "nan"}),
+        end("/nothing", TWIST, fields={"linear.x": "nan"}),
     ],
     "short": [end("/elsewhere", TWIST, fields=VX)],
 }
@@ -186,8 +186,8 @@ SENTENCES = [
     "/unstamped comes without a stamp; expected that of what it answers (header.stamp) (from 'teleop')",
     "the stamps of /old are of another clock, 2 h behind the test's: copy header.stamp, "
     "or take the node's clock (from 'teleop')",
-    "a message on /nothing is not taken: pose.orientation.w of /nothing is nan, "
-    "which robot.PoseEstimate.qw (double) cannot be (from 'teleop')",
+    "a message on /nothing is not taken: linear.x of /nothing is nan, "
+    "which opendlv.proxy.GroundMotionRequest.vx (float) cannot be (from 'teleop')",
     "'short' left the ROS graph during the test: it ended or hangs",
 ]
 
