@@ -74,7 +74,18 @@ class Sources:
     def resolve(self, declared: Mapping[str, Declared | None]) -> tuple[Resolved, ...]:
         """All topics of an application."""
         topics = [Resolved(name, topic) for name, each in declared.items() if each for topic in each.topics]
-        return tuple(map(self._resolved, topics))
+        found = tuple(map(self._resolved, topics))
+        seen = {each.maker.use.name: each.maker for each in found if each.is_picture and each.maker}
+        return tuple(self._of_camera(each, [*seen.values()]) for each in found)
+
+    def _of_camera(self, it: Resolved, seen: Sequence[ResolvedService]) -> Resolved:
+        """Detections with the camera whose pixels they count: the test's only one, or the only one that nodes see."""
+        cameras = {maker for _, maker in self.memories}
+        if it.written.given or it.problem or "/Detection" not in it.written.topic.type or not cameras:
+            return it
+        if len(cameras) > 1 and len(seen) != 1:
+            return it.refused("ros-source", f"could count pixels of {listed(sorted(cameras))}", "give nodes one")
+        return replace(it, maker=seen[0] if len(cameras) > 1 else self._service(cameras.pop()))
 
     def _resolved(self, it: Resolved) -> Resolved:
         written, topic = it.written, it.written.topic
@@ -92,10 +103,12 @@ class Sources:
             hint = f"write {topic.topic}: {{type: {topic.type}, {key}: opendlv.proxy.{example}}}"
             is_made = "is made of" if written.given else "becomes"
             return it.refused("ros-topic", f"does not say which message it {is_made}", hint)
+        missing = {path.partition(".")[0] for path in topic.fields.values()} - {*self.own.get(topic.type, ())}
+        if topic.type in self.own and missing:
+            hint = f"it has {', '.join(self.own[topic.type])}"
+            return it.refused("ros-topic", f"names the field '{min(missing)}', which {topic.type} has not", hint)
         if not written.given:
-            cameras = {maker for _, maker in self.memories} if "/Detection" in topic.type else set()
-            bus = tuple(name for name, _ in written.messages)
-            return replace(it, bus=bus, maker=self._service(cameras.pop()) if len(cameras) == 1 else None)
+            return replace(it, bus=tuple(name for name, _ in written.messages))
         return self._picture(it) if it.is_picture else self._message(it)
 
     def _service(self, name: str) -> ResolvedService | None:
@@ -120,7 +133,9 @@ class Sources:
 
     def _message(self, it: Resolved) -> Resolved:
         own = tuple(sorted({word.partition("/")[0] for word, _ in it.written.ports if "." in word}))
-        ways = GIVEN.get(it.written.topic.type) or (own,)
+        if not (ways := GIVEN.get(it.written.topic.type) or (own,) * bool(own)):
+            hint = "write the name of a message in 'from', such as opendlv.proxy.VoltageReading/0"
+            return it.refused("ros-topic", "does not say which message it is made of", hint)
         for names in ways:
             meant = [(port, maker) for port, maker in self.messages if _is_meant(it, port, maker)]
             found = [[one for one in meant if one[0].partition("/")[0] == name] for name in names]
@@ -128,6 +143,9 @@ class Sources:
                 several = next((each for each in found if len(each) > 1), None)
                 made = replace(it, bus=tuple(each[0][0] for each in found), maker=self._service(found[0][0][1]))
                 return _ambiguous(it, [port for port, _ in several]) if several else made
+        if any(port.partition("/")[0] == "*" for port, _ in self.messages):  # of a recording
+            asked = {word.partition("/")[0]: word for word, _ in it.written.ports}
+            return replace(it, bus=tuple(asked.get(name, f"{name}/0") for name in ways[0]))
         it = replace(it, wanted=tuple(name for names in ways for name in names))
         return _without_source(it, " or ".join(" with ".join(names) for names in ways), self.messages)
 
@@ -174,11 +192,15 @@ def problems(topics: Iterable[Resolved]) -> Iterator[Diagnostic]:
         if other.written.topic.type != topic.type:
             why = f"has two types: '{other.service}' has {other.written.topic.type}"
             found = replace(each, written=replace(each.written, span=each.written.type_span)).refused("ros-topic", why)
+        elif other.written.given != each.written.given:
+            found = each.refused("ros-topic", "is both in 'in' and in 'out'", "give one of them another topic")
+        elif (other.written.topic, *other.bus) != (topic, *each.bus) and not (other.problem or each.problem):
+            found = each.refused("ros-topic", f"has other keys than at '{other.service}'", "write the same at both")
         elif other is not each and not each.written.given and not other.written.given:
             why, hint = f"is published by '{other.service}' and '{each.service}'", "give one of them another topic"
             found = each.refused("ros-topic", why, hint, "warning")
         for name in () if each.written.given else each.bus:
-            if (before := sent.setdefault(name, each)).written.topic.topic != topic.topic:
+            if (before := sent.setdefault(name.removesuffix("/0"), each)).written.topic.topic != topic.topic:
                 hint = "remove one, or give it another message with 'to'"
                 found = each.refused("ros-topic", f"and '{before.written.topic.topic}' both become {name}", hint)
         if found and found.problem:
@@ -224,11 +246,18 @@ def _frames(resolved: Iterable[Resolved]) -> Iterator[StaticFrame]:
             continue
         seen.add(child)
         texts = each.maker.texts
-        place = {key: float(texts.get(key, "0").split(",")[0]) for key in ("x", "y", "z")}
-        roll, pitch, yaw = (math.radians(float(texts.get(key, "0").split(",")[0])) for key in ("roll", "pitch", "yaw"))
+        place = {key: _of_sensor(texts, key, each) for key in ("x", "y", "z")}
+        roll, pitch, yaw = (math.radians(_of_sensor(texts, key, each)) for key in ("roll", "pitch", "yaw"))
         body = child.removesuffix("_optical_frame") + "_link" if each.is_picture else child
         if each.is_picture:
             pitch = 0.0 - pitch  # a camera's is positive upwards, in REP 103 downwards
         yield StaticFrame(parent=_ROBOT, child=body, **place, roll=roll, pitch=pitch, yaw=yaw)
         if each.is_picture:
             yield StaticFrame(parent=body, child=child, roll=-math.pi / 2, yaw=-math.pi / 2)
+
+
+def _of_sensor(texts: Mapping[str, str], key: str, of: Resolved) -> float:
+    """A number of a service that may have several sensors: one for all of them, or one each by their sender stamps."""
+    values, stamps = texts.get(key, "0").split(","), texts.get("id", "").split(",")
+    stamp = of.bus[0].rpartition("/")[2]
+    return float(values[stamps.index(stamp) if len(values) > 1 and stamp in stamps else 0])

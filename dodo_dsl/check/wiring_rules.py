@@ -12,8 +12,9 @@ from dodo_dsl.application.variables import owner, split_by, with_variables
 from dodo_dsl.check import ros_topics
 from dodo_dsl.check.resolve import IMAGE, RuleContext, without_pictures
 from dodo_dsl.check.senders import HIDDEN, told
-from dodo_dsl.check.wiring import ANYTHING, End, Wiring
+from dodo_dsl.check.wiring import ANYTHING, End, Wiring, message
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, closest
+from dodo_dsl.opendlv.address import is_of_the_world
 from dodo_dsl.opendlv.ros_types import SENT
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec.manifest import Manifest
@@ -45,6 +46,11 @@ def check_topics(context: RuleContext) -> Iterator[Diagnostic]:
     """``ros-topic``, ``ros-type`` and ``ros-source``."""
     if not context.test.is_complete:
         return
+    for each in context.wiring.topics:
+        for name in each.bus if each.written.given and not each.is_picture else ():
+            if is_of_the_world(name) or context.wiring.judges_by(message(name, 0)):
+                what = f"'{each.written.topic.topic}' is made of {name}, which only a simulation has"
+                yield Diagnostic(each.written.span, "ros-topic", what, "it is in no topic: remove it")
     for problem in ros_topics.problems(context.wiring.topics):
         wanted = {name for each in context.wiring.topics if each.problem == problem for name in each.wanted}
         makers = (m.name for name in wanted for m in context.manifests.values() if _sends(m, name))

@@ -34,6 +34,9 @@ from dodo_dsl.spec.model import LAYERS
 from dodo_dsl.spec.rig import EMULATED, EMULATED_FILE, PORT, SIMULATION_TAG
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 
+_MOST_OF_TOPICS = 120_000
+"""Bytes of what the ROS bridge is started with: Linux takes 131,072 in one word."""
+
 
 @dataclass(frozen=True)
 class Compiled:
@@ -231,12 +234,16 @@ class _Builder:
     def _bridge(self) -> Iterator[str]:
         """The flags of what stands between the bus and the application's ROS graph."""
         graph = ros_topics.graph(self.test.wiring.topics)
-        yield from (f"--name={topic.bus[0]}" for topic in graph.given if topic.camera)
+        yield from dict.fromkeys(f"--name={topic.bus[0]}" for topic in graph.given if topic.camera)
         own = {
-            "types": dict(map(_ros_type, self.deployment.ros_types)),
+            "types": dict(itertools.starmap(_ros_type, enumerate(self.deployment.ros_types))),
             "messages": "\n".join(path.read_text(encoding="utf-8") for path in self.deployment.messages),
         }
-        yield f"--topics={msgspec.json.encode(msgspec.structs.replace(graph, **own)).decode()}"
+        text = msgspec.json.encode(msgspec.structs.replace(graph, **own)).decode()
+        if len(text) > _MOST_OF_TOPICS:
+            what = f"topics with the files of 'messages' in dodo.yml take {len(text):,} bytes"
+            raise FilesError(f"{what}, expected at most {_MOST_OF_TOPICS:,}: name fewer files")
+        yield f"--topics={text}"
 
     def _pooled(self) -> Pooled:
         test = of_test(self.spec)
@@ -325,11 +332,11 @@ class _Builder:
         return Flag(parameter.name, path.relative_to(real(self.spec.location.root)).as_posix(), "path")
 
 
-def _ros_type(path: Path) -> tuple[str, str]:
+def _ros_type(number: int, path: Path) -> tuple[str, str]:
     """The place of a type of ROS below a folder, by which it is named, and its text."""
     from dodo_dsl.opendlv.ros_codec import own_name
 
-    name = path.name if path.suffix == ".idl" else f"{own_name(path)}.msg"
+    name = f"{number}/{path.name}" if path.suffix == ".idl" else f"{own_name(path)}.msg"
     return name, path.read_text(encoding="utf-8")
 
 
