@@ -22,7 +22,7 @@ def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
 
 
 @needs_ros
-@pytest.mark.slow
+@pytest.mark.proof
 def test_the_page_for_ros_can_be_followed(tmp_path: Path) -> None:
     shutil.copytree(PYTHON.parents[1], tmp_path / ".ros", symlinks=True, copy_function=os.link)
     follow(DOCS / "tutorial" / "ros2.md", tmp_path, Path(sys.executable).parent)

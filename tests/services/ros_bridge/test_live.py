@@ -199,6 +199,7 @@ def test_names_what_goes_wrong() -> None:
     assert seen.code == 0
 
 
+@pytest.mark.proof
 def test_counts_pictures_that_a_small_buffer_loses() -> None:
     graph = RosGraph(given=(topic("/camera", IMAGE, "MEMORY", camera=CameraView(width=640, height=480)),))
     peers = {"lane": [end("/camera", IMAGE, reliable=False)]}
@@ -234,6 +235,7 @@ def test_a_strangers_bytes_and_floods_end_nothing() -> None:
     assert {fields for _, _, _, fields in seen.sent} == {"vx: 0.5 vy: 0 vz: 0 rollRate: 0 pitchRate: 0 yawRate: 0.25"}
 
 
+@pytest.mark.proof
 def test_ends_with_a_sentence_when_a_memory_is_lost() -> None:
     graph = RosGraph(given=(topic("/camera", IMAGE, "MEMORY", camera=CAMERA),))
     seen = played(Scenario(graph=graph, loses_memory=True, seconds=20))
