@@ -203,8 +203,8 @@ class RunState:
         """Notes an end of the application's that decides nothing, unless it is a good one or by SIGTERM."""
         if self.layer_of.get(event.service) != "application" or event.code in (0, *_ASKED):
             return
-        if is_asked and BRIDGE in self.layer_of and event.code not in _KILLED:
-            return  # a node of rclpy that catches nothing ends so
+        if is_asked and BRIDGE in self.layer_of and event.code == 1:
+            return  # so ends a node of rclpy that does not catch the exception of its executor
         how = "did not end upon SIGTERM and was killed" if is_asked and event.code in _KILLED else _how(event)
         when = "as the test ended" if is_asked else "when all was judged"
         at = self._when() or (f"after {self.time.seconds:.1f} s of test time" if self.time else "")

@@ -138,7 +138,7 @@ def of(freq: str, output: str = STEERING) -> Plan:
     ],
 )
 def test_pauses(tmp_path: Path, period: float, pause: float, freq: str, output: str, told: str) -> None:
-    """Neither what came before the begin counts, nor a message that comes less often than frames do."""
+    """A message that is rarer than the frames does not count, and neither does one from before the begin."""
     times = [-50.0, *(period * n for n in range(1, 21)), *(20 * period + pause + period * n for n in range(20))]
     sent = [message(STEERING, 0, EPOCH + round(t * 1e6)) for t in times]
     rec = write(tmp_path / "test.rec", begin(EPOCH), *sent)

@@ -25,7 +25,7 @@ def test_a_scan_says_how_it_is_to_be_read(folder: Path) -> None:
 
     flags = ["--id=7", "--freq=40", "--field-of-view=180", "--rays=3", "--x=0.5", "--walls=wall", "--max-range=5"]
     with built("lidar", f"--map-path={folder}", *flags) as service:
-        assert (service.period, service.update(0)) == (25_000, []), "nobody knows where the vehicle is"
+        assert (service.period, service.update(0)) == (25_000, []), "before the first frame of the vehicle"
         hand(service, FRAME, 0, 0, qw=1.0)
         (output,) = service.update(0)
         assert (output.message.DESCRIPTOR.full_name, output.sender_stamp) == (SCAN, 7)

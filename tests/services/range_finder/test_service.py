@@ -30,7 +30,7 @@ def test_each_sensor_sends_under_its_stamp(folder: Path) -> None:
     flags = ["--id=6,7,8", "--x=0.2,-0.2,0", "--yaw=0,180,90", "--rays=1", "--freq=5", "--walls=wall", "--frame-id=0"]
     with built("range_finder", f"--map-path={folder}", *flags) as service:
         assert service.period == 200_000
-        assert read(service) == {}, "nobody knows where the vehicle is"
+        assert read(service) == {}, "before the first frame of the vehicle"
         hand(service, FRAME, 0, 0, qw=1.0)
         assert read(service) == pytest.approx({6: 1.8, 7: 6.0, 8: 6.0})
         hand(service, FRAME, 0, 0, x=1.0, **NORTH)
