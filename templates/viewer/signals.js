@@ -75,11 +75,14 @@ dodo.signals = (function () {
     return { title: `${data.short(channel.message)}/${channel.sender} a second`, unit: "1/s", times, values, min: 0, isPlain: true, note: "" };
   }
 
+  // Of a message with several fields those that are not 0 all the time: the others can be added.
+  const used = (fields) => (fields.length > 1 && fields.some((one) => one.values.some(Boolean)) ? fields.filter((one) => one.values.some(Boolean)) : fields);
+
   function judged() {
     const channels = data.test.messages.flatMap((each) => data.channels.filter((c) => c.message === each.message && (each.sender === null || c.sender === each.sender)));
     return [
       ...data.test.judged.map(recorded),
-      ...channels.flatMap((channel) => channel.fields.map((field) => plain(channel, field))),
+      ...channels.flatMap((channel) => used(channel.fields).map((field) => plain(channel, field))),
       ...(dodo.detection.frames.length ? [detected()] : []),
     ];
   }
