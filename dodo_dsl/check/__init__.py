@@ -29,6 +29,7 @@ RULES: tuple[Rule, ...] = (
     file_rules.check_starts,
     file_rules.check_limits,
     file_rules.check_input,
+    spec_rules.check_until,
     spec_rules.check_goals,
     wiring_rules.check_producers,
     wiring_rules.check_topics,

@@ -196,9 +196,10 @@ def resolve(
         services, wiring = _driven(services, wire(services, declared, types), declared, types)
         if takes_old_frames(wiring, deployment.messages):
             services = tuple(_with_default(each, "true", lambda it: it.parameter.name == EULER) for each in services)
-        if spec.timeout_s and any(service.ends_input for service in services):
+        if spec.timeout_s and (spec.until or any(service.ends_input for service in services)):
             ending = operator.attrgetter("parameter.within_timeout")
-            services = tuple(_with_default(each, f"{spec.timeout_s:g}", ending) for each in services)
+            longest = f"{spec.timeout_s:g}"
+            services = tuple(s if s.use.name == spec.until else _with_default(s, longest, ending) for s in services)
         found.append(ResolvedTest(spec, rig, services, *replayed(wiring, services, deployment.messages)))
     return found
 

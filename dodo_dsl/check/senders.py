@@ -25,7 +25,8 @@ def senders(test: ResolvedTest) -> tuple[str, ...]:
     for end in wiring.printed:
         if not wiring.judges_by(end.port):
             table[end.port] = [LINES]
-    sources = sorted(use.name for use in test.spec.uses if use.layer in SENDING_LAYERS)
+    uses = test.spec.uses
+    sources = sorted(u.name for u in uses if u.layer in SENDING_LAYERS or u.name == test.spec.until)
     table[Port("message", END_OF_INPUT)] = sources
     words = (
         f"{port}={','.join(f'{name}?' if name in own else name for name in names)}" for port, names in table.items()

@@ -166,6 +166,13 @@ def _strangers(context: RuleContext, use: Use, argument: Argument) -> Iterator[D
             yield Diagnostic(argument.entry.value.span, "rig-device", message, hint)
 
 
+def check_until(context: RuleContext) -> Iterator[Diagnostic]:
+    name, evaluators = context.spec.until, [use.name for use in context.spec.uses if use.layer == "evaluation"]
+    if name and name not in evaluators and context.spec.is_whole:
+        message = f"the test has no evaluator '{name}'"
+        yield Diagnostic(context.spec.span("until"), "unknown-evaluator", message, did_you_mean(name, evaluators))
+
+
 def check_goals(context: RuleContext) -> Iterator[Diagnostic]:
     yield from resolved_goals(context.test)[1]
 

@@ -297,6 +297,8 @@ class _Builder:
         ]
         flags = [_leaving_out(flag, self.test.left_out.get(use.name, ())) for flag in flags]
         flags.append(Flag("cid", str(self.cid)))
+        if use.name == self.spec.until:
+            flags.append(Flag("ends-input", "true"))
         planned = PlannedService(
             use.layer,
             use.name,

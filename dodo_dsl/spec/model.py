@@ -31,7 +31,7 @@ class ResourceLimits:
 
 
 _RESOURCES = ("max-memory", "max-memory-growth", "max-processor-time", "max-processor-share")
-_PLAIN = ("name", "level", "kind", "clock", "rig", "isolation", "pose", "seed")
+_PLAIN = ("name", "level", "kind", "clock", "rig", "isolation", "pose", "seed", "until")
 _VALUES = (*_PLAIN, "description", "timeout", "record", "response", "resources")
 
 
@@ -69,6 +69,7 @@ class Spec:
     """One instance of a ``.dodo.yml``; ``spans`` holds the place of each top-level value.
 
     ``pool`` is the kind of several rigs, any of which will do, and ``rig`` one of them.
+    ``until`` is the evaluator whose verdict ends the test, if one does.
     ``isolation`` is None if the spec leaves it to the rig. With ``pose`` ``hidden`` the application must not declare
     to take what only a simulation knows. ``frames`` is one of FRAMES, ``frames_hz`` None for the cameras' own rates.
     ``record_limit_mb`` is the largest size of the recording in millions of bytes, None for the recorder's default.
@@ -86,6 +87,7 @@ class Spec:
     level: str | None = None
     kind: str | None = None
     timeout_s: float | None = None
+    until: str = ""
     clock: str = REALTIME
     rig: str | None = None
     pool: str = ""

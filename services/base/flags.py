@@ -40,6 +40,11 @@ COMMON: dict[str, About] = {
         "maximum": 4_294_967_295,
         "help": "Sender stamp under which log lines are also sent as LogMessage; by default they are not.",
     },
+    "ends-input": {
+        "type": "boolean",
+        "default": False,
+        "help": "End the input of all others, so that they give their verdict, with the own verdict.",
+    },
     "verbose": {"type": "boolean", "default": False, "help": "Log more."},
 }
 

@@ -124,6 +124,8 @@ class Loop:
     sender_stamp: int
     members: Members | None = None
     """In real time: the services of the test, whose messages others must not send."""
+    ends_input: bool = False
+    """Whether the verdict ends the test: the others decide on what came until then."""
     _handlers: dict[int, list[tuple[int | None, Handler, Layout]]] = field(default_factory=dict)
     _stamps: HeardStamps = field(init=False)
     _began: int | None = None
@@ -159,6 +161,7 @@ class Loop:
         self._hear_rest()
         if self.service.finished and self.service.verdict is None:
             tell("end-of-input")
+        if self.service.finished if self.service.verdict is None else self.ends_input:
             self._send(self.session.messages.type(END_OF_INPUT)(source=self.name), self.clock.now())
         self.clock.close(stopped if self._began is not None else lambda: True)
         self._tell_strangers()

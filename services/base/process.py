@@ -197,7 +197,7 @@ def _serve(
                 session.hear_directly()
             members = _membership(session, role, world)
             stamp = flags["id"] if isinstance(flags["id"], int) else 0  # its own list gives each message one
-            loop = Loop(role, service, session, clock, stamp, members)
+            loop = Loop(role, service, session, clock, stamp, members, bool(flags["ends-input"]))
             resources.enter_context(_readiness(place, role, session))
             try:
                 (service.drive or loop.run)(stop)

@@ -71,6 +71,20 @@ def test_who_answers_no_more_drives_on_as_he_did(tmp_path: Path) -> None:
     assert use["peak_memory_bytes"] > 200e6
 
 
+@pytest.mark.parametrize("clock", ["lockstep", pytest.param("realtime", marks=pytest.mark.realtime)])
+def test_the_verdict_of_an_evaluator_ends_the_test(tmp_path: Path, clock: str) -> None:
+    """The other judges the drive alone, and not what the vehicle does behind the finish line."""
+    place, compose = registry(tmp_path), kiwi(tmp_path / "app")
+    (place / "hold.csv").write_text("time,value\n0,0\n60,0\n")
+    about = {"message": "opendlv.proxy.GroundSteeringRequest", "field": "groundSteering", "target": "../hold.csv"}
+    judge = {"uses": "continuous-signal", "with": {**about, "max-mean": "0.5 rad"}}
+    spec = variant(place, "sil-closed-straight", "sil-until", until="track", clock=clock, evaluation={"steady": judge})
+    dodo("run", str(spec), "--application", str(compose), "--report", str(tmp_path / "report"), code=0)
+    track, steady = results(tmp_path / "report")["sil-until"]["verdicts"]
+    samples = re.search(r" over (\d+) samples", steady["reason"])
+    assert track["reason"].startswith("reached") and samples and 54 <= int(samples[1]) <= 62
+
+
 def test_of_several_programs_the_last_may_join_late(tmp_path: Path) -> None:
     """What the first one sends before the second one listens would be lost, and no frame answered."""
     joins = "    with Session(flags.cid) as session:\n        session.hear_only("

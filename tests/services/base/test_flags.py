@@ -20,6 +20,7 @@ def test_values_have_their_types_and_defaults() -> None:
         "cid": 128,
         "id": 7,
         "log-id": None,
+        "ends-input": False,
         "verbose": True,
     }
     assert isinstance(flags["freq"], float) and isinstance(flags, Flags)
