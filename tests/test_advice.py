@@ -10,8 +10,6 @@ import functools
 import os
 import re
 import shlex
-import shutil
-import subprocess
 import sys
 import sysconfig
 import tomllib
@@ -23,11 +21,6 @@ import pytest
 
 from dodo_dsl import advice, package_data
 from dodo_dsl.cli.main import COMMANDS, parser
-from dodo_dsl.run import capabilities
-from dodo_dsl.run.docker import pulls
-from dodo_dsl.state_folder import UnsafeFolder, secured
-from tests.emit.readers import run
-from tests.run.scripted import plan
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted(path for folder in ("dodo_dsl", "services") for path in (ROOT / folder).rglob("*.py"))
@@ -90,36 +83,6 @@ def test_extras_are_those_of_the_project() -> None:
         of_modules = {owner for module in advice._LOADED[extra] for owner in owners[module.partition(".")[0]]}
         assert of_modules & names, extra
         assert advice.missing(extra) == ""
-
-
-def test_set_up_installs_what_it_is_recommended_for() -> None:
-    lock = (ROOT / "locks" / "extras.txt").read_text()
-    for extra in advice._OF_SETUP:
-        assert all(f"\n{package}==" in lock for package in advice.PACKAGES[extra])
-
-
-def test_in_the_environment_of_a_checkout_its_set_up_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "prefix", str(ROOT / ".venv"))
-    (command,) = shlex.split(advice.install("search"))
-    assert Path(command) == ROOT / "scripts" / "setup"
-    assert os.access(command, os.X_OK)
-
-
-@pytest.mark.parametrize("extra", ["storage"])
-def test_elsewhere_pip_gets_the_checkout_with_the_extra(extra: str) -> None:
-    assert f"{ROOT}[{extra}]" in advice.install(extra)
-    assert re.search(rf"^{extra} = \[", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
-
-
-@pytest.mark.slow
-@pytest.mark.proof
-@pytest.mark.parametrize("extra", ["storage"])
-def test_pip_takes_the_command(extra: str) -> None:
-    command = advice.install(extra)
-    dry = ["--dry-run", "--no-index", "--no-build-isolation", "--disable-pip-version-check"]
-    done = subprocess.run([*shlex.split(command), *dry], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "does not provide the extra" not in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -196,82 +159,3 @@ def test_an_engine_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.undo()
     monkeypatch.setenv("DOCKER_HOST", "tcp://10.0.0.1")
     assert "unset DOCKER_HOST" in advice.engine()
-
-
-def test_the_rig_is_built_in_the_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.delenv("DODO_FIRMWARE", raising=False)
-    monkeypatch.chdir(tmp_path)
-    command = shlex.split(advice.firmware("DODO_FIRMWARE"))
-    done = subprocess.run([*command, "--dry-run"], capture_output=True, text=True, check=False)
-    assert (done.returncode, "install-firmware-tools" in done.stdout) == (0, True), done.stderr
-
-
-IN_NAMESPACES = """\
-import subprocess
-from dodo_dsl.run.capabilities import multicast
-(before,) = multicast()
-subprocess.run(before.advice, shell=True, check=True, stdout=subprocess.DEVNULL)
-(after,) = multicast()
-print(before.state, after.state)
-"""
-
-
-@pytest.mark.skipif(not shutil.which("ip") or os.geteuid() != 0, reason="needs iproute2 and root")
-@pytest.mark.thorough
-def test_a_machine_without_multicast() -> None:
-    """A network of its own: what doctor advises is typed there."""
-    words = ["unshare", "--net", sys.executable, "-c", IN_NAMESPACES]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
-    if "unshare:" in done.stderr:
-        pytest.skip(f"no namespaces here: {done.stderr.strip()}")
-    assert done.stdout == "problem ok\n", done.stderr
-
-
-def test_limits_of_the_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The keys are the kernel's; in a container they are its host's, and users need sudo."""
-    advised = capabilities._sysctl("net.core.rmem_max=1")
-    assert re.fullmatch(r"[\w.]+=\d+", advised.partition("sysctl -w ")[2])
-    (tmp_path / "net").mkdir()
-    monkeypatch.setattr(capabilities, "_SYS", tmp_path)
-    assert capabilities._sysctl("net.rmem=1") == "on the host: sysctl -w net.rmem=1"
-    (tmp_path / "net" / "rmem").touch(0o644)
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert capabilities._sysctl("net.rmem=1") == "sudo sysctl -w net.rmem=1"
-
-
-def test_a_state_folder_that_all_can_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "my state"
-    folder.mkdir()
-    folder.chmod(0o777)
-    with pytest.raises(UnsafeFolder) as raised:
-        secured(folder)
-    command = str(raised.value.strerror).partition("state: ")[2]
-    subprocess.run(command, shell=True, check=True)
-    assert secured(folder) == folder
-
-
-def test_a_program_that_is_not_executable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Typed in the folder where the message is shown, which is not that of the compose file."""
-    folder = tmp_path / "my app"
-    folder.mkdir()
-    (folder / "drive").write_text("#!/bin/sh\n")
-    (folder / "compose.yml").write_text("services: {app: {image: a, x-dodo-process: [./drive]}}\n")
-    monkeypatch.chdir(tmp_path)
-    said = "".join(run("compile", "--check", "--application", "my app/compose.yml")[1:])
-    (command,) = re.findall(r"hint: run: (chmod .+)", said)
-    subprocess.run(command, shell=True, check=True)
-    assert os.access(folder / "drive", os.X_OK)
-
-
-@pytest.mark.parametrize("prefix", ["dodo", "registry.example.org/team"])
-def test_images_that_were_never_built(prefix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the message says builds the image that was missing, wherever it is typed."""
-    from dodo_dsl.cli import images
-    from dodo_dsl.cli.selection import checked_deployment
-
-    monkeypatch.chdir(tmp_path)
-    reference = f"{prefix}/sandbox:7"
-    command = re.fullmatch("'dodo (.+)' makes it", pulls.image_hints(plan(sandbox_image=reference))[reference])
-    assert command
-    options = parser().parse_args(shlex.split(command[1]))
-    assert (options.name, images.series_of(options, checked_deployment()).reference("sandbox")) == ([], reference)

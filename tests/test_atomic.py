@@ -26,16 +26,6 @@ def umask() -> Iterator[None]:
     os.umask(before)
 
 
-@pytest.mark.parametrize("durable", [False, True])
-def test_text_and_bytes_replace_what_is_there(tmp_path: Path, durable: bool) -> None:
-    path = tmp_path / "new" / "folder" / "file.txt"
-    atomic.write_text(path, "größer\r\n", durable)
-    assert path.read_bytes() == "größer\r\n".encode()
-    atomic.write_bytes(path, b"\0\xff", durable)
-    assert path.read_bytes() == b"\0\xff"
-    assert names(path.parent) == ["file.txt"]
-
-
 def test_the_old_content_is_there_until_the_end(tmp_path: Path) -> None:
     path = tmp_path / "file.png"
     path.write_text("old")
@@ -100,22 +90,6 @@ def test_a_full_disk_leaves_the_old_content_and_room(small_disk: Path) -> None:
     atomic.write_bytes(path, bytes(20_000))
 
 
-def test_a_file_where_a_folder_should_be_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OSError, match="file"):
-        atomic.write_text(tmp_path / "file" / "below", "new")
-    assert names(tmp_path) == ["file"]
-
-
-def test_names_may_be_as_long_as_the_system_takes(tmp_path: Path) -> None:
-    path = tmp_path / ("n" * 251 + ".txt")
-    atomic.write_text(path, "new")
-    assert names(tmp_path) == [path.name]
-    with pytest.raises(OSError, match="File name too long"):
-        atomic.write_text(tmp_path / ("n" * 256), "new")
-    assert names(tmp_path) == [path.name]
-
-
 def test_a_folder_appears_with_all_its_files(tmp_path: Path) -> None:
     folder = tmp_path / "above" / "folder"
     with atomic.new_folder(folder) as stage:
@@ -124,13 +98,6 @@ def test_a_folder_appears_with_all_its_files(tmp_path: Path) -> None:
         assert not folder.exists()
     assert (folder / "below" / "file").read_text() == "new"
     assert names(folder.parent) == ["folder"]
-
-
-def test_a_folder_of_which_a_part_failed_does_not_appear(tmp_path: Path) -> None:
-    with pytest.raises(Stop), atomic.new_folder(tmp_path / "folder") as stage:
-        (stage / "file").write_text("half")
-        raise Stop
-    assert names(tmp_path) == []
 
 
 @pytest.mark.parametrize("other", ["folder", "file", "link"])
@@ -168,11 +135,3 @@ def test_files_join_what_a_folder_holds(tmp_path: Path) -> None:
         "below/file": "ours",
     }
     assert names(tmp_path) == ["target"]
-
-
-def test_no_file_joins_a_folder_when_one_failed(tmp_path: Path) -> None:
-    target = tmp_path / "target"
-    with pytest.raises(Stop), atomic.files_into(target) as stage:
-        (stage / "file").write_text("half")
-        raise Stop
-    assert names(tmp_path) == []

@@ -1,21 +1,11 @@
 """Code frames fit into the terminal, and show the place that they are about."""
 
-import fcntl
-import os
-import pty
-import struct
-import subprocess
-import sys
-import termios
-from io import StringIO
-from pathlib import Path
-
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dodo_dsl.diagnostics import Diagnostic, Span, forget_lines, format_text
-from dodo_dsl.terminal import WIDE, cells, columns, excerpt, printable
+from dodo_dsl.terminal import cells, excerpt, printable
 
 CHARACTERS = st.sampled_from("abc {}:,…\t\x1b\x00漢字한👍e\u0301ßÄ\u200b\ufeff")
 LINES = st.text(CHARACTERS, max_size=400)
@@ -70,31 +60,3 @@ def test_each_frame_of_several_has_carets_below_its_place(
             column += cells(character)
         wanted = printable(line[span.column - 1 : span.column])
         assert seen == wanted or not cells(wanted), (above, below)
-
-
-def test_a_place_behind_what_is_read_of_a_file_has_no_frame(tmp_path: Path) -> None:
-    (tmp_path / "a.json").write_text("{}")
-    found = [Diagnostic(Span(str(tmp_path / "a.json"), 1, 2_000_000), "wrong-file", "wrong")]
-    assert format_text(found).count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("written", "width"),
-    [("72", 72), ("0", WIDE), ("", WIDE), ("x", WIDE), ("5", 20), ("9" * 3, 999), ("9" * 30, WIDE)],
-)
-def test_the_width_that_columns_says(monkeypatch: pytest.MonkeyPatch, written: str, width: int) -> None:
-    monkeypatch.setenv("COLUMNS", written)
-    assert columns(StringIO()) == width
-
-
-@pytest.mark.parametrize(("size", "width"), [(61, 61), (0, 80)])
-def test_the_width_of_a_terminal_and_of_a_pipe_beside_it(
-    monkeypatch: pytest.MonkeyPatch, size: int, width: int
-) -> None:
-    monkeypatch.delenv("COLUMNS")
-    leader, follower = pty.openpty()
-    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, size, 0, 0))
-    code = "import sys; from dodo_dsl.terminal import columns; print(columns(sys.stdout))"
-    for stdout in (subprocess.PIPE, follower):
-        run = subprocess.run([sys.executable, "-c", code], stdin=follower, stdout=stdout, stderr=follower, check=True)
-        assert int(run.stdout if run.stdout else os.read(leader, 100)) == width

@@ -1,12 +1,10 @@
 """What the documentation shows is true: its specs compile, its commands exist, its examples run."""
 
-import contextlib
 import json
 import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from io import StringIO
 from pathlib import Path
 
@@ -14,10 +12,8 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from dodo_dsl.cli.main import COMMANDS, main
-from dodo_dsl.cli.selection import select
+from dodo_dsl.cli.main import main
 from dodo_dsl.report.trajectory import read_ground
-from dodo_dsl.spec.model import LEVEL_WORDS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -80,22 +76,6 @@ def test_the_blocks_of_readme_and_contract_compile_together(newcomer: Path) -> N
     assert compiled == {"sil-my-straight", *shipped} - {*unfed}
 
 
-@pytest.mark.parametrize(
-    ("words", "levels", "expected"),
-    [
-        ((), (), ("dil-static-rig", "hil-camera", "hil-camera-scenes", "hil-perception", *PERCEPTIONS)),
-        ((), ("sil",), PERCEPTIONS),
-        (("sil-*",), (), PERCEPTIONS),
-        (("sil-*", "sil-my-straight"), (), PERCEPTIONS),
-    ],
-)
-def test_what_is_left_out_keeps_to_what_was_asked_for(
-    newcomer: Path, words: tuple[str, ...], levels: tuple[str, ...], expected: tuple[str, ...]
-) -> None:
-    checked = select(words, levels, ())
-    assert (checked.ok, checked.left_out) == (True, expected)
-
-
 def test_a_shipped_test_that_is_named_is_an_error(newcomer: Path) -> None:
     stdout = StringIO()
     assert main(["compile", "--check", "sil-perception"], stdout, StringIO()) == 2
@@ -144,17 +124,6 @@ def test_a_blind_application_fails_the_test_that_dodo_new_writes(newcomer: Path)
     assert "FAILED  sil-first  hit wall right after " in output
 
 
-def test_commands_on_the_front_page_exist() -> None:
-    named = set(re.findall(r"(?:`|\$ )dodo ([a-z]+)", README))
-    assert {"compile", "new", "run"} <= named <= set(COMMANDS)
-
-
-def test_the_front_page_is_short_and_its_picture_small() -> None:
-    assert len(README.splitlines()) <= 150
-    (picture,) = re.findall(r"!\[[^]]+\]\(([^)]+)\)", README)
-    assert (ROOT / picture).stat().st_size < 2_000_000
-
-
 MANIFESTS = sorted(p.parent for p in (ROOT / "services").glob("*/service.yml"))
 
 
@@ -168,11 +137,6 @@ def test_services_help_ends_with_an_example(folder: Path) -> None:
         assert f"--{parameter}" in result.stdout
     assert " ".join(manifest["process"]) in result.stdout.splitlines()[-1]
     assert (folder / "README.md").is_file()
-
-
-@pytest.mark.parametrize("folder", sorted((ROOT / "tests_registry").glob("*/*.dodo.yml")), ids=lambda p: p.parent.name)
-def test_every_test_has_a_readme(folder: Path) -> None:
-    assert (folder.parent / "README.md").read_text().startswith(f"# {folder.parent.name}\n")
 
 
 def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:
@@ -207,45 +171,3 @@ def test_the_page_has_every_key_that_a_service_may_have_for_dodo() -> None:
         value = yaml.safe_load(example)
         service = {"image": "example", key: {part: value} if part else value}
         Draft202012Validator(schema).validate({"services": {"app": service}})
-
-
-def test_pages_install_dodo_in_the_same_place_and_from_a_checkout() -> None:
-    """It is on no package index; its name alone is enough only where it is installed already."""
-    tutorial = (ROOT / "docs/tutorial/python.md").read_text()
-    (block,) = re.findall(r"```text\n(python3 -m venv .*?)```", tutorial, re.DOTALL)
-    assert block in (ROOT / "docs/how-to/running.md").read_text()
-    assert " && ".join(block.splitlines()) in README
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    for page in (ROOT / "README.md", *(ROOT / "docs/tutorial").glob("*.md"), *(ROOT / "docs/how-to").glob("*.md")):
-        text = page.read_text()
-        assert "dodo-dsl[" not in text, page
-        named = re.findall(r"PATH-OF-THE-CHECKOUT\[([\w,]+)\]", text)
-        assert {extra for names in named for extra in names.split(",")} <= extras.keys(), page
-
-
-def tracked(pattern: str) -> list[Path]:
-    listed = subprocess.run(["git", "ls-files", pattern], cwd=ROOT, capture_output=True, text=True, check=True)
-    return [ROOT / name for name in listed.stdout.split()]
-
-
-def test_each_page_that_names_the_thesis_links_to_where_it_is_cited() -> None:
-    cited = ROOT / "docs" / "explanation" / "architecture.md"
-    naming = [
-        page for page in tracked("*.md") if re.search(r"\bthesis\b", page.read_text()) and page.name != "CHANGELOG.md"
-    ]
-    assert len(naming) > 5 and cited in naming
-    assert [page for page in naming if "architecture.md#the-thesis" not in page.read_text() and page != cited] == []
-    assert "Chalmers University of Technology" in cited.read_text()
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/reference/language.md", "docs/explanation/architecture.md"])
-def test_levels_are_spelt_out(page: str) -> None:
-    text = " ".join((ROOT / page).read_text().split())
-    first = min(text.find(f"`{level}`") for level in LEVEL_WORDS)
-    assert re.search("software(, data or hardware)? in the loop", text[first : first + 400], re.IGNORECASE), text[
-        first:
-    ][:80]
-    stdout = StringIO()
-    with contextlib.redirect_stdout(stdout):
-        main(["--help"], stdout, stdout)
-    assert all(words in stdout.getvalue() for words in LEVEL_WORDS.values())

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.outcome import SLOW_ANSWERS, Outcome, with_margin, worst_margin
@@ -64,18 +64,6 @@ def test_the_share_has_the_sign_of_the_check(value: float, limit: dict[str, floa
     if share is not None:
         assert 0 <= share <= 1 if ok else -1 <= share < 0
     json.dumps([margin, share], allow_nan=False)
-
-
-@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9), LIMITS)
-def test_more_margin_is_more_share(one: float, other: float, limit: dict[str, float]) -> None:
-    """On both sides of a limit, which fails beyond it."""
-    pairs = []
-    for value in (one, other):
-        margin = with_margin(check(value, **limit))["margin"]
-        assume(margin is not None)
-        pairs.append(margins(value, margin >= 0, **limit))
-    (low, low_share), (high, high_share) = sorted(pairs)  # type: ignore[type-var]
-    assert low_share <= high_share and (low != high or low_share == high_share)  # type: ignore[operator]
 
 
 def outcome(base: Outcome, *checks: dict[str, Any]) -> Outcome:

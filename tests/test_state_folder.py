@@ -1,6 +1,5 @@
 """Where a user's state is kept, also for a user without a home folder."""
 
-import pwd
 from pathlib import Path
 
 import pytest
@@ -45,10 +44,3 @@ def test_without_a_home_folder_the_error_says_what_to_set(
     with pytest.raises(NoStateFolder) as caught:
         state_path("DODO_HISTORY", "history.jsonl")
     assert str(caught.value) == f"user {NOBODY} has no home folder: set DODO_HISTORY or XDG_STATE_HOME"
-
-
-def test_the_password_database_names_the_home_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.getuid", lambda: 0)
-    assert state_path("DODO_HISTORY", "history.jsonl") == Path(
-        pwd.getpwuid(0).pw_dir, ".local/state/dodo/history.jsonl"
-    )

@@ -1,6 +1,5 @@
 """Applications as a whole: which services start, on which bus, with what; and the files that are read for them."""
 
-import itertools
 import json
 import re
 from pathlib import Path
@@ -50,11 +49,6 @@ HUGE = {
 @pytest.mark.thorough
 def test_what_would_grow_without_end_is_refused(services: dict[str, Any], root: Path) -> None:
     assert "too-large" in {told.rule for told in compiled(root, json.dumps({"services": services})).errors}
-
-
-def test_services_that_extend_one_another_without_end(root: Path) -> None:
-    chain = {one: {"image": "x", "extends": other} for one, other in itertools.pairwise("abcdefghijklm")}
-    assert of_services(root, **chain, m=car()).errors
 
 
 def test_services_that_do_not_start(root: Path) -> None:
@@ -195,29 +189,6 @@ def test_its_time_is_the_test_s(root: Path) -> None:
     assert test.services["b"]["environment"]["OMP_NUM_THREADS"] == "4"
 
 
-@pytest.mark.parametrize(
-    ("line", "named"),
-    [
-        ("TAG=v1", True),
-        ("UNUSED=x", False),
-        ("TAG=x://a:b@c", False),
-        ("TAG_TOKEN=x", False),
-        ("DODO_SUBNET=x\nCOMPOSE_FILE=y", False),
-    ],
-)
-def test_what_a_compiled_test_has_of_the_variables(line: str, named: bool, root: Path) -> None:
-    (root / ".env").write_text(f"{line}\n")
-    test = of_services(root, a=car(image="driver:${TAG:-0}"))
-    value = line.partition("=")[2].partition("\n")[0]
-    lines = [
-        one
-        for text in test.files.values()
-        for one in text.splitlines()
-        if one.endswith((f"={value}", f":{value}", f'"{value}"', f":{value}}}"))
-    ]
-    assert bool(lines) == named
-
-
 def test_variables_that_a_compiled_file_names(root: Path) -> None:
     """Those that ``dodo.yml`` passes, secrets of ``.env``, and images."""
     (root / ".env").write_text("A=1\nAPI_KEY=s3cr3t\n")
@@ -270,23 +241,6 @@ def test_variables_of_the_host_are_named(
     told = [one for one in test.told if one.rule == "application-secret"]
     assert [one.text.split("'")[1] for one in told] == named
     assert "s3cr3t" not in "".join(one.text for one in told)
-
-
-def test_links_are_not_followed(root: Path, tmp_path: Path) -> None:
-    (tmp_path / "secret").write_text("CID=1\nPASSWORD=h1dd3n\nservices: {a: {image: secret}}\n")
-    for name in (".env", "common.yml"):
-        (root / name).symlink_to(tmp_path / "secret")
-    test = of_services(root, b=car())
-    assert test.told == () and "h1dd3n" not in "".join(test.files.values())
-    assert of_services(root, b=car(extends={"file": "common.yml", "service": "a"})).errors
-
-
-def test_the_repository_is_where_git_and_dodo_yml_are(root: Path) -> None:
-    """Not the folder of the compose file alone."""
-    (root / "sub").mkdir()
-    (root / "sub" / FILE).write_text(json.dumps({"services": {"a": car(volumes=["../data:/d:ro"])}}))
-    test = compiled(root, application=f"sub/{FILE}")
-    assert (test.told, test.services["a"]["volumes"]) == ((), ["./data:/d:ro"])
 
 
 @pytest.mark.parametrize("holder", ["tests", ".git", "generated", "dodo-report"])
@@ -345,14 +299,6 @@ def test_limits_of_dodo_yml(service: dict[str, Any], key: str, cut: object, root
     assert compiled(root, {"services": {"a": car(**service)}}, sandbox=SANDBOX).services["a"][key] == cut
 
 
-def test_folders_that_dodo_yml_allows(root: Path, tmp_path: Path) -> None:
-    """They are the host's own, also to write to."""
-    (tmp_path / "host").mkdir()
-    document = {"services": {"a": car(volumes=[f"{tmp_path}/host:/h"])}}
-    assert compiled(root, document).errors
-    assert compiled(root, document, paths=[f"{tmp_path}/host"]).services["a"]["volumes"] == [f"{tmp_path}/host:/h"]
-
-
 def test_services_share_a_copy_and_nothing_beside_it(root: Path) -> None:
     services = {
         "a": car(volumes=["./new:/d"]),
@@ -368,7 +314,3 @@ def test_services_share_a_copy_and_nothing_beside_it(root: Path) -> None:
         ["files-1:/b:nocopy,ro"],
     ]
     assert set(test.document["volumes"]) == {"files-0", "files-1"}
-
-
-def test_a_name_that_is_too_long_for_a_host(root: Path) -> None:
-    assert of_services(root, **{"n" * 64: car()}).errors

@@ -55,11 +55,6 @@ def test_each_key_of_the_deployment_replaces_that_of_the_compose_file(folder: Pa
     assert found["driver"].process == ("python3", "-m", "steering")
 
 
-def test_they_are_about_the_files_that_they_name(folder: Path) -> None:
-    (folder / "other.yml").write_text("services: {steer: {image: steer, command: --cid=111}}")
-    assert load([folder / "tests" / "network.dodo.yml"], [Path("other.yml")]).ok
-
-
 def test_a_service_has_the_keys_of_x_dodo() -> None:
     declared = schema_of_keys("deployment")["properties"]["application"]["properties"]["services"]
     services = schema_of_keys("application")["properties"]["services"]

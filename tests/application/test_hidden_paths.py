@@ -5,8 +5,6 @@ from pathlib import Path
 import pytest
 
 from dodo_dsl import compiler
-from dodo_dsl.application import hidden_paths
-from dodo_dsl.plan.test_files import FilesError
 
 SPEC = """\
 dodo: 1
@@ -17,8 +15,6 @@ environment:
 evaluation:
   boxes: {uses: object-detection, with: {truth: "../truths/${matrix.x}.json"}}
 """
-CHECK = {"name": "mean", "value": 0, "limit": {"max": 1}}
-RESULTS = {"dodo": "results", "version": 1, "tests": [{"slug": f"sil-a--x-{x}", "checks": [CHECK]} for x in "ab"]}
 
 
 def compiled(root: Path, spec: str, application: str, deployment: str = "") -> compiler.Compilation:
@@ -63,9 +59,3 @@ def test_what_is_hidden(
     """From each test all specs and what any of them names, but no messages, which are the application's, too."""
     plans = compiled(tmp_path, spec, application, deployment).compiled.suite.plans
     assert [plan.application.hidden for plan in plans] == [expected, expected]
-
-
-def test_too_many_files_among_the_applications_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hidden_paths, "MOST", 2)
-    with pytest.raises(FilesError, match="at most 2"):
-        compiled(tmp_path, "sil-a/sil-a.dodo.yml", "docker-compose.yml", "registry: [.]")

@@ -4,12 +4,10 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
 
-from dodo_dsl.plan.plan_json import from_json, to_json
 from tests.application.compiled import Compiled, compiled, repository
 from tests.emit.readers import compose
 
@@ -78,17 +76,3 @@ def test_compose_accepts_them(style: str, tmp_path: Path) -> None:
         said = subprocess.run([*command, "config", "-q"], cwd=test.write(), capture_output=True, text=True, check=False)
         unset = [line for line in said.stderr.splitlines() if "variable is not set" not in line]
         assert (said.returncode, unset) == (0, []), way
-
-
-@pytest.mark.parametrize("style", STYLES)
-def test_plans_survive_their_file(style: str, tmp_path: Path) -> None:
-    test = made(style, tmp_path, way_of(style))
-    assert test.plan is not None
-    text = to_json(test.plan)
-    assert to_json(from_json(text)) == text
-    assert from_json(text).application == test.plan.application
-
-
-def test_each_style_is_known() -> None:
-    known: dict[str, Any] = yaml.safe_load(SUMMARY.read_text())
-    assert list(known) == STYLES

@@ -1,7 +1,6 @@
 """The command, with runs of benchmarks that need no time."""
 
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -47,13 +46,6 @@ def test_it_writes_both_files_and_prints_the_table(
 
 
 @pytest.mark.thorough
-def test_one_that_failed_takes_no_others_with_it(tmp_path: Path, runs: Callable[..., Runs]) -> None:
-    noted = runs(rated(1, 2, 3), failed=True)
-    assert command.main(["bus", "rec", "-o", str(tmp_path)]) == 0
-    assert len(noted) == 2 and "- ended with 3: bench_bus" in (tmp_path / "ledger.md").read_text()
-
-
-@pytest.mark.thorough
 def test_an_interrupt_keeps_what_was_measured(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -76,18 +68,6 @@ def test_an_interrupt_keeps_what_was_measured(
     assert "| interrupted before it |" in table
 
 
-@pytest.mark.thorough
-def test_the_set_up_counts(tmp_path: Path, runs: Callable[..., Runs]) -> None:
-    """And what one benchmark takes too long goes off the others."""
-    noted = runs(rated(1, 2, 3))
-    began = time.time() - command.ALL_IN_ALL + command.TOTAL / 4
-    assert command.main(["-o", str(tmp_path), "--since", str(began)]) == 0
-    assert noted[0][2] == pytest.approx(command.SECONDS["bench_bus"] / 4, rel=0.05)
-    noted.clear()
-    assert command.main(["-o", str(tmp_path), "--since", "1"]) == 0
-    assert {seconds for *_, seconds in noted} == {command.LEAST}
-
-
 @pytest.mark.parametrize(("before", "code", "verdict"), [((5, 6, 7), 1, "worse"), ((1, 2, 3), 0, "within the spread")])
 def test_a_worse_row_fails_the_command(
     tmp_path: Path, runs: Callable[..., Runs], before: tuple[float, ...], code: int, verdict: str
@@ -97,21 +77,6 @@ def test_a_worse_row_fails_the_command(
     assert command.main(["bus", "-o", str(tmp_path), "--against", str(tmp_path / "old.json")]) == code
     table = (tmp_path / "ledger.md").read_text()
     assert " against old\n" in table and f"| {verdict} " in table
-
-
-@pytest.mark.thorough
-def test_two_checkouts_run_in_turns(tmp_path: Path, runs: Callable[..., Runs]) -> None:
-    other = tmp_path / "other"
-    (other / "benchmarks").mkdir(parents=True)
-    (other / "benchmarks" / "bench_bus.py").touch()
-    noted = runs(rated(1, 2, 3))
-    assert command.main(["bus", "rec", "-o", str(tmp_path), "--against-checkout", str(other)]) == 0
-    assert [(name, place) for name, place, _ in noted] == [
-        *(("bench_bus", place) for place in (command.ROOT, other, other, command.ROOT)),
-        *(("bench_rec", command.ROOT) for _ in range(2)),
-    ]
-    assert noted[0][2] == command.SECONDS["bench_bus"] / 2
-    assert (tmp_path / "before.json").is_file() and "other" in (tmp_path / "ledger.md").read_text()
 
 
 @pytest.mark.parametrize(

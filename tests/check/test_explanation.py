@@ -113,15 +113,6 @@ def test_json_has_the_same(folder: Path) -> None:
     assert rows[0]["asked"][0]["port"] == "opendlv.proxy.GroundSteeringRequest"
 
 
-def test_json_has_the_ranges(folder: Path) -> None:
-    examples.write(VARY, folder)
-    (row,) = json.loads(explained("example", "--json")[1])
-    assert [(one["name"], one["values"]) for one in row["vary"]] == [
-        ("yaw", "80 deg to 100 deg"),
-        ("exposure", "0.5, 1"),
-    ]
-
-
 def test_a_rule() -> None:
     code, out, err = explained("wrong-unit")
     assert (code, err) == (0, "")
@@ -132,13 +123,3 @@ def test_a_rule() -> None:
 def test_all_rules_have_a_line() -> None:
     lines = explained()[1].splitlines()
     assert [line.split()[0] for line in lines] == list(catalogue.pages())
-
-
-def test_neither(folder: Path) -> None:
-    examples.write("", folder)
-    code, out, err = explained("wrong-units")
-    assert (code, out) == (2, "")
-    assert err.startswith(
-        "dodo explain: unknown test or rule 'wrong-units'; known: base, example; or the rule: did you"
-    )
-    assert "'wrong-unit'" in err

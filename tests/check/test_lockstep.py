@@ -50,14 +50,6 @@ environment:
     assert step_hz(Wiring((), ()), found) == DEFAULT_HZ
 
 
-def test_without_a_camera_the_fastest_sensor_that_the_application_hears_sets_the_step() -> None:
-    heard, other = message("opendlv.proxy.DistanceReading/0", None), message("opendlv.sim.Frame/0", None)
-    span = Span("x.yml")
-    produced = (End("range", "environment", heard, span), End("pose", "action", other, span))
-    wiring = Wiring(produced, (), application_consumes=(End("driver", "application", heard, span),))
-    assert step_hz(wiring, {"range": 25.0, "pose": 100.0}) == 25.0
-
-
 def test_what_drives_the_vehicle_answers(tmp_path: Path) -> None:
     wiring = resolved("", tmp_path).wiring
     assert answers(wiring) == [STEERING, PEDAL]
@@ -110,13 +102,6 @@ def test_an_optional_message_is_expected_when_it_is_declared() -> None:
     declared = End("driver", "application", message("a.B", 0), Span("x.yml"))
     assert answers(Wiring((), (optional,))) == []
     assert answers(Wiring((), (optional,), (declared,))) == ["a.B"]
-
-
-def test_a_name_alone_means_all_sender_stamps() -> None:
-    ends = [
-        End(f"s{n}", "action", message(name, None), Span("x.yml")) for n, name in enumerate(("a.B/3", "a.B", "a.C/1"))
-    ]
-    assert answers(Wiring((), tuple(ends))) == ["a.B", "a.C/1"]
 
 
 def printing(messages: str, more: str = "") -> str:

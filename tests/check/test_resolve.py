@@ -4,31 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.check.resolve import known_ids, resolve
+from dodo_dsl.check.resolve import resolve
 from dodo_dsl.check.wiring import answers, driving
 from tests.check.contexts import checked, resolved
-
-MATRIX = """\
-matrix: {yaw: [80 deg, 90 deg]}
-action:
-  vehicle: {uses: dynamic-model}
-  pose: {uses: integrator, with: {yaw: "${matrix.yaw}"}}
-"""
-
-
-def test_instances_share_what_does_not_depend_on_the_matrix(tmp_path: Path) -> None:
-    one, other = (test for test in checked(MATRIX, tmp_path).tests if test.spec.location.stem == "example")
-    (camera, _, pose, track), (other_camera, _, other_pose, other_track) = one.services, other.services
-    assert other_camera.arguments["map-path"] is camera.arguments["map-path"]
-    assert other_track.arguments["map-path"] is track.arguments["map-path"]
-    assert (pose.texts["yaw"], other_pose.texts["yaw"]) == ("80", "90")
-    assert other_pose.arguments["x"] == pose.arguments["x"]
-
-
-def test_a_service_without_manifest_is_left_out(tmp_path: Path) -> None:
-    test = resolved("evaluation: {track: {uses: collide}}\n", tmp_path)
-    assert [service.use.name for service in test.services] == ["camera", "vehicle", "pose"]
-    assert not test.is_complete
 
 
 def test_the_rig(tmp_path: Path) -> None:
@@ -98,12 +76,3 @@ action: {vehicle: {uses: dynamic-model, with: {drive: "${matrix.drive}"}}, pose:
     texts = [service.texts for test in tests for service in test.services if service.use.name == "vehicle"]
     assert [("track" in each, "steering-offset" in each) for each in texts] == [(False, True), (True, False)]
     assert [len(answers(test.wiring)) for test in tests] == [2, 2]
-
-
-def test_messages_of_files_that_can_be_read(tmp_path: Path) -> None:
-    good, bad = tmp_path / "good.odvd", tmp_path / "bad.odvd"
-    good.write_text("message my.Own [id = 3000] { float x [id = 1]; }")
-    bad.write_text("message")
-    standard = known_ids(())
-    assert "opendlv.proxy.GroundSteeringRequest" in standard
-    assert known_ids((good, bad)).items() - standard.items() == {("my.Own", 3000)}

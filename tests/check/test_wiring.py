@@ -29,24 +29,6 @@ def test_what_a_port_consumes(
     assert Port("message", *consumer).consumes(Port("message", *producer)) is expected
 
 
-def test_memories_are_not_messages() -> None:
-    assert not Port("memory", "a.B").consumes(Port("message", "a.B"))
-
-
-def test_what_can_be_required_of_an_application() -> None:
-    assert message("opendlv.proxy.X", None).can_be_required
-    assert not message("opendlv.sim.Frame", None).can_be_required
-    assert Port("memory", "dodo.argb").can_be_required
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"), [("a.B", Port("message", "a.B", 7)), ("a.B/3", Port("message", "a.B", 3))]
-)
-def test_a_message_with_its_stamp(text: str, expected: Port) -> None:
-    assert message(text, 7) == expected
-    assert str(message("a.B/3", 0)) == "a.B/3"
-
-
 def test_a_test_without_application(tmp_path: Path) -> None:
     wiring = wire(resolved("", tmp_path).services, None)
     assert not wiring.has_application

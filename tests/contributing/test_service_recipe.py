@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,9 +130,3 @@ def test_what_checks_every_service_has_nothing_to_say(checkout: Path) -> None:
         checkout, "pytest", "-q", *(f"tests/{name}" for name in tests), "-k", "odometer or table or schema or stand"
     )
     assert "passed" in told
-
-
-def test_the_contract_of_independence_names_every_service() -> None:
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
-    (named,) = [contract["modules"] for contract in contracts if contract["type"] == "independence"]
-    assert sorted(named) == sorted(f"services.{path.parent.name}" for path in ROOT.glob("services/*/__main__.py"))

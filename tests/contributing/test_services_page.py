@@ -4,21 +4,12 @@ import sys
 from pathlib import Path
 
 import pytest
-import yaml
 
-from dodo_dsl import __version__
-from dodo_dsl.images.names import base_of
 from dodo_dsl.report.join import read_document
 from dodo_dsl.report.viewer.encoded import unpacked
-from tests.contributing.tutorial import New, follow, steps
+from tests.contributing.tutorial import follow
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/services.md"
-
-
-def file(name: str) -> str:
-    """What the page writes into a file."""
-    (text,) = [step.text for step in steps(PAGE.read_text()) if isinstance(step, New) and step.file == name]
-    return text
 
 
 @pytest.mark.slow
@@ -33,12 +24,3 @@ def test_it_can_be_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert unpacked(steps_over_time["values"]).max() > 3 and steps_over_time["marks"]
     (check,) = [each for each in data["checks"] if each["name"] == "largest-step"]
     assert "max-step: 3 deg" in check["places"][0]["text"]
-
-
-def test_its_image_starts_what_the_manifest_says_on_this_version(tmp_path: Path) -> None:
-    manifest = yaml.safe_load(file("my_services/smoothness/service.yml"))
-    text = file("my_services/smoothness/Dockerfile")
-    assert text.startswith(f"ARG DODO_BASE=dodo/base:{__version__}\n")
-    assert f'ENTRYPOINT ["python3", "-m", "{manifest["process"][-1]}"]' in text
-    (tmp_path / "Dockerfile").write_text(text)
-    assert base_of(tmp_path / "Dockerfile") == "base"

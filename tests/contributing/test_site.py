@@ -5,7 +5,6 @@ import re
 import runpy
 import subprocess
 import sys
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -25,21 +24,6 @@ def test_the_page_of_commands_is_up_to_date() -> None:
 @pytest.mark.parametrize("page", reference_pages.PAGES, ids=lambda page: page.stem)
 def test_the_reference_of_files_and_variables_is_up_to_date(page: Path) -> None:
     assert page.read_text() == reference_pages.PAGES[page](), "run scripts/make-reference"
-
-
-class Addresses(HTMLParser):
-    """What a page loads: links that only lead somewhere else are none of it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.loaded: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        named = dict(attrs)
-        if tag in ("script", "img", "iframe", "source") and named.get("src"):
-            self.loaded.append(str(named["src"]))
-        if tag == "link" and named.get("rel") in ("stylesheet", "icon", "preload"):
-            self.loaded.append(str(named.get("href")))
 
 
 def build(folder: Path, builder: str) -> None:
@@ -91,26 +75,3 @@ def test_every_page_stands_in_a_list() -> None:
 def test_the_site_has_no_warning(tmp_path: Path) -> None:
     """Its pages are read, and not written."""
     build(tmp_path, "dummy")
-
-
-@pytest.mark.slow
-@pytest.mark.proof
-def test_the_site_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
-    build(tmp_path, "html")
-    pages = list((tmp_path / "site").rglob("*.html"))
-    assert len(pages) > 40
-    for page in pages:
-        addresses = Addresses()
-        addresses.feed(page.read_text())
-        assert addresses.loaded
-        assert [address for address in addresses.loaded if "//" in address] == []
-
-
-@pytest.mark.slow
-@pytest.mark.proof
-def test_the_demo_of_a_report_has_a_failed_test_and_others(tmp_path: Path) -> None:
-    subprocess.run([sys.executable, str(ROOT / "scripts/make-demo"), str(tmp_path / "demo")], check=True)
-    page = (tmp_path / "demo" / "index.html").read_text()
-    assert "1 failed</span>" in page and "8 passed</span>" in page
-    assert page.count('<details class="matrix"') == 1
-    assert all((tmp_path / "demo" / link).is_file() for link in re.findall(r'href="([^"#:]*drive.html)"', page))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.contributing.tutorial import Command, Edit, New, follow, steps
+from tests.contributing.tutorial import follow
 from tests.examples.ros import PYTHON, needs_ros
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -49,31 +49,3 @@ def test_the_sample_application_passes_the_test_on_a_page(page: str, tmp_path: P
     command = ["-m", "dodo_dsl", "run", "--application", root / "examples" / "kiwi" / "docker-compose.yml"]
     done = subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and "1 passed" in done.stdout, done.stdout + done.stderr
-
-
-def test_a_page_is_read_as_its_reader_does() -> None:
-    page = "```console\n$ a b\nsaid\n...\nend\n$ c\n```\n\n```diff\n--- f\n-old\n+new\n```\n\n```text\n$ not run\n```\n"
-    page += "Do it. Write `d/g`:\n\n```yaml\na: 1\n```\n\nAnd:\n\n```yaml\nb: 2\n```\n"
-    commands = [Command("a b", "said\n...\nend\n"), Command("c", "")]
-    assert list(steps(page)) == [*commands, Edit("f", "old", "new"), New("d/g", "a: 1\n")]
-
-
-def test_a_new_file_replaces_none(tmp_path: Path) -> None:
-    New("d/f", "text").make(tmp_path)
-    assert (tmp_path / "d/f").read_text() == "text"
-    with pytest.raises(AssertionError, match="d/f is there already"):
-        New("d/f", "other").make(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("output", "right"),
-    [("said\nmore\nend\n", True), ("said\n\nend", True), ("said\nmore\n", False), ("first\nsaid\nmore\nend\n", False)],
-)
-def test_what_a_page_leaves_out_may_be_anything(output: str, right: bool) -> None:
-    assert (Command("a", "said\n...\nend\n").wrong(output) == "") is right
-
-
-def test_an_edit_has_one_place(tmp_path: Path) -> None:
-    (tmp_path / "f").write_text("old old")
-    with pytest.raises(AssertionError, match="2 times"):
-        Edit("f", "old", "new").make(tmp_path)

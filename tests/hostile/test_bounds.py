@@ -109,14 +109,6 @@ def test_what_it_writes_goes_with_the_test(bench: Bench) -> None:
     assert not Path(f"{own}.new").exists()
 
 
-def test_it_has_time_to_end(bench: Bench) -> None:
-    """Control: SIGTERM reaches the application, and what it says then is in its log."""
-    handler = "import signal\nsignal.signal(signal.SIGTERM, lambda *_: (print('landed', flush=True), sys.exit(0)))\n"
-    plan = bench.plan(judge=READY + AFTER_START + PASS, application=handler + STARTED + WAIT)
-    bench.run(plan)
-    assert "landed" in bench.log(plan, "application.app")
-
-
 def test_children_for_which_nobody_waits_are_in_the_account(bench: Bench) -> None:
     """The bound is wide: what was used before the test began does not count."""
     if (group := process_group.make(200)) is None:

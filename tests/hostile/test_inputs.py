@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv import regular_file
 from tests.hostile.command import dodo
 from tests.rec.conftest import video
 
@@ -49,10 +48,3 @@ def test_files_that_are_found_are_files(
     code, output = dodo(*words)
     assert "Traceback" not in output and "internal error" not in output
     assert code == 2 or name == "dodo.yml", output
-
-
-def test_a_reader_takes_no_more_than_it_may(tmp_path: Path) -> None:
-    (tmp_path / "a").write_bytes(bytes(1001))
-    with pytest.raises(OSError, match="larger than 1000 bytes"):
-        regular_file.content(tmp_path / "a", 1000)
-    assert len(regular_file.content(tmp_path / "a", 1001)) == 1001

@@ -1,8 +1,6 @@
 """Rigs that a repository, a job or a number would move unasked."""
 
-import contextlib
 import json
-import math
 import os
 import pwd
 import time
@@ -22,7 +20,6 @@ from dodo_dsl.run import leases
 from dodo_dsl.run.rigs import leases as rigs_leases
 from dodo_dsl.run.rigs import permission
 from dodo_dsl.run.rigs.leases import device_key, device_leases, identity
-from dodo_dsl.run.rigs.permission import motion_of
 from dodo_dsl.run.rigs.problems import RigProblem
 from dodo_dsl.spec import machine as operator
 from dodo_dsl.spec.machine import MachineError, machine
@@ -113,20 +110,6 @@ def test_all_names_of_a_device_are_one(tmp_path: Path) -> None:
     assert device_leases(["socket://127.0.0.1:4242"]) == device_leases(["socket://localhost:4242"]) != []
 
 
-def test_a_serial_number_is_the_device_s_whatever_port_it_is_in(tmp_path: Path) -> None:
-    number = Path("/dev/null").stat().st_rdev
-    board = tmp_path / "usb1" / "1-2"
-    (board / "1-2:1.0" / "tty").mkdir(parents=True)
-    for name, text in {"idVendor": "2341", "idProduct": "0043", "serial": "A-17/x"}.items():
-        (board / name).write_text(f"{text}\n")
-    (tmp_path / f"{os.major(number)}:{os.minor(number)}").mkdir()
-    (tmp_path / f"{os.major(number)}:{os.minor(number)}" / "device").symlink_to(board / "1-2:1.0" / "tty")
-    assert identity("/dev/null", tmp_path) == "usb 2341 0043 A-17/x"
-    (board / "serial").unlink()
-    assert identity("/dev/null", tmp_path) == "path /dev/null"
-    assert identity("/dev/does-not-exist") == "path /dev/does-not-exist"
-
-
 @pytest.fixture
 def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A repository whose rig is a device that no program moves."""
@@ -170,14 +153,6 @@ def test_no_variable_moves_the_quarantine_of_hardware(repository: Path, monkeypa
     assert rigs_leases.all_quarantined() == {"fake": "it has lost steps"}
     assert rigs_leases.clear_quarantine("renamed", ["/dev/null"])
     assert rigs_leases.all_quarantined() == {}
-
-
-@pytest.mark.parametrize("name", ["/dev/null", "/dev/ptmx", "/dev/tty", "/none", "a\0b", "", "emulated", __file__])
-def test_what_is_no_hardware(name: str) -> None:
-    """Files, pseudo-terminals and sockets are not taken for hardware, and what is no device has no identity."""
-    assert not rigs_leases.is_hardware_device(name) and not rigs_leases.is_hardware_device("0")
-    is_device = name.startswith(("/dev/", "/none"))
-    assert (identity(name) != "", device_key(name) != "") == (is_device, is_device)
 
 
 # The operator
@@ -253,31 +228,6 @@ def test_only_permitted_repositories_use_a_rig(
     assert "may not use" not in dodo("rig", *words)[1]
 
 
-def test_the_yaw_of_a_circle_has_no_limit_whatever_its_flag_says() -> None:
-    """An operator who limits the yaw permits no rig that turns without end."""
-    flags = {"range-x": "1", "range-yaw": "170", "limits": "x=0.9,yaw=2.967"}
-    assert motion_of(flags).limits["yaw"] == 170 and motion_of(flags).limits["x"] == 1
-    assert motion_of({**flags, "kind": "circle"}).limits["yaw"] == math.inf
-
-
-@pytest.mark.parametrize(
-    ("flags", "said"),
-    [
-        ({"max-acceleration": "0.2", "limits": "acceleration=0.2"}, ""),
-        ({"max-acceleration": "0.5", "limits": "acceleration=0.2"}, "limits.acceleration is 0.5 m/s2, and"),
-        ({"max-acceleration": "0.2", "limits": "acceleration=0.3"}, "limits.acceleration is 0.3 m/s2, and"),
-        ({"max-acceleration": "0.2", "limits": "acceleration=much"}, "limits.acceleration is not set, and"),
-        ({"max-acceleration": "0.2"}, "limits.acceleration is not set, and"),
-    ],
-)
-def test_what_the_memory_is_given_is_compared_too(
-    repository: Path, rules: Callable[..., None], flags: dict[str, str], said: str
-) -> None:
-    rules(rigs=permitted(repository, acceleration="0.2 m/s2"))
-    with pytest.raises(RigProblem, match=said) if said else contextlib.nullcontext():
-        permission.refuse_forbidden(["/dev/null"], motion_of(flags), [repository])
-
-
 def test_places_come_from_the_operator_and_not_from_variables(
     repository: Path, rules: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -328,13 +278,6 @@ def test_a_file_of_the_operator_that_cannot_be_used_stops_everything(
     rig(repository)
     code, output = dodo("rig", "home", "fake")
     assert code in (2, 3) and "Traceback" not in output and "internal error" not in output
-
-
-def test_without_a_file_there_is_nothing_to_permit(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Control: without a file of the operator, everything is permitted."""
-    monkeypatch.setattr(operator, "FILE", repository / "none" / "rigs.yml")
-    assert machine() is None
-    permission.refuse_forbidden(["/dev/null"], {}, [repository])
 
 
 @pytest.mark.parametrize("rig_name", ["", "emulated"])

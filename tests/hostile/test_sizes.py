@@ -1,7 +1,6 @@
 """Inputs that unfold to more than a machine has, and floods."""
 
 import json
-import os
 import struct
 import time
 import zlib
@@ -10,10 +9,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from dodo_dsl.opendlv import video as opendlv_video
 from dodo_dsl.opendlv.assets import map_file
 from dodo_dsl.opendlv.assets.json_file import MapError
 from dodo_dsl.opendlv.assets.map_file import MAX_OVERLAYS, read_map
@@ -21,10 +18,8 @@ from dodo_dsl.opendlv.assets.mesh_text import MAX_BYTES, MAX_TRIANGLES, MAX_VERT
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.odvd import OdvdError
-from dodo_dsl.opendlv.picture_size import MAX_PIXELS, picture_size
+from dodo_dsl.opendlv.picture_size import MAX_PIXELS
 from dodo_dsl.opendlv.recording import Recording
-from dodo_dsl.opendlv.shared_memory import MemoryTakenError, SharedMemory, SharedMemoryError
-from dodo_dsl.opendlv.video import VideoDecoder
 from dodo_dsl.rec import truth
 from dodo_dsl.rec.frames import IMAGE, MOST_DECODERS, decoded
 from dodo_dsl.rec.truth import TruthError
@@ -43,7 +38,7 @@ from services.virtual_camera.optics import load_with_alpha
 from tests.drive.applications import dodo, program, results
 from tests.drive.variants import registry as registry_of_dodo
 from tests.drive.variants import variant
-from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, dodo_rec, message, record, video
+from tests.rec.conftest import BEGIN, HEIGHT, WIDTH, message, record, video
 from tests.run.scripted import plan
 
 __all__ = ["record"]
@@ -148,16 +143,6 @@ def test_what_is_read_in_all_is_limited(
         read(tmp_path)
 
 
-def test_sizes_in_headers_are_those_of_the_pictures() -> None:
-    """Control: sizes in headers are those of the pictures."""
-    import cv2
-
-    for kind in (".png", ".jpg"):
-        for options in ([], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]):
-            _, data = cv2.imencode(kind, np.zeros((123, 457, 3), np.uint8), options if kind == ".jpg" else [])
-            assert picture_size(data.tobytes()) == (457, 123)
-
-
 def test_frames_that_a_message_calls_too_large_are_not_decoded(record: Callable[..., Path]) -> None:
     size = {"format": "h264", "width": 16_000, "height": 16_000}
     large = message("opendlv.proxy.ImageReading", BEGIN, 3, data=b"\0\0\1\x65", **size)
@@ -169,18 +154,6 @@ def test_frames_that_a_message_calls_too_large_are_not_decoded(record: Callable[
     assert sentence.startswith("frames cannot be decoded: an image of 16000 x 16000 pixels, expected at most")
 
 
-def test_frames_that_lie_about_their_size_are_not_decoded_either(monkeypatch: pytest.MonkeyPatch) -> None:
-    packets = [image.payload for image in video(1)]
-    data = message_data(packets[0])
-    assert VideoDecoder("h264").decode(data) is not None
-    monkeypatch.setattr(opendlv_video, "MAX_PIXELS", WIDTH * HEIGHT - 1)
-    assert VideoDecoder("h264").decode(data) is None
-
-
-def message_data(payload: bytes) -> bytes:
-    return bytes(MessageSet.standard().decode(IMAGE, payload).data)
-
-
 @pytest.mark.thorough
 def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> None:
     told: list[str] = []
@@ -189,14 +162,6 @@ def test_cameras_are_not_counted_without_end(record: Callable[..., Path]) -> Non
         frames = [frame for _, frame in decoded(recording, recording.rows(messages=[IMAGE]), told.append)]
     assert [frame is not None for frame in frames] == [True] * MOST_DECODERS + [False] * (40 - MOST_DECODERS)
     assert told == [f"frames of more than {MOST_DECODERS} cameras and formats are not decoded"]
-
-
-def test_senders_without_end_become_no_tables(record: Callable[..., Path]) -> None:
-    envelopes = [message("opendlv.proxy.DistanceReading", BEGIN, stamp, distance=1.0) for stamp in range(1001)]
-    path = record(envelopes)
-    code, _, stderr = dodo_rec("export", path, "--csv")
-    assert (code, "would become 1001 tables, expected at most 1000; choose messages with" in stderr) == (2, True)
-    assert not path.with_suffix("").exists()
 
 
 def test_hidden_folders_and_mounts_are_no_part_of_a_registry(small_disk: Path) -> None:
@@ -251,19 +216,6 @@ def test_messages_of_a_second_are_limited_in_all_and_of_a_kind() -> None:
         counter.add(envelope(5), 10)
 
 
-def test_in_lockstep_the_clock_counts_messages() -> None:
-    counter = Traffic(10**9, None, lambda: 0, str)
-    for _ in range(model.MOST_PER_SECOND + 1):
-        counter.add(envelope(5), 10)
-
-
-def test_senders_without_end_take_no_memory() -> None:
-    counter = Traffic(10**9, Clock(), lambda: 0, str)
-    for stamp in range(model.MOST_OF_A_KIND):
-        counter.add(envelope(5, stamp), 10)
-    assert len(counter._bytes) <= 1001
-
-
 def test_notes_do_not_grow_without_end() -> None:
     found = RunState(plan(), time.monotonic)
     for number in range(1000):
@@ -313,18 +265,3 @@ def test_whole_applications(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kin
     (test,) = results(tmp_path / "report").values()
     result, reason = APPLICATIONS[kind][1]
     assert (test["outcome"], test["reason"][: len(reason)]) == (result, reason), test
-
-
-@pytest.mark.parametrize("posix", [False, True])
-def test_a_lock_that_a_reader_keeps_is_not_the_creator_s_fault(posix: bool) -> None:
-    name = f"dodo-test-{os.getpid()}-{posix}"
-    with SharedMemory.create(name, 64, posix) as ours, SharedMemory.attach(name) as theirs:
-        with (
-            theirs.lock(),
-            pytest.raises(MemoryTakenError, match=r"was locked by another for 0\.05 s"),
-            ours.lock(0.05),
-        ):
-            raise AssertionError("it is locked")
-        with ours.lock(), pytest.raises(SharedMemoryError) as caught, theirs.lock(0.05):
-            raise AssertionError("it is locked")
-        assert not isinstance(caught.value, MemoryTakenError)

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
 
@@ -10,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dodo_dsl.terminal import harmless_stream, json_text, printable
+from dodo_dsl.terminal import harmless_stream, printable
 from tests.hostile.command import dodo
-from tests.rec.conftest import BEGIN, dodo_rec, message
 
 ATTACKS = {
     "title": "\x1b]0;owned\x07",
@@ -47,23 +45,6 @@ def test_no_text_commands_a_stream(attack: str) -> None:
     assert not FORBIDDEN.search(printable("x" + ATTACKS[attack]).replace("##", ""))
 
 
-@pytest.mark.parametrize("attack", ATTACKS)
-def test_json_says_the_same_and_commands_nothing(attack: str) -> None:
-    """JSON says the same, and commands nothing."""
-    stream = StringIO()
-    harmless_stream(stream).write(json_text({ATTACKS[attack]: [ATTACKS[attack], "ü"]}))
-    assert not FORBIDDEN.search(stream.getvalue())
-    assert json.loads(stream.getvalue()) == {ATTACKS[attack]: [ATTACKS[attack], "ü"]}
-
-
-def test_commands_in_pieces_are_none_and_the_rest_stays() -> None:
-    stream = StringIO()
-    out = harmless_stream(stream)
-    for part in ("a::b\n", " ", ":", ":error::x\n", "\t:", "ok\n"):
-        out.write(part)
-    assert stream.getvalue() == "a::b\n : :error::x\n\t:ok\n"
-
-
 PIECES = st.sampled_from(["#", "##", "[", "##[", "vso", "vso[", ":", "::", "::error::", " ", "\t", "\n", "a", "\x1b["])
 
 
@@ -77,14 +58,6 @@ def test_no_pieces_become_a_command(pieces: list[str]) -> None:
         assert out.write(piece) == len(piece)
     assert not re.search(r"^[ \t]*::|##\[|##vso\[", stream.getvalue(), re.MULTILINE), repr(stream.getvalue())
     assert all(c.isprintable() or c in "\n\t" for c in stream.getvalue())
-
-
-@pytest.mark.thorough
-def test_a_recording_commands_no_terminal(record: Callable[..., Path]) -> None:
-    image = message("opendlv.proxy.ImageReading", BEGIN, 7, data=b"x", format=ALL, width=4, height=4)
-    for words in (("info",), ("export", "--coco", "--all", "-o", "out")):
-        _, stdout, stderr = dodo_rec(words[0], record([image], "drive.rec"), *words[1:])
-        assert not FORBIDDEN.search(stdout + stderr), repr(stderr)
 
 
 @pytest.mark.thorough
@@ -110,12 +83,3 @@ def test_a_repository_commands_no_terminal(tmp_path: Path, monkeypatch: pytest.M
         _, output = dodo(*words)
         assert "internal error" not in output, output
         assert not FORBIDDEN.search(output), repr(output)
-
-
-@pytest.mark.parametrize("attack", ATTACKS)
-def test_a_results_file_commands_no_terminal(tmp_path: Path, attack: str) -> None:
-    """A file of results commands no terminal."""
-    (tmp_path / "results.json").write_text(json.dumps({"dodo": "results", "version": 1, "tests": [ATTACKS[attack]]}))
-    code, output = dodo("report", str(tmp_path))
-    assert code == 2
-    assert not FORBIDDEN.search(output), repr(output)

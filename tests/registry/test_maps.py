@@ -4,7 +4,6 @@ import importlib.util
 import json
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -61,15 +60,6 @@ def test_a_map_is_what_its_generator_makes(generated, name):
     assert np.array_equal(ours, new)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_map_is_small(name):
-    assert sum(p.stat().st_size for p in (MAPS / name).iterdir()) < 60_000
-
-
-def test_all_maps_are_tested():
-    assert sorted(p.name for p in MAPS.iterdir() if p.is_dir() and p.name != "__pycache__") == NAMES
-
-
 @pytest.mark.parametrize("name", TRACKS)
 def test_cones_follow_each_other_closely_and_walls_run_through_them(name):
     for colour, side in (("yellow", "left"), ("blue", "right")):
@@ -87,26 +77,6 @@ def test_the_lane_is_half_a_metre_wide(name):
     yellow, blue = cones(name, "yellow"), cones(name, "blue")
     across = np.linalg.norm(yellow[:, None] - blue[None], axis=2).min(axis=1)
     assert across == pytest.approx(np.full(len(yellow), 0.5), abs=0.025)
-
-
-def test_the_track_of_the_rig_fits_its_workspace_with_room_to_brake():
-    """1.9 x 1.4 m around 0; the vehicle's centre is 0.18 m behind its front, and brakes from 0.52 m/s within 0.27 m."""
-    x, *_ = start("rig-straight")
-    ((finish, *_),) = obstacle("rig-straight", "finish")
-    assert x > -0.9 + 0.1
-    assert finish - 0.18 + 0.52**2 / (2 * 0.5) < 0.95
-
-
-def test_the_oval_of_the_rig_fits_its_workspace_with_room_to_brake():
-    """By the middle of the lane, in which the vehicle's centre is, with 10 cm to each side."""
-    rows = [np.array(obstacle("rig-oval", side))[:, :2] for side in ("left", "right")]
-    (inner_low, inner_high), (outer_low, outer_high) = ((row.min(axis=0), row.max(axis=0)) for row in rows)
-    low, high = (inner_low + outer_low) / 2, (inner_high + outer_high) / 2
-    assert (low >= np.array([-0.9, -0.7]) + 0.099).all()
-    assert (high <= np.array([0.95, 0.7]) - 0.099).all()
-    ((x, y, *_),) = obstacle("rig-oval", "far")
-    assert (x, y) == pytest.approx((0.025, 0.35)), "half a lap from the finish and 0.225 m"
-    assert obstacle("rig-oval", "finish")
 
 
 @pytest.mark.parametrize(
@@ -171,15 +141,6 @@ def test_cones_are_seen_all_along_the_lane(name):
         assert hues(image, BLUE)[0] > 20
 
 
-def test_the_cone_is_closed_and_of_the_size_of_the_real_one():
-    copies = load_scene(MAPS / "straight").models[0]
-    low, high = copies.shape.vertices.min(axis=0), copies.shape.vertices.max(axis=0)
-    assert (high - low).tolist() == pytest.approx([0.024, 0.024, 0.034])
-    assert len(copies.shape.faces) < 60
-    outwards = np.einsum("fi,fi->f", copies.shape.normals, copies.shape.centres - copies.shape.middle)
-    assert (outwards > 0).mean() > 0.7
-
-
 def test_two_cars_are_on_the_straight_track():
     """The car is as long and as wide as the one that is judged, and points along -y."""
     ours, straight = (json.loads((MAPS / name / "map.json").read_text()) for name in ("two-cars", "straight"))
@@ -190,8 +151,3 @@ def test_two_cars_are_on_the_straight_track():
     assert np.ptp(shape.vertices, axis=0) == pytest.approx([0.16, 0.36, 0.11])
     top = shape.vertices[shape.vertices[:, 2] > 0.1]
     assert abs(top[:, 1].min()) < abs(top[:, 1].max())
-
-
-def test_no_file_of_a_map_names_a_place_on_a_machine():
-    for path in MAPS.rglob("*.json"):
-        assert not any(Path(m["file"]).is_absolute() for m in json.loads(path.read_text())["model"])

@@ -51,13 +51,6 @@ def test_a_slip_is_told_once(name: str, told: Said) -> None:
     assert said["hint"]
 
 
-@pytest.mark.parametrize("name", SLIPS)
-def test_it_is_told_at_the_line_that_is_wrong(name: str) -> None:
-    """A line that the good test does not have."""
-    line = written(name).splitlines()[int(SLIPS[name][1].partition(":")[0]) - 1]
-    assert line not in GOOD.splitlines()
-
-
 @pytest.mark.parametrize(
     "name", ["block-above-colon", "char-byte-order-mark", "char-nbsp", "list-dash-no-blank-second"]
 )
@@ -75,12 +68,6 @@ def test_patterns_are_not_tried_on_lines_as_long_as_a_file() -> None:
     """Some would take minutes for what strangers write."""
     messages = [parse(f"a: {'x ' * words}y: z", "long.yml")[1][0].message for words in (100, 100_000)]
     assert messages[0].startswith("a second colon") and messages[1].startswith("not YAML")
-
-
-@pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
-def test_lines_of_any_system_are_fine(ends: str) -> None:
-    node, problems = parse(GOOD.replace("\n", ends), "good.dodo.yml")
-    assert (node is None, problems) == (False, [])
 
 
 CHARACTERS = "\t \n:-{}[]'\",#&*!|>%@`=;\u00a0" + string.ascii_lowercase[:3]

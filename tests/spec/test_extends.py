@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from dodo_dsl.source import Mapping, plain, read
-from dodo_dsl.spec.load import EXTENDS, MAX_CHAIN, resolve
+from dodo_dsl.source import plain, read
+from dodo_dsl.spec.load import MAX_CHAIN, resolve
 
 BASE = "name: base\nlevel: sil\nmatrix: {a: [1, 2]}\naction: {car: {uses: model, with: {x: 1 m, y: 2 m}}}\n"
 
@@ -32,10 +32,6 @@ def test_mappings_merge_and_values_replace(tmp_path: Path) -> None:
     assert resolved(tmp_path, own) == (expected, [])
 
 
-def test_a_name_is_never_inherited(tmp_path: Path) -> None:
-    assert "name" not in resolved(tmp_path, "extends: base.dodo.yml\n")[0]
-
-
 def test_null_removes(tmp_path: Path) -> None:
     own, problems = resolved(tmp_path, "extends: base.dodo.yml\nmatrix:\naction: {car: {with: {y: }}}\n")
     assert own == {"level": "sil", "action": {"car": {"uses": "model", "with": {"x": "1 m"}}}}
@@ -49,44 +45,10 @@ def test_another_service_starts_without_the_parameters(tmp_path: Path) -> None:
     assert own["action"]["car"]["with"] == {"x": "1 m", "y": "2 m"}
 
 
-def test_spans_keep_their_files(tmp_path: Path) -> None:
-    resolved(tmp_path, "extends: base.dodo.yml\nlevel: hil\n")
-    node, _ = read(tmp_path / "own.dodo.yml")
-    assert node is not None
-    found, _ = resolve(node, tmp_path / "own.dodo.yml", tmp_path)
-    assert isinstance(found, Mapping)
-    assert {key: Path(entry.value.span.file).name for key, entry in found.entries.items()} == {
-        "level": "own.dodo.yml",
-        "matrix": "base.dodo.yml",
-        "action": "base.dodo.yml",
-    }
-
-
 def test_a_long_chain(tmp_path: Path) -> None:
     chain = {f"t{n}": f"extends: t{n + 1}.dodo.yml\n" for n in range(MAX_CHAIN + 1)}
     _, problems = resolved(tmp_path, "extends: t0.dodo.yml\n", **chain)
     assert problems == [("extends-cycle", f"the chain of extended tests is longer than {MAX_CHAIN}")]
-
-
-@pytest.mark.parametrize(
-    ("text", "base", "expected"),
-    [
-        ("a: 1", "", False),
-        ("extends: base.dodo.yml", "a: 1", False),
-        ("extends: base.dodo.yml", "a: [", True),
-        ("extends: base.dodo.yml", "extends: none.dodo.yml", True),
-        ("extends: none.dodo.yml", "", True),
-        ("extends: [x]", "", True),
-    ],
-)
-def test_a_spec_on_what_cannot_be_read_stays_open(tmp_path: Path, text: str, base: str, expected: bool) -> None:
-    (tmp_path / "base.dodo.yml").write_text(base)
-    file = tmp_path / "spec.dodo.yml"
-    file.write_text(text)
-    node, _ = read(file)
-    assert node is not None
-    found = resolve(node, file, tmp_path)[0]
-    assert (isinstance(found, Mapping) and EXTENDS in found.entries) is expected
 
 
 @pytest.mark.parametrize(

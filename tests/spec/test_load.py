@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from dodo_dsl.diagnostics import Diagnostic, Span
+from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.source import Scalar
-from dodo_dsl.spec.load import load_spec, varied
-from dodo_dsl.spec.matrix import Choice
+from dodo_dsl.spec.load import load_spec
 from dodo_dsl.spec.model import Spec
 from dodo_dsl.spec.registry import Location
 from tests.check import examples
@@ -51,19 +50,6 @@ def test_corners_have_each_end_once(tmp_path: Path) -> None:
     assert first.corners[0].title == "example[yaw=80 deg,start=-8 cm,limit=60 s]"
 
 
-def test_other_values_under_another_name(tmp_path: Path) -> None:
-    (_, second), _ = loaded(tmp_path, TEXT)
-    here = Span("")
-    found = varied(second, {"start": Scalar(here, "3 cm", "3 cm")}, Choice((("run", Scalar(here, 7, "7")),)))
-    assert values(found) == ("3 cm", "90 deg", 90.0)
-    assert found.slug == "example--run-7"
-
-
-def test_a_test_without_ranges_has_no_corners(tmp_path: Path) -> None:
-    ((spec,), _) = loaded(tmp_path, "seed: 3\n")
-    assert (spec.corners, spec.ranges, spec.template) == ((), (), None)
-
-
 def test_a_test_that_extends_another_changes_its_ranges(tmp_path: Path) -> None:
     loaded(tmp_path, TEXT)
     path = tmp_path / "own.dodo.yml"
@@ -75,17 +61,6 @@ def test_a_test_that_extends_another_changes_its_ranges(tmp_path: Path) -> None:
     assert problems == []
     assert values(spec) == ("2 cm", "70 deg", 90.0)
     assert [one.text for one in spec.ranges] == ["-8 cm to 8 cm", "60 s, 90 s, 2 min"]
-
-
-def test_ranges_that_an_extending_test_does_not_use_are_the_concern_of_the_other(tmp_path: Path) -> None:
-    loaded(tmp_path, TEXT)
-    path = tmp_path / "own.dodo.yml"
-    without = "dodo: 1\nname: own\nextends: example.dodo.yml\nmatrix:\naction: {pose: {with: {x: 0 m, yaw: 70 deg}}}\n"
-    path.write_text(without)
-    (spec,), problems = load_spec(Location(path, tmp_path))
-    assert (problems, "start" in {one.name for one in spec.ranges}) == ([], True)
-    path.write_text(f"{without}vary: {{far: {{from: 1, to: 2, nominal: 1}}}}\n")
-    assert [found.rule for found in load_spec(Location(path, tmp_path))[1]] == ["vary-unused"]
 
 
 def test_no_more_instances_are_read_after_twenty_with_mistakes(tmp_path: Path) -> None:

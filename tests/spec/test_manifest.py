@@ -66,29 +66,9 @@ def test_messages_and_parameters_depend_on_other_parameters(tmp_path: Path) -> N
     assert in_words(manifest.parameters["size"].when) == "with kind: b and fast: true"
 
 
-def test_own_manifests_beside_the_shipped_ones(tmp_path: Path) -> None:
-    write(tmp_path, "own", OWN.format(name="own"))
-    manifests, problems = load_manifests((tmp_path,))
-    assert problems == ()
-    assert manifests["own"].folder == tmp_path / "own"
-    assert manifests["collision"].folder.parent == package_data.services()
-
-
 def test_what_ships_is_sound_and_named_as_its_folder() -> None:
     """So that it is read without a check, when it is asked for."""
     for file in package_data.services().glob("*/service.yml"):
         manifest, problems = load_manifest(file)
         assert manifest is not None and problems == []
         assert manifest == load_manifests()[0][file.parent.name.replace("_", "-")]
-
-
-def test_names_that_are_taken(tmp_path: Path) -> None:
-    write(tmp_path / "a", "own", OWN.format(name="own"))
-    write(tmp_path / "b", "own", OWN.format(name="own"))
-    write(tmp_path / "b", "other", OWN.format(name="collision"))
-    manifests, problems = load_manifests((tmp_path / "a", tmp_path / "b"))
-    assert manifests["own"].folder == tmp_path / "a/own"
-    assert [problem.message for problem in problems] == [
-        "the name 'collision' is taken by a service of DoDo",
-        f"the name 'own' is taken by the service in {tmp_path / 'a/own'}",
-    ]

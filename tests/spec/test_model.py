@@ -74,24 +74,3 @@ def test_limits_of_resources(
 ) -> None:
     (spec,), found = loaded(tmp_path, f"{examples.SPEC}{resources}\n")
     assert (spec.resources, found) == (expected, problems)
-
-
-def test_instances(tmp_path: Path) -> None:
-    specs, problems = loaded(tmp_path, examples.SPEC.replace("finish line.", "${matrix.a}") + "matrix: {a: [x, y]}\n")
-    assert problems == []
-    assert [(spec.title, spec.slug) for spec in specs] == [
-        ("example[a=x]", "example--a-x"),
-        ("example[a=y]", "example--a-y"),
-    ]
-    assert [spec.description for spec in specs] == ["Drive to the x", "Drive to the y"]
-
-
-def test_a_problem_in_a_parameter_is_left_to_the_rules(tmp_path: Path) -> None:
-    text = examples.SPEC.replace("{goal: finish}", '{goal: "${matrix.a}"}') + "matrix: {a: [1, 2]}\nlevel: 3\n"
-    assert loaded(tmp_path, text)[1].count("duplicate-key") == 1
-
-
-def test_a_description_is_one_line(tmp_path: Path) -> None:
-    text = examples.SPEC.replace("description: Drive to", "description: >\n  Drive\n\n  to")
-    (spec,), problems = loaded(tmp_path, text)
-    assert (spec.description, problems) == ("Drive to the finish line.", [])

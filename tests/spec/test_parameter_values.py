@@ -4,11 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from dodo_dsl.diagnostics import Span
-from dodo_dsl.source import Scalar
 from dodo_dsl.spec.arguments import Value, ValueProblem, convert, default_value
 from dodo_dsl.spec.manifest import Parameter
 from tests.source.nodes import mapping, value
@@ -95,14 +91,6 @@ def test_defaults(parameter: Parameter, expected: Value | None) -> None:
     assert default_value(parameter) == expected
 
 
-@given(st.text(max_size=20))
-def test_strings_are_kept_or_refused(text: str) -> None:
-    try:
-        assert convert(parameter("string"), Scalar(Span("x.yml"), text, text), ROOT).text == text
-    except ValueProblem:
-        assert not text.isprintable()
-
-
 @pytest.fixture
 def registry(tmp_path: Path) -> Path:
     root = tmp_path / "registry"
@@ -142,11 +130,3 @@ def test_paths_that_are_refused(text: str, rule: str, hint: str, registry: Path)
         path(registry, text)
     assert problem.value.diagnostic.rule == rule
     assert hint in problem.value.diagnostic.hint
-
-
-@pytest.mark.parametrize(("text", "hint"), [("90", "write '90 %'"), ("150", ""), ("-1", ""), ("120 %", "")])
-def test_a_share_beyond_one_may_be_in_percent(text: str, hint: str) -> None:
-    with pytest.raises(ValueProblem) as problem:
-        convert(parameter("number", unit="1", minimum=0, maximum=1), value(text), ROOT)
-    assert problem.value.diagnostic.rule == "out-of-range"
-    assert problem.value.diagnostic.hint == hint

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dodo_dsl.spec.quantity import UNITS, QuantityError, convert
-from dodo_dsl.spec.slips import boolean_meant
 
 MENDED = [
     ("0.8 m/s# as on the car", "m/s", "0.8 m/s # as on the car"),
@@ -31,22 +30,6 @@ def test_a_value_with_exactly_one_fix(text: str, unit: str, mended: str) -> None
     assert problem.value.hint
     assert problem.value.fix.mended(text) == mended
     convert(mended.partition(" #")[0], unit)
-
-
-@pytest.mark.parametrize(
-    ("text", "unit"), [("5 x,", "m"), ("a# b", "m"), ("\u2212", "deg"), (",", "1"), ("10 q", "Hz")]
-)
-def test_values_without_one(text: str, unit: str) -> None:
-    with pytest.raises(QuantityError) as problem:
-        convert(text, unit)
-    assert problem.value.fix is None
-
-
-@pytest.mark.parametrize(("text", "meant"), [("Yes", "true"), ("on", "true"), ("NO", "false"), ("maybe", None)])
-def test_words_for_true_and_false(text: str, meant: str | None) -> None:
-    hint, fix = boolean_meant(text)
-    assert (fix.new if fix else None) == meant
-    assert bool(hint) == bool(meant)
 
 
 NUMBERS = st.sampled_from(("1", "-1", "1,5", "1.5", ".5", "1e3", "1.000,5", "+2", ",", "", "\u22121", "0x1"))

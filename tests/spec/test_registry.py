@@ -41,15 +41,6 @@ def test_roots_of_specs_outside_of_registries(folder: Path) -> None:
     assert {spec.root for spec in found} == {folder}
 
 
-def test_other_registries_are_roots_only(folder: Path) -> None:
-    found, _ = locate([folder / "else/d/d.dodo.yml"], [folder / "tests"], [folder])
-    assert [(spec.stem, spec.root) for spec in found] == [("d", folder)]
-
-
-def test_an_empty_registry_is_not_reported(folder: Path) -> None:
-    assert locate([folder / "empty"], [folder / "empty"]) == ([], [])
-
-
 @pytest.mark.parametrize("name", ["tests/x/x.dodo.yaml", "dodo.yaml"])
 def test_a_file_of_the_other_suffix_is_refused(name: str, tmp_path: Path) -> None:
     (tmp_path / "tests" / "x").mkdir(parents=True)

@@ -13,12 +13,6 @@ def loaded(folder: Path, text: str) -> tuple[Deployment, list[tuple[str, str]]]:
     return deployment, [(problem.rule, problem.message) for problem in problems]
 
 
-def test_without_a_file(tmp_path: Path) -> None:
-    assert find_deployment(tmp_path) is None
-    deployment, problems = load_deployment(None)
-    assert (deployment.file, deployment.registry, problems) == (None, (package_data.registry(),), [])
-
-
 def test_the_nearest_file(tmp_path: Path) -> None:
     (tmp_path / "a/b").mkdir(parents=True)
     (tmp_path / "dodo.yml").touch()
@@ -36,14 +30,6 @@ def test_outside_of_all_deployments_that_of_the_named_paths_counts(tmp_path: Pat
     assert find_deployment(outside, [one / "tests", one / "tests" / "a.dodo.yml"]) == one / "dodo.yml"
     assert find_deployment(outside, [one / "tests", other / "tests"]) is None
     assert find_deployment(other, [one / "tests"]) == other / "dodo.yml"
-
-
-def test_defaults(tmp_path: Path) -> None:
-    deployment, problems = loaded(tmp_path, "")
-    assert problems == []
-    assert (deployment.root, deployment.registry) == (tmp_path, (package_data.registry(),))
-    assert not {111, 112} & set(deployment.cids)
-    assert deployment.gates
 
 
 def test_everything(tmp_path: Path) -> None:

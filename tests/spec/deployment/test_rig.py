@@ -4,8 +4,6 @@ import json
 import os
 from pathlib import Path
 
-import pytest
-
 from dodo_dsl import package_data
 from dodo_dsl.source import Scalar
 from dodo_dsl.spec import machine
@@ -13,7 +11,6 @@ from dodo_dsl.spec.rig import (
     CIRCLE,
     EMULATED,
     EMULATED_CIRCLE,
-    EMULATED_FILE,
     LIMIT_UNITS,
     MEMORY,
     Rig,
@@ -75,21 +72,6 @@ def test_limits_have_the_names_and_units_of_the_schema_and_of_the_rigs_memory() 
     assert list(LIMIT_UNITS) == list(LIMITS)
 
 
-@pytest.mark.parametrize("key", ["", "camera.height", "kind.width", "camera.width.x", "other"])
-def test_keys_that_a_rig_does_not_have(key: str) -> None:
-    assert KIWI.entry(key) is None
-
-
-def test_its_entries() -> None:
-    entry = KIWI.entry("camera.width")
-    assert entry is not None
-    assert isinstance(entry.value, Scalar)
-    assert entry.value.value == 640
-    source = emulated().entry("camera.source")
-    assert source is not None
-    assert source.key.file == EMULATED_FILE
-
-
 def test_a_pseudo_terminal_has_a_program_at_its_other_end(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
     link = tmp_path / "port"
@@ -97,9 +79,3 @@ def test_a_pseudo_terminal_has_a_program_at_its_other_end(tmp_path: Path) -> Non
     assert is_simulated(str(link)) and is_simulated(os.ttyname(theirs)) and is_simulated("emulated")
     os.close(ours)
     os.close(theirs)
-
-
-def test_serial_ports_have_hardware(tmp_path: Path) -> None:
-    link = tmp_path / "port"
-    link.symlink_to("/dev/ttyACM0")
-    assert not any(map(is_simulated, ("/dev/ttyACM0", str(link), "socket://rig:2000", "/dev/pts/../ttyACM0", "")))

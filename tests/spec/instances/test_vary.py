@@ -45,11 +45,6 @@ def test_every_end_is_in_a_corner_and_the_rest_is_nominal() -> None:
     }
 
 
-def test_a_range_with_a_problem_keeps_its_nominal_value() -> None:
-    ((one,), _) = read(mapping("vary: {a: {from: 2, to: 1, nominal: 1}}"))
-    assert (one.nominal.text, one.ends) == ("1", ())
-
-
 def unknown(written: str) -> list[str]:
     """The hints about a value."""
     node = mapping(f"vary: {{light: {{from: 0.3, to: 2, nominal: 1}}}}\nx: {written}\n")
