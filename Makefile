@@ -1,29 +1,24 @@
 # The developer's front door. `make demo` and `make test` set up what they need.
 DODO := .venv/bin/dodo
-# One worker more than there are cores, as many tests wait for something
+# More workers than there are cores, as many tests wait for something: those with an engine, and those in real time
 WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
+ALL_WORKERS ?= $(shell echo $$(($$(nproc) + 2)))
 PYTEST := .venv/bin/pytest --quiet
 JUNIT := build/tests
 # Words for `make bench`, as "rec bus", "--against FILE" or "--against-checkout DIR"
 BENCH ?=
-# `make test` has two parts, each with tests that mostly wait beside others. Those in real time do, for two rigs at a
-# time, and go first: by a priority that root may give, else by the quick ones standing back. The engine's two do, too.
-RIGS ?= 2
-AHEAD := $(if $(filter -10,$(shell nice -n -10 nice 2>/dev/null)),nice -n -10)
-BEHIND := $(if $(AHEAD),,nice -n 10)
 # What `make proof` may take; it ends behind the test that is over it
 PROOF_S ?= 1800
-PARTS := realtime-tests engine-tests fast-tests slow-tests first second
 
 # Without bytecode on disk, each of the thousands of processes that tests start would compile DoDo anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test proof dev style types quick-tests $(PARTS) tools compiled-tests lint bench firmware ros format goldens schema site release clean
+.PHONY: help demo check test proof dev style types quick-tests all-tests tools compiled-tests lint bench firmware ros format goldens schema site release clean
 
 help:
 	@echo "make demo     set up, then run the shipped tests with the example application"
-	@echo "make check    format, lint, types, imports, and the tests that need only Python: a minute"
-	@echo "make test     set up, then every check and every test: a quarter of an hour"
+	@echo "make check    format, lint, types, imports, and the tests that need only Python: below a minute"
+	@echo "make test     set up, then every check and every test: eight minutes"
 	@echo "make proof    what takes long to prove, in half an hour at most, and what of it holds"
 	@echo "make lint     format, lint, types, imports"
 	@echo "make bench    set up, then measure, beside a peer in the same run: ten minutes, a table in build/bench"
@@ -56,22 +51,15 @@ types: dev
 quick-tests: dev
 	$(PYTEST) -n $(WORKERS) -m "not slow and not thorough and not proof" --hypothesis-profile=quick --junitxml=$(JUNIT)/quick.xml
 
-realtime-tests:
-	$(AHEAD) $(PYTEST) -n $(RIGS) --dist loadgroup -m "realtime and not proof" --junitxml=$(JUNIT)/realtime.xml
-
-engine-tests:
-	$(PYTEST) -m "engine and not proof" --junitxml=$(JUNIT)/engine.xml
-
-fast-tests:
-	$(BEHIND) $(PYTEST) -n 2 -m "not slow and not proof" --junitxml=$(JUNIT)/fast.xml
-
-slow-tests:
-	$(PYTEST) -n $(shell nproc) --dist loadgroup -m "slow and not engine and not realtime and not proof" --junitxml=$(JUNIT)/slow.xml
+all-tests:
+	@rm -f $(JUNIT)/*.xml; status=0; \
+		$(PYTEST) -n $(ALL_WORKERS) --dist loadgroup --no-loadscope-reorder -m "not proof" --junitxml=$(JUNIT)/test.xml || status=$$?; \
+		.venv/bin/python scripts/slowest-tests $(JUNIT)/test.xml; exit $$status
 
 tools:
 	@scripts/install-test-tools
 
-# Compiles the tests once, which each of the parts that run side by side would do for itself
+# Compiles the tests once, which each worker would do for itself
 compiled-tests: dev
 	@.venv/bin/pytest --quiet --collect-only >/dev/null
 
@@ -83,20 +71,13 @@ check:
 
 test:
 	@$(MAKE) --no-print-directory -j 3 style tools compiled-tests
-	@status=0; rm -f $(JUNIT)/*.xml; for part in first second; do \
-		$(MAKE) --no-print-directory -j 3 --keep-going --output-sync=target $$part || status=$$?; done; \
-		.venv/bin/python scripts/slowest-tests $(JUNIT)/*.xml; exit $$status
+	@$(MAKE) --no-print-directory -j 2 --keep-going --output-sync=target types all-tests BESIDE='nice -n 10'
 
 proof: dev tools
 	@rm -f $(JUNIT)/proof.xml $(JUNIT)/search.xml; status=0; \
 		$(PYTEST) -m proof --session-timeout=$(PROOF_S) --junitxml=$(JUNIT)/proof.xml || status=$$?; \
 		$(PYTEST) -n 2 -m "hypothesis and not engine and not realtime" --hypothesis-profile=search --junitxml=$(JUNIT)/search.xml || status=$$?; \
 		.venv/bin/python scripts/slowest-tests --held $(JUNIT)/proof.xml; exit $$status
-
-first: BESIDE = $(BEHIND)
-first: realtime-tests fast-tests types
-
-second: engine-tests slow-tests
 
 bench:
 	@since=$$(date +%s); scripts/install-bench-tools && .venv/bin/python -m benchmarks.ledger --since $$since $(BENCH)

@@ -6,8 +6,8 @@ import os
 import random
 import socket
 import subprocess
+from collections import Counter
 from collections.abc import Callable, Iterator
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -29,30 +29,15 @@ os.environ["COLUMNS"] = str(WIDE)  # whatever terminal the tests are started in
 REALTIME_RERUNS, REALTIME_REST_S, REALTIME_LIMIT_S = 2, 5, 300
 HANGS = "from pytest-timeout"
 
-WORDS = {
-    "engine": ("mark.engine", "MARKS"),
-    "realtime": ("realtime", "firmware"),
-    "slow": ("slow", "engine", "realtime", "firmware", "proof"),
-    "proof": ("proof",),
-}
-"""A file with tests of a mark says one of its words; `pytest -m engine` loads no others, which would take seconds."""
+PRIORITIES = {"realtime": -10, "engine": -5}
+"""How nice tests of a mark are beside others, where this user may be less so."""
+PATIENT = os.nice(0) if os.geteuid() == 0 else os.nice(0) + 10
+"""How nice others are."""
+IS_BESIDE_OTHERS = "PYTEST_XDIST_WORKER" in os.environ
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-goldens", action="store_true", help="write expected output instead of comparing")
-
-
-@cache
-def says(path: Path, mark: str) -> bool:
-    """Whether a file of tests may have some with a mark."""
-    text = path.read_text(encoding="utf-8")
-    return any(word in text for word in WORDS[mark])
-
-
-def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    mark = config.getoption("markexpr").partition(" ")[0]
-    is_known = mark in WORDS and collection_path.match("test_*.py")
-    return True if is_known and not says(collection_path, mark) else None
 
 
 def pytest_collection() -> None:
@@ -65,6 +50,7 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever needs the rig's firmware in its simulator needs real time; that and an engine are slow.
 
@@ -84,9 +70,30 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=engine.STUCK))
         if item.get_closest_marker("engine") or item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.slow)
-        for mark in WORDS:
-            if item.get_closest_marker(mark) and not says(item.path, mark):
-                raise pytest.UsageError(f"{item.nodeid} has the mark '{mark}', and its file does not say so")
+    if IS_BESIDE_OTHERS:
+        _share_out(items)
+
+
+def _share_out(items: list[pytest.Item]) -> None:
+    """Groups for ``--dist loadgroup``, of which one process runs each, in the order in which processes take them.
+
+    Those with an engine are one group and those in real time two, as they mostly wait and disturb one another; they
+    begin at once. Then come the slow ones, each by itself, and the quick ones, file by file.
+    """
+    counts = Counter(item.path for item in items if item.get_closest_marker("realtime"))
+    rigs = {path: number % 2 for number, (path, _) in enumerate(counts.most_common())}
+    order = {}
+    for item in items:
+        if item.get_closest_marker("engine"):
+            order[item], group = 0, "engine"
+        elif item.get_closest_marker("realtime"):
+            order[item], group = 1 + rigs[item.path], f"realtime-{rigs[item.path]}"
+        else:
+            is_slow = item.get_closest_marker("slow") is not None
+            order[item], group = 3 + (not is_slow), "" if is_slow else str(item.path)
+        if group:
+            item.add_marker(pytest.mark.xdist_group(group), append=order[item] > 3)
+    items.sort(key=order.__getitem__)
 
 
 FIRST_FAILURE = pytest.StashKey[str]()
@@ -98,6 +105,10 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
+    if IS_BESIDE_OTHERS:
+        wanted = next((nice for mark, nice in PRIORITIES.items() if item.get_closest_marker(mark)), PATIENT)
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, 0, wanted)
     if item.get_closest_marker("engine") and getattr(item, "execution_count", 1) > 1:
         failure = item.stash.get(FIRST_FAILURE, "")
         assert engine.is_stuck() and engine.start_anew(), f"the engine was not stuck:\n{failure}"

@@ -70,9 +70,7 @@ def test_summaries(style: str, tmp_path: Path, update_goldens: bool) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("style", STYLES)
 def test_compose_accepts_them(style: str, tmp_path: Path) -> None:
-    command = compose()
-    for way in ("network", "hil"):  # hil has what host has, and hardware
-        test = made(style, tmp_path / way, way)
-        said = subprocess.run([*command, "config", "-q"], cwd=test.write(), capture_output=True, text=True, check=False)
-        unset = [line for line in said.stderr.splitlines() if "variable is not set" not in line]
-        assert (said.returncode, unset) == (0, []), way
+    test = made(style, tmp_path, way_of(style))
+    said = subprocess.run([*compose(), "config", "-q"], cwd=test.write(), capture_output=True, text=True, check=False)
+    unset = [line for line in said.stderr.splitlines() if "variable is not set" not in line]
+    assert (said.returncode, unset) == (0, [])
