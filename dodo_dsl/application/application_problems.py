@@ -22,7 +22,6 @@ from dodo_dsl.application.model import (
     ApplicationSource,
     ComposeService,
     declared_cid,
-    image_variable,
     plain,
     references,
     words_of,
@@ -32,7 +31,6 @@ from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_e
 from dodo_dsl.source import Node, Scalar
 
 _GIVE_CID = "add --cid=111 to its command, or declare the one that is built in: x-dodo: {cid: 111}"
-_FLAG = re.compile(r"(?P<flag>-{1,2}[ ]?[A-Za-z]+ ?)=(?P<value> ?.*)", re.DOTALL)
 _IN_ONE_WORD = re.compile(r"--cid[ ]+(?P<value>[^ ]+)")
 _LITERAL = re.compile(r"--cid=(?P<value>[\w.+-]+)")
 _HIGHEST = 254
@@ -57,7 +55,6 @@ def application_problems(
         found.extend([stack.problem(application, name, part, has_errors(own))] if part else own)
     found.extend(construction.check())
     found.extend(_cycles(application))
-    found.extend(_same_variable(application))
     found.extend(_several_cids(application, of_stack))
     yield from found
     if not has_errors(found):
@@ -76,15 +73,6 @@ def _cycles(application: ApplicationSource) -> Iterator[Diagnostic]:
         message = f"services depend on one another: {', '.join([first, *others[:5]])}{more}"
         hint = "remove one of the dependencies, so that one service can start first"
         yield _bad(services[first].span, message, hint)
-
-
-def _same_variable(application: ApplicationSource) -> Iterator[Diagnostic]:
-    seen: dict[str, str] = {}
-    for name in application.services:
-        other = seen.setdefault(image_variable(name), name)
-        if other != name:
-            message = f"'{name}' and '{other}' would both take their image from {image_variable(name)}"
-            yield Diagnostic(application.services[name].span, "application-file", message, "rename one of them")
 
 
 def _several_cids(application: ApplicationSource, of_stack: Collection[str]) -> Iterator[Diagnostic]:
@@ -132,7 +120,7 @@ def written_cids(service: ComposeService, application: ApplicationSource) -> set
 def _without_cid(application: ApplicationSource) -> Iterator[Diagnostic]:
     """Warnings of flags that give no CID, of services with messages that take none, and of none that does."""
     services = application.services.values()
-    slips = {service.name: list(_cid_slips(service, takes_cid(service))) for service in services}
+    slips = {service.name: list(_cid_slips(service)) for service in services}
     yield from (slip for found in slips.values() for slip in found)
     if application.cid is not None:
         return
@@ -179,26 +167,14 @@ def _bad(span: Span, message: str, hint: str = "") -> Diagnostic:
     return Diagnostic(span, "application-file", message, hint)
 
 
-def _meant(word: str) -> str:
-    """The value in a word that is almost ``--cid=``: letters in another order or size, one too many, or blanks."""
-    match = _FLAG.fullmatch(word)
-    if match is None or match["flag"] == "--cid":
-        return ""
-    name = match["flag"].replace("-", "").strip().lower()
-    shorter = {name[:at] + name[at + 1 :] for at in range(len(name))}
-    return match["value"].strip() if sorted(name) == sorted("cid") or "cid" in shorter else ""
-
-
-def _cid_slips(service: ComposeService, takes_cid: bool) -> Iterator[Diagnostic]:
-    """Words that are meant to give a CID, and give none; a service that ``takes_cid`` may have flags that are alike."""
+def _cid_slips(service: ComposeService) -> Iterator[Diagnostic]:
+    """Words that are meant to give a CID, and give none."""
     for word, item in service.words:
         one, literal = _IN_ONE_WORD.fullmatch(word), _LITERAL.fullmatch(word)
         if one:
             yield _warning(item, f"'{word}' is one word, which no program reads", f"write '--cid={one['value']}'")
         elif literal and not _is_cid(literal["value"]):
             yield _warning(item, f"'{word}' gives no CID, expected a number from 1 to {_HIGHEST}", "write '--cid=111'")
-        elif not takes_cid and (value := _meant(word)) and (_is_cid(value) or "$" in value):
-            yield _warning(item, f"'{word}' is not the flag '--cid'", f"did you mean '--cid={value}'?")
 
 
 def _is_cid(value: str) -> bool:

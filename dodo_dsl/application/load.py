@@ -7,7 +7,6 @@ import functools
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ from dodo_dsl import source
 from dodo_dsl.application import merge
 from dodo_dsl.application.compose_files import ComposeFiles
 from dodo_dsl.application.model import scalars, with_entry
-from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean, listed
+from dodo_dsl.diagnostics import Diagnostic, Span, did_you_mean
 from dodo_dsl.source import Entry, Node, Scalar
 
 MAX_DEPTH = 8
@@ -46,36 +45,7 @@ def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[
     settled = merge.settled(functools.reduce(merge.merged, whole))
     assert isinstance(settled, source.Mapping)
     here = files.relative(folder)
-    return _without_bound(_changed(settled, lambda _, service: _with_context(service, here)))
-
-
-def _without_bound(document: source.Mapping) -> source.Mapping:
-    """A file with mounts of folders in place of volumes that bind them (``driver_opts: {o: bind, device: ./data}``)."""
-    volumes, bound = source.entries(document, "volumes"), dict[str, tuple[Scalar, bool]]()
-    for name, entry in volumes.items():
-        words, device = (source.part(entry.value, "driver_opts", key) for key in ("o", "device"))
-        if isinstance(words, Scalar) and isinstance(device, Scalar) and merge.is_path(device.text):
-            options = words.text.split(",")
-            bound |= {name: (device, "ro" in options)} if "bind" in options else {}
-
-    def mounting(_: str, service: Node) -> Node:
-        node = source.part(service, "volumes")
-        if not isinstance(service, source.Mapping) or not isinstance(node, source.Sequence):
-            return service
-        return with_entry(service, "volumes", replace(node, items=tuple(map(mounted, node.items))))
-
-    def mounted(item: Node) -> Node:
-        name = source.part(item, "source")
-        if not isinstance(item, source.Mapping) or not isinstance(name, Scalar) or name.text not in bound:
-            return item
-        device, is_read = bound[name.text]
-        item = with_entry(item, "type", Scalar(name.span, "bind", "bind"))
-        item = with_entry(item, "source", Scalar(name.span, device.value, device.text))
-        return with_entry(item, "read_only", Scalar(name.span, True, "true")) if is_read else item
-
-    kept = {name: entry for name, entry in volumes.items() if name not in bound}
-    whole = with_entry(document, "volumes", source.Mapping(document.span, kept))
-    return _changed(whole, mounting) if bound else document
+    return _changed(settled, lambda _, service: _with_context(service, here))
 
 
 def _changed(document: source.Mapping, change: Callable[[str, Node], Node]) -> source.Mapping:
@@ -186,35 +156,19 @@ def _base(files: ComposeFiles, entry: Entry, chain: tuple[Service, ...]) -> Node
     return None
 
 
-_NAMES = ("compose.yaml", "compose.yml", "docker-compose.yml", "docker-compose.yaml")
-_OVERRIDES = tuple(f"{name}.override.{end}" for name in ("compose", "docker-compose") for end in ("yml", "yaml"))
-"""Of each, compose takes the first that is there."""
 _PLAIN = re.compile(r"[\w./-]+")
+_OVERRIDDEN = re.compile(r"(docker-)?compose\.ya?ml")
 
 
-def unread(paths: Sequence[Path], root: Path | None = None) -> Iterator[Diagnostic]:
-    """A warning if compose would read other files together with one of ``paths``.
-
-    Its hint names files as ``dodo.yml`` does, which is in ``root`` or else next to them.
-    """
-    folder = paths[0].parent
-    there = (
-        next((folder / name for name in names if (folder / name).is_file()), None) for names in (_NAMES, _OVERRIDES)
-    )
-    found = [path for path in there if path]
-    others = [path for path in found if path not in paths]
-    if others and len(others) < len(found):
-        names = listed([f"'{path.name}'" for path in others])
-        items = [as_item(path, root or folder) for path in dict.fromkeys([*found, *paths])]
-        own = next(path.name for path in found if path in paths)
-        yield Diagnostic(
-            Span(str(paths[0])),
-            "application-override",
-            f"'docker compose' also reads {names}, which it finds next to this file; DoDo does not",
-            f"write application: [{', '.join(items)}] in dodo.yml; to test without it, name another file there that "
-            f"has include: [{own}]",
-            "warning",
-        )
+def unread(paths: Sequence[Path], root: Path) -> Iterator[Diagnostic]:
+    """A warning if compose would read override files together with ``paths``; its hint names files as ``root`` does."""
+    first = paths[0]
+    found = sorted(path for path in first.parent.glob("*compose.override.y*ml") if path not in paths)
+    if _OVERRIDDEN.fullmatch(first.name) and len(paths) == 1 and found:
+        message = f"'docker compose' also reads '{found[0].name}', which it finds next to this file; DoDo does not"
+        hint = f"write application: [{as_item(first, root)}, {as_item(found[0], root)}] in dodo.yml; to test without "
+        hint += f"it, name another file there that has include: [{first.name}]"
+        yield Diagnostic(Span(str(first)), "application-override", message, hint, "warning")
 
 
 def as_item(path: Path, folder: Path) -> str:

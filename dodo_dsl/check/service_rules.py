@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterator
+from collections.abc import Sequence as Several
 from pathlib import Path
 
 from dodo_dsl.application.model import PrintedLine
@@ -50,12 +51,12 @@ def _is_broken(context: RuleContext, name: str) -> bool:
 
 
 def check_parameters(context: RuleContext) -> Iterator[Diagnostic]:
-    for service in context.services:
+    for number, service in enumerate(context.services):
         yield from _written(service)
         for name, argument in service.arguments.items():
             if argument.problem and name not in service.use.parameters:  # of the rig or of another service
                 yield argument.problem
-        yield from _missing(context, service)
+        yield from _missing(context, service, context.services[:number])
         yield from _counts(service)
 
 
@@ -108,17 +109,23 @@ def _misspelt(service: ResolvedService) -> set[str]:
     return {meant(name, known, is_empty=_is_empty(entry)) for name, entry in unknown}
 
 
-def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnostic]:
-    use, manifest, misspelt = service.use, service.manifest, _misspelt(service)
+def _needs(service: ResolvedService, name: str) -> bool:
+    """Whether a parameter is required of a service, and not written there."""
+    parameter = service.manifest.parameters.get(name)
+    return parameter is not None and parameter.required and name not in {*service.use.parameters, *_misspelt(service)}
+
+
+def _missing(context: RuleContext, service: ResolvedService, before: Several[ResolvedService]) -> Iterator[Diagnostic]:
+    use, manifest = service.use, service.manifest
     for parameter in manifest.parameters.values():
-        if not parameter.required or parameter.name in use.parameters or parameter.name in misspelt:
+        if not _needs(service, parameter.name):
             continue
         is_on_rig = bool(context.spec.rig) or context.spec.level == "hil"
         if parameter.rig and (context.rig.entry(parameter.rig) if context.rig else is_on_rig):
             continue  # a rig that is unknown or missing may give it, too
         if parameter.shared and not context.spec.is_whole:
             continue  # a service that could not be read may give it
-        if parameter.shared and _lacks_first(context, service, parameter.name):
+        if parameter.shared and any(_needs(each, parameter.name) for each in before):
             continue  # what is written there would be given here, too
         givers = _givers(context, parameter.name) if parameter.shared else {}
         if len(givers) == 1:
@@ -130,19 +137,6 @@ def _missing(context: RuleContext, service: ResolvedService) -> Iterator[Diagnos
         if len(givers) > 1:
             hint = f"{' and '.join(givers.values())} give different values, so write the one to use"
         yield Diagnostic(use.span, "missing-parameter", message, hint)
-
-
-def _lacks_first(context: RuleContext, service: ResolvedService, name: str) -> bool:
-    """Whether another service that shares the parameter needs it as well, and comes first."""
-    needing = (
-        each
-        for each in context.services
-        if (one := each.manifest.parameters.get(name))
-        and one.required
-        and name not in each.use.parameters
-        and not _misspelt(each) & {name}
-    )
-    return next(needing, service) is not service
 
 
 def _givers(context: RuleContext, name: str) -> dict[str, str]:
