@@ -7,6 +7,7 @@ import functools
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,7 +46,36 @@ def _all(files: ComposeFiles, names: Sequence[Path], folder: Path, chain: tuple[
     settled = merge.settled(functools.reduce(merge.merged, whole))
     assert isinstance(settled, source.Mapping)
     here = files.relative(folder)
-    return _changed(settled, lambda _, service: _with_context(service, here))
+    return _without_bound(_changed(settled, lambda _, service: _with_context(service, here)))
+
+
+def _without_bound(document: source.Mapping) -> source.Mapping:
+    """A file with mounts of folders in place of volumes that bind them (``driver_opts: {o: bind, device: ./data}``)."""
+    volumes, bound = source.entries(document, "volumes"), dict[str, tuple[Scalar, bool]]()
+    for name, entry in volumes.items():
+        words, device = (source.part(entry.value, "driver_opts", key) for key in ("o", "device"))
+        if isinstance(words, Scalar) and isinstance(device, Scalar) and merge.is_path(device.text):
+            options = words.text.split(",")
+            bound |= {name: (device, "ro" in options)} if "bind" in options else {}
+
+    def mounting(_: str, service: Node) -> Node:
+        node = source.part(service, "volumes")
+        if not isinstance(service, source.Mapping) or not isinstance(node, source.Sequence):
+            return service
+        return with_entry(service, "volumes", replace(node, items=tuple(map(mounted, node.items))))
+
+    def mounted(item: Node) -> Node:
+        name = source.part(item, "source")
+        if not isinstance(item, source.Mapping) or not isinstance(name, Scalar) or name.text not in bound:
+            return item
+        device, is_read = bound[name.text]
+        item = with_entry(item, "type", Scalar(name.span, "bind", "bind"))
+        item = with_entry(item, "source", Scalar(name.span, device.value, device.text))
+        return with_entry(item, "read_only", Scalar(name.span, True, "true")) if is_read else item
+
+    kept = {name: entry for name, entry in volumes.items() if name not in bound}
+    whole = with_entry(document, "volumes", source.Mapping(document.span, kept))
+    return _changed(whole, mounting) if bound else document
 
 
 def _changed(document: source.Mapping, change: Callable[[str, Node], Node]) -> source.Mapping:

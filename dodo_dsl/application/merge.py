@@ -56,6 +56,23 @@ def _formed(node: Node, place: Place) -> Node:
     return replace(node, entries={k: Entry(e.key, _formed(e.value, (*place, k))) for k, e in node.entries.items()})
 
 
+def joined(service: Mapping, containers: dict[str, str]) -> Mapping:
+    """A service that names other services where it names their containers, by ``containers``."""
+
+    def named(node: Node) -> Node:
+        if isinstance(node, Sequence):
+            return replace(node, items=tuple(map(named, node.items)))
+        kind, *rest = node.text.split(":", 2) if isinstance(node, Scalar) else ("",)
+        if kind != "container" or rest[0] not in containers:
+            return node
+        text = ":".join(["service", containers[rest[0]], *rest[1:]])
+        return Scalar(node.span, text, text)
+
+    keys = service.entries.keys() & {*NAMESPACES, "volumes_from"} if containers else ()
+    own = {key: Entry(service.entries[key].key, named(service.entries[key].value)) for key in keys}
+    return replace(service, entries=service.entries | own)
+
+
 def _merge(base: Node, over: Node, path: Place) -> Node:
     place = path[2:] if path[:1] == ("services",) else _OUTSIDE
     if over.tag == "!override" or place in _REPLACED:

@@ -20,6 +20,7 @@ from dodo_dsl.application.container import is_carried
 from dodo_dsl.application.host_paths import INSIDE, link_out, repository
 from dodo_dsl.application.interpolation import names
 from dodo_dsl.application.load import as_item, load, unread
+from dodo_dsl.application.merge import joined
 from dodo_dsl.application.model import (
     KEYS,
     Access,
@@ -82,11 +83,16 @@ def read_application(
     if not any(p.rule != "unknown-key" for p in found if p.severity == "error"):
         found.extend(validate(document, "application"))
     if has_errors(found):
-        return None, found
+        return None, list(_explained(found, document, files))
     root = Path(access.roots[0]) if access.roots else None
     dropped = {name: why for name, entry in services.items() if (why := _why_dropped(plain(entry.value)))}
     started = {name: entry for name, entry in services.items() if name not in dropped}
-    kept = {name: _service(name, entry, files, folder) for name, entry in started.items()}
+    containers = {
+        word.text: name
+        for name, entry in started.items()
+        if isinstance(word := source.part(entry.value, "container_name"), Scalar)
+    }
+    kept = {name: _service(name, entry, files, folder, containers) for name, entry in started.items()}
     application = ApplicationSource(
         path=paths[0].resolve(),
         services=kept,
@@ -106,7 +112,7 @@ def read_application(
     found.extend(tunable_problems(application))
     refused = {problem.span for problem in found}
     more = (*_withheld(application, files), *_empty(application, files))
-    found += (problem for problem in more if problem.span not in refused)
+    found = [*_explained(found, document, files), *(p for p in more if p.span not in refused)]
     if application.speaks_ros:
         node = bridge()
         raw = {"command": node.entries["command"].value}
@@ -127,10 +133,11 @@ def _links(paths: Sequence[Path]) -> Iterator[Diagnostic]:
             yield Diagnostic(Span(str(path)), "application-isolation", message, INSIDE)
 
 
-def _service(name: str, entry: Entry, files: ComposeFiles, folder: Path) -> ComposeService:
+def _service(name: str, entry: Entry, files: ComposeFiles, folder: Path, containers: dict[str, str]) -> ComposeService:
     assert isinstance(entry.value, Mapping)
-    raw = {key: entry.value.entries[key].value for key in TEST_FILLED if key in entry.value.entries}
-    node = with_values(entry.value, raw, files.known, files.is_late)
+    node = joined(entry.value, containers)
+    raw = {key: node.entries[key].value for key in TEST_FILLED if key in node.entries}
+    node = with_values(node, raw, files.known, files.is_late)
     return ComposeService(name, node, entry.key, declared(node), tuple(env_files(node, folder)), raw)
 
 
@@ -215,6 +222,16 @@ def _unset(span: Span, files: ComposeFiles) -> list[str]:
     """The variables in what is written at a place that have no value there, and are not DoDo's own."""
     known = {*files.known, *files.secrets, *files.passed, *os.environ, *_OF_FOLDER}
     return sorted(files.unset.get(span, set()) - known)
+
+
+def _explained(problems: Sequence[Diagnostic], document: Node, files: ComposeFiles) -> Iterator[Diagnostic]:
+    """Problems with the variable for want of which a text is as it is."""
+    parts = source.walk(document) if problems else ()
+    values = {e.key: e.value.span for part in parts if isinstance(part, Mapping) for e in part.entries.values()}
+    for problem in problems:
+        unset = _unset(values.get(problem.span, problem.span), files)
+        message = f"variable '{unset[0]}' has no value: {problem.message}" if unset else problem.message
+        yield replace(problem, message=message)
 
 
 def _empty(application: ApplicationSource, files: ComposeFiles) -> Iterator[Diagnostic]:

@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dodo_dsl.check.resolve import RuleContext, known_ids, without_pictures
+from dodo_dsl.check import wiring
+from dodo_dsl.check.resolve import IMAGE, RuleContext, known_ids, without_pictures
 from dodo_dsl.diagnostics import Diagnostic, Severity, Span, did_you_mean, has_errors, only_fix
 from dodo_dsl.opendlv import regular_file
-from dodo_dsl.opendlv.assets import formats, map_file
+from dodo_dsl.opendlv.assets import formats, map_file, recording_contents
 from dodo_dsl.opendlv.assets.problem import InputError
 from dodo_dsl.source import MAX_PROBLEMS, Entry, Scalar, Sequence
 from dodo_dsl.spec.arguments import Argument, ResolvedService
@@ -226,15 +227,20 @@ def course_of(flags: tuple[tuple[str, str, str], ...]) -> tuple[Any, Any] | None
 
 _SINCE_1970 = 1e8
 """Seconds; larger times count from 1970."""
+_CLOSE = 1e-9
 
 Unmet = tuple[str, str, str, Severity]
 """A parameter that what the test shows cannot meet, why in words behind the service's name, and a hint."""
 
 
 def check_input(context: RuleContext) -> Iterator[Diagnostic]:
+    """In lockstep a frame has one answer, with its sample time; else an application may answer as often as it likes."""
     spec, services = context.spec, context.services
     unsure: Severity = "error" if spec.clock == "lockstep" else "warning"
     player = next((s for s in services if "rec" in s.texts and s.use.layer == "environment"), None)
+    known = wiring.rates(services)
+    has_rate = not player and known.keys() & wiring.cameras_of(context.wiring)
+    period = 1 / wiring.step_hz(context.wiring, known) if has_rate else 0.0
     for service in services if context.test.is_complete else ():
         found: list[Unmet] = []
         for name, argument in service.arguments.items():
@@ -243,7 +249,7 @@ def check_input(context: RuleContext) -> Iterator[Diagnostic]:
                 why = f"judges {argument.text} s of the test's {spec.timeout_s:g} s, as nothing ends the input"
                 found.append((name, why, f"write '{name}: ...', how long it is to judge", "warning"))
         if service.use.layer == "evaluation":
-            found += _times(service, player, unsure)
+            found += [*_times(service, player, unsure), *_frames(service, player, period, unsure)]
         for name, why, hint, severity in found:
             entry = service.use.parameters.get(name)
             span = entry.value.span if entry else service.use.span
@@ -293,6 +299,39 @@ def table_span(path: Path, field: str) -> tuple[float, float] | None:
     except target_table.TargetError:
         return None  # reported with the file
     return times[0], times[-1]
+
+
+def _frames(
+    service: ResolvedService, player: ResolvedService | None, period: float, unsure: Severity
+) -> Iterator[Unmet]:
+    """More answers than there are frames in a recording or each ``period`` s, and a gap that is shorter than that."""
+    texts, judged = service.texts, _judged(service)
+    name = "min-samples" if "min-samples" in texts else "min-frames"
+    least = most = int(texts.get(name, 0))
+    path = player.arguments["rec"].value if player else None
+    if player and path and path.path and unsure == "error":
+        most = pictures(path.path, int(player.texts.get("video-sender", 0)), least)
+    elif period and judged and judged[1] < judged[2]:
+        most = math.floor(judged[2] / period + _CLOSE) - math.ceil(judged[1] / period - _CLOSE) + 1
+    elif period and name == "min-frames" and {"max-delay", "max-time"} <= texts.keys():
+        wait = 0.0 if "message" in texts else float(texts["max-delay"])  # responds counts an answer when it comes
+        most = math.floor((float(texts["max-time"]) - wait) / period + _CLOSE) + 1
+    if most < least:
+        why = f"expects {least} answers, and what it judges has {most} frame{'' if most == 1 else 's'}"
+        yield name, why, f"write '{name}: {most}' or less", unsure
+    gap = service.arguments.get("max-gap")
+    if gap and gap.text and not gap.parameter.shared and float(gap.text) < period - _CLOSE:
+        why = f"expects an answer each {float(gap.text):g} s, and frames come each {period:g} s"
+        yield "max-gap", why, f"write 'max-gap: {period:g} s' or more", unsure
+
+
+@functools.lru_cache(maxsize=256)
+def pictures(path: Path, sender: int, most: int) -> int:
+    """How many frames of a camera a recording has, up to so many; so many if it has none, or is damaged."""
+    try:
+        return recording_contents.count(path, known_ids(())[IMAGE], sender, most) or most
+    except OSError:
+        return most  # reported with the file
 
 
 def check_limits(context: RuleContext) -> Iterator[Diagnostic]:

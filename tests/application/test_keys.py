@@ -55,7 +55,7 @@ class Row:
         """A compose file with a service that has it."""
         service: dict[str, Any] = {"image": "team/a", "command": "--cid=111"}
         found: dict[str, Any] = {
-            "services": {"s": service, "b": {"image": "team/b"}},
+            "services": {"s": service, "b": {"image": "team/b", "container_name": "eyes"}},
             "volumes": {"named": {}, "tmp": {}, "report": {}, "shared": {"external": True}},
             "secrets": {"s": {"file": "./a.env"}},
             "configs": {"c": {"file": "./a.env"}},

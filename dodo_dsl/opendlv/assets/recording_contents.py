@@ -3,6 +3,7 @@
 import collections
 import functools
 import io
+import itertools
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -68,6 +69,16 @@ def picture_size(path: Path) -> tuple[int, int]:
             return first_number(image, 2), first_number(image, 3)
     except OSError:
         return 0, 0
+
+
+def count(path: Path, message: int, sender: int, most: int) -> int | None:
+    """How many messages of a sender there are, up to so many; None if that is not known, and raises OSError."""
+    with io.BufferedReader(regular_file.opened(path), _BUFFER) as stream:
+        looked = LookedThrough(os.fstat(stream.fileno()).st_size)
+        bodies = _bodies(stream, looked)
+        found = (1 for body in bodies if _type(body) == message and first_number(body, _STAMP_FIELD) == sender)
+        number = sum(itertools.islice(found, most))
+    return number if number == most or looked.is_whole else None
 
 
 def problems(path: Path, message: int, sender: int, name: str, is_needed: bool) -> Iterator[InputError]:
