@@ -1,15 +1,13 @@
-"""Commands that messages propose. Each works where it is shown: for this user and Python, in any folder."""
+"""Commands that messages propose, for this user and Python, in any folder."""
 
 import grp
 import importlib
-import importlib.util
 import json
 import os
 import pwd
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import sysconfig
 from collections.abc import Callable
@@ -20,14 +18,6 @@ from urllib.parse import unquote, urlsplit
 
 from dodo_dsl import package_data
 
-PACKAGES = {
-    "lsp": ("pygls",),
-    "mcap": ("foxglove-schemas-protobuf", "mcap", "mcap-protobuf-support"),
-    "ros": ("cyclonedds==11.0.1", "rosbags"),
-    "search": ("scipy",),
-    "storage": ("psycopg[binary]",),
-}
-"""What each extra of DoDo installs."""
 _LOADED = {
     "lsp": ("pygls.lsp.server", "lsprotocol.types"),
     "mcap": ("mcap.writer", "mcap_protobuf.schema", "foxglove_schemas_protobuf"),
@@ -35,22 +25,10 @@ _LOADED = {
     "search": ("scipy",),
     "storage": ("psycopg",),
 }
-"""Modules of these, which load what they need themselves."""
-_OF_SETUP = ("lsp", "mcap", "search")
-"""Extras that ``scripts/setup`` installs."""
+"""Modules of what each extra of DoDo installs, which load what they need themselves."""
 _DISTRIBUTION = "dodo-dsl"
-_PLUGINS = {
-    "buildx": ("docker-buildx-plugin", "docker-buildx"),
-    "compose": ("docker-compose-plugin", "docker-compose-v2", "docker-compose"),
-}
-"""Their packages: Docker's own, and those of Ubuntu and Debian 13. Debian 12 has only Compose 1."""
-_LEAST = {"buildx": 0, "compose": 2}
-_DOCKER = ("docker-ce", "docker.io")
-_CANDIDATE = re.compile(r"Candidate: (?:\d+:)?(\d+)")
-_ENGLISH = {"PATH": os.defpath, "LC_ALL": "C"}
 _PAGE = "https://docs.docker.com/engine/install"
 _SOCKET = Path("/var/run/docker.sock")
-_APT_S = 10.0
 
 
 def missing(extra: str) -> str:
@@ -66,12 +44,28 @@ def missing(extra: str) -> str:
 def install(extra: str) -> str:
     """A command that installs what an extra needs into the Python that runs DoDo.
 
-    DoDo is on no package index, so the command names the checkout that DoDo is from, or else the packages.
+    DoDo is on no package index, so the command names the checkout that it was installed from, or else the packages.
     """
-    checkout = package_data.checkout()
-    if checkout and Path(sys.prefix).resolve() == checkout / ".venv" and extra in _OF_SETUP:
-        return shlex.quote(str(checkout / "scripts" / "setup"))
-    return _pip(_source(extra) or [*PACKAGES[extra]])
+    checkout = _installed_from()
+    packages = [f"{checkout}[{extra}]"] if checkout else _packages(extra)
+    command = shlex.join([sys.executable, "-m", "pip", "install", *packages])
+    return command if os.access(sysconfig.get_path("purelib"), os.W_OK) else as_root(command)
+
+
+def _packages(extra: str) -> list[str]:
+    """What an installed DoDo says that the extra needs."""
+    rows = metadata.requires(_DISTRIBUTION) or []
+    return [row.partition(";")[0].strip() for row in rows if re.search(f"extra == ['\"]{extra}['\"]", row)]
+
+
+def _installed_from() -> Path | None:
+    """The checkout that DoDo runs from, or was installed from by what pip noted (PEP 610)."""
+    try:
+        noted = json.loads(metadata.distribution(_DISTRIBUTION).read_text("direct_url.json") or "{}")
+        folder = Path(unquote(urlsplit(noted["url"]).path))
+    except (metadata.PackageNotFoundError, KeyError, TypeError, ValueError, OSError):
+        return package_data.checkout()
+    return folder if package_data.is_checkout(folder) else package_data.checkout()
 
 
 def as_root(*commands: str) -> str:
@@ -81,16 +75,12 @@ def as_root(*commands: str) -> str:
 
 def docker() -> str:
     """How to get the docker command."""
-    return _by_apt(_DOCKER) or f"install Docker Engine with its command line ({_PAGE})"
+    return f"install Docker Engine with its command line ({_PAGE})"
 
 
 def docker_plugin(name: str) -> str:
     """How to get Compose v2 or buildx."""
-    if command := _by_apt(_PLUGINS[name], _LEAST[name]):
-        return command
-    if script := _script("install-compose"):
-        return script
-    return f"install {_PLUGINS[name][0]} from Docker's own repository ({_PAGE})"
+    return _script("install-compose") or f"install docker-{name}-plugin from Docker's own repository ({_PAGE})"
 
 
 def engine() -> str:
@@ -136,59 +126,10 @@ def firmware(variable: str) -> str:
     """How to build the emulated rig; ``variable`` names its folder."""
     if named := os.environ.get(variable):
         return f"{variable} is {named}: build it there, or unset {variable}"
-    if checkout := package_data.checkout():
-        return f"make -C {shlex.quote(str(checkout))} firmware"
-    if folder := _installed_from()[0]:
-        built = shlex.quote(str(folder / "build" / "firmware"))
-        return f"make -C {shlex.quote(str(folder))} firmware && export {variable}={built}"
+    if checkout := _installed_from():
+        make, built = (
+            f"make -C {shlex.quote(str(checkout))} firmware",
+            shlex.quote(str(checkout / "build" / "firmware")),
+        )
+        return make if package_data.checkout() else f"{make} && export {variable}={built}"
     return f"'make firmware' in a checkout of DoDo, then export {variable}=CHECKOUT/build/firmware"
-
-
-def _source(extra: str) -> list[str]:
-    """The checkout that DoDo was installed from, with an extra; nothing if there is none, or not any more."""
-    folder, is_editable = _installed_from()
-    return [*(["--editable"] if is_editable else []), f"{folder}[{extra}]"] if folder else []
-
-
-def _installed_from() -> tuple[Path | None, bool]:
-    """The checkout by what pip noted (PEP 610), and whether DoDo runs from there."""
-    try:
-        noted = json.loads(metadata.distribution(_DISTRIBUTION).read_text("direct_url.json") or "{}")
-        folder = Path(unquote(urlsplit(noted["url"]).path))
-        is_there = "dir_info" in noted and package_data.is_checkout(folder)
-    except (metadata.PackageNotFoundError, KeyError, TypeError, ValueError, OSError):
-        return None, False
-    return (folder, bool(noted["dir_info"].get("editable"))) if is_there else (None, False)
-
-
-def _pip(what: list[str]) -> str:
-    """pip's command for the Python that runs DoDo; environments of uv have no pip, and DoDo's image has none."""
-    python, words = sys.executable, ["install", *what]
-    if importlib.util.find_spec("pip") is None and shutil.which("uv"):
-        return _for_owner(shlex.join(["uv", "pip", "install", "--python", python, *what]))
-    if importlib.util.find_spec("pip") is None:
-        commands = [shlex.join([python, "-m", "ensurepip"]), shlex.join([python, "-m", "pip", *words])]
-        return _for_owner(*commands)
-    found = shutil.which("pip")
-    is_active = sys.prefix != sys.base_prefix and found and Path(found).parent == Path(python).parent
-    return _for_owner(shlex.join(["pip" if is_active else python, *([] if is_active else ["-m", "pip"]), *words]))
-
-
-def _for_owner(*commands: str) -> str:
-    """Commands that write where this Python has its packages."""
-    return " && ".join(commands) if os.access(sysconfig.get_path("purelib"), os.W_OK) else as_root(*commands)
-
-
-def _by_apt(packages: tuple[str, ...], least: int = 0) -> str:
-    """Installs the first package that apt has in this major version or a later one; empty if there is none."""
-    apt = shutil.which("apt-cache")
-    for name in packages if apt else ():
-        words = [str(apt), "policy", name]
-        try:
-            told = subprocess.run(words, env=_ENGLISH, capture_output=True, text=True, check=False, timeout=_APT_S)
-        except (OSError, subprocess.TimeoutExpired):
-            return ""
-        candidate = _CANDIDATE.search(told.stdout)
-        if candidate and int(candidate[1]) >= least:
-            return as_root(f"apt install {name}")
-    return ""
