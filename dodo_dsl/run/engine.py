@@ -9,7 +9,6 @@ from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.added_services import CLOCK
 from dodo_dsl.plan.model import LAYERS, READY_S, Plan
 from dodo_dsl.run import listeners, start_order
-from dodo_dsl.run.machine_load import shortage
 from dodo_dsl.run.machine_load.meter import Meter
 from dodo_dsl.run.outcomes import deaf
 from dodo_dsl.run.protocol import (
@@ -58,7 +57,7 @@ class Engine:
     async def run(self, keep: bool = False) -> tuple[Outcome, list[str]]:
         """The outcome, and sentences about a test that is kept up. Cancelling gives the outcome error, too."""
         self._now = asyncio.get_running_loop().time
-        self.state = RunState(self.plan, self._now, memory_kills=shortage.memory_kills)
+        self.state = RunState(self.plan, self._now)
         self._meter = Meter(self.backend.use, self.state.test_s, self.state.is_application)
         kept: list[str] = []
         try:
@@ -77,8 +76,8 @@ class Engine:
             if self.state.finished is None:
                 self.state.finished = self._now()
             self.state.keep_tails(self.backend)
-            if self.state.is_to_explain():
-                await self._explain()
+            if self.state.finding.silent and not self.backend.is_on_host:
+                await self._look_for_buses()
             if not keep and self.state.outcome(self.backend).outcome == "passed":
                 self.passed()
             self.say("taking down")
@@ -86,19 +85,15 @@ class Engine:
             await self._collect_losses()
         return self.state.outcome(self.backend), kept
 
-    async def _explain(self) -> None:
-        """Reports to the state what of the machine the test may have lacked."""
-        application = None
+    async def _look_for_buses(self) -> None:
+        """Reports to the state on which buses an application is of which nothing came."""
         try:
             async with asyncio.timeout(EXPLAIN_PATIENCE_S):
-                application = await self.backend.application()
+                self.state.buses = frozenset(listeners.buses(await self.backend.application() or ()))
         except TimeoutError:
             pass
         except asyncio.CancelledError:
             asyncio.current_task().uncancel()  # type: ignore[union-attr]
-        if application and not self.backend.is_on_host:
-            self.state.buses = frozenset(listeners.buses(application))
-        self.state.shortage = shortage.used_up(application)
 
     async def _close(self, keep: bool) -> list[str]:
         """Teardown to its end, however often the run is interrupted meanwhile; its errors do not change the verdict."""

@@ -13,7 +13,7 @@ from dodo_dsl.plan.model import LAYERS, Plan
 from dodo_dsl.run import start_order
 from dodo_dsl.run.machine_load import judgement
 from dodo_dsl.run.machine_load.judgement import consider
-from dodo_dsl.run.machine_load.shortage import Shortage
+from dodo_dsl.run.machine_load.processes import memory_kills
 from dodo_dsl.run.outcomes import (
     Cause,
     Facts,
@@ -92,12 +92,8 @@ class RunState:
     finished: float | None = None
     setup_s: float | None = None
     input_ended: bool = False
-    shortage: Shortage = field(default_factory=Shortage)
-    """What of the machine was used up when the test ended."""
     buses: frozenset[int] = frozenset()
     """The CIDs of all buses that programs have joined in the application's networks, where these are the test's own."""
-    memory_kills: Callable[[], int] = lambda: 0
-    """How many processes the kernel has ended so far for want of memory."""
     time: Time | None = None
     resources: tuple[ServiceUse, ...] = ()
     _tails: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -105,7 +101,7 @@ class RunState:
     _killed_before: int = field(init=False)
 
     def __post_init__(self) -> None:
-        self._killed_before = self.memory_kills()
+        self._killed_before = memory_kills()
         self.facts = Facts(tuple(s.name for s in self.plan.services if s.judge))
 
     def test_s(self) -> float:
@@ -220,7 +216,7 @@ class RunState:
             is_done = (code == 0 and self.input_ended) or start_order.may_end(
                 self.plan.application.services, service, code
             )
-            if code in _KILLED and not out_of_memory and self.memory_kills() > self._killed_before:
+            if code in _KILLED and not out_of_memory and memory_kills() > self._killed_before:
                 self.notes.append(MEMORY_KILL)
             if not is_done and not self._all_verdicts_given():
                 reason = f"application service '{service}' {ended}, before the test was decided"
@@ -236,29 +232,10 @@ class RunState:
             reason = f"evaluator '{service}' ended without a verdict {when}".rstrip()
             self.end("error", reason, service, "end")
 
-    def is_to_explain(self) -> bool:
-        """Whether the machine may be the reason for how the test ended, if something of it was used up."""
-        return self.finding.cause == "start" or self._is_of_conditions(self.finding)
-
     @property
     def finding(self) -> Finding:
         """What decides, as far as it is known."""
         return decide(self.facts)
-
-    def _is_of_conditions(self, finding: Finding) -> bool:
-        """Whether a failure may come from what a program was given, unlike a message that it must not send."""
-        return finding.result == "failed" and finding.cause in ("verdict", "end", "silence")
-
-    def _explained(self, finding: Finding) -> Finding:
-        """An error in place of a failure that may be due to what others used up.
-
-        What the application itself may have used up is in a note, see ``_shortage_notes``.
-        """
-        shortage = self.shortage
-        if shortage.is_of_others and self._is_of_conditions(finding):
-            reason = f"the application cannot be judged here: {shortage.text}; it found: {finding.reason}"
-            return replace(finding, result="error", reason=reason)
-        return finding
 
     def _details(self, finding: Finding, cid: int) -> list[str]:
         """What helps to understand why a test ended so, behind the reason; ``cid`` is that of its bus."""
@@ -267,8 +244,6 @@ class RunState:
             details.append(f"the test is on CID {cid}")
             if others := sorted(self.buses - {cid}):
                 details.append(f"the application talks on CID {others[0]}; write x-dodo: {{cid: {others[0]}}}")
-        if finding.cause == "start":
-            details.append(self.shortage.text)
         if finding.cause == "silence":
             details += [each.words for each in self._unmatched]
         if finding.result != "error":
@@ -276,10 +251,6 @@ class RunState:
         if finding.result != "passed" and self.is_application(finding.service):
             details.append(windowless(self._tails.get(finding.service, ())))
         return list(filter(None, details))
-
-    def _shortage_notes(self, finding: Finding) -> tuple[str, ...]:
-        is_told = self.shortage.is_of_others or finding.cause == "start" or not self.shortage.text
-        return () if is_told else (f"{self.shortage.text}, perhaps by the application itself",)
 
     def _all_verdicts_given(self) -> bool:
         return all(self.facts.verdicts.get(name) for name in self.facts.evaluators)
@@ -316,7 +287,7 @@ class RunState:
         judged = [check for verdict in verdicts for check in verdict.checks]
         findings = (*answers.findings, *use.findings)
         considered, load = consider(decide(self.facts, findings), self._load())
-        found = self._explained(self._timed(considered))
+        found = self._timed(considered)
         graph = [] if found.result == "passed" else self.graph[:_MOST_OF_GRAPH]
         finding = replace(found, reason="; ".join([*graph, found.reason, *self._details(found, backend.cid)]))
         losses = (lost_messages(s, self.lost[s.name]) for s in plan.services if s.name in self.lost)
@@ -334,7 +305,6 @@ class RunState:
                 *self.notes,
                 *self.graph[len(graph) :],
                 *self._printed_notes(finding),
-                *self._shortage_notes(finding),
                 *losses,
                 *answers.notes,
                 *use.notes,

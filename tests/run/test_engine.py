@@ -10,7 +10,7 @@ import pytest
 
 from dodo_dsl.outcome import MachineLoad, Outcome
 from dodo_dsl.plan.model import LAYERS, Application, ApplicationService, Flag, Lockstep, Plan
-from dodo_dsl.run import listeners
+from dodo_dsl.run import listeners, run_state
 from dodo_dsl.run.engine import (
     BEGIN_PATIENCE_S,
     LAST_TIME_PATIENCE_S,
@@ -19,10 +19,8 @@ from dodo_dsl.run.engine import (
     READY_PATIENCE_S,
     Engine,
 )
-from dodo_dsl.run.machine_load import shortage
 from dodo_dsl.run.machine_load.judgement import UNSEEN_USE
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
-from dodo_dsl.run.machine_load.shortage import Shortage
 from dodo_dsl.run.protocol import (
     BackendError,
     Event,
@@ -570,47 +568,12 @@ def test_what_is_written_after_the_decision_is_not_quoted() -> None:
     assert outcome(Talking(plan(), stages, tails={"track": ["it hit the wall"]})).last_lines == ("it hit the wall",)
 
 
-USED_UP = "9 of 9 open files of this machine were in use"
-
-
-@pytest.mark.parametrize(
-    ("event", "is_of_others", "expected", "said"),
-    [
-        (FAILED, True, "error", f"judged here: {USED_UP}; it"),
-        (Exited("app", 1), True, "error", f"judged here: {USED_UP}; it"),
-        (Exited("app", 1, out_of_memory=True), True, "error", f"judged here: {USED_UP}; it"),
-        (Stopped("unanswered", "did not answer frame 17"), True, "error", f"judged here: {USED_UP}; it"),
-        (Foreign("the application sent x, which only 'pose' may send"), True, "failed", "the application sent x"),
-        (PASSED, True, "passed", "it drove"),
-        (FAILED, False, "failed", f"{USED_UP}, perhaps by the application itself"),
-        (Exited("app", 1), False, "failed", f"{USED_UP}, perhaps by the application itself"),
-        (Stopped("unanswered", "no answer"), False, "failed", f"{USED_UP}, perhaps by the application itself"),
-        (Unstartable("app", "python: unavailable"), False, "error", f"python: unavailable; {USED_UP}"),
-    ],
-)
-def test_a_machine_that_had_nothing_left_is_not_the_applications_fault_unless_it_took_it(
-    monkeypatch: pytest.MonkeyPatch, event: Event, is_of_others: bool, expected: str, said: str
-) -> None:
-    """What it must not send, it did not send for want of anything."""
-    asked: list[object] = []
-
-    def used_up(*words: object) -> Shortage:
-        asked.extend(words)
-        return Shortage(USED_UP, is_of_others)
-
-    monkeypatch.setattr(shortage, "used_up", used_up)
-    found = begun((1.0, event), (1.0, ENDED))
-    assert (found.outcome, said in "\n".join((found.reason, *found.notes))) == (expected, True), found
-    assert asked == ([[17]] if USED_UP in said else [])
-
-
 @pytest.mark.parametrize(("kills", "notes"), [([3, 3], ()), ([3, 4], (MEMORY_KILL,))])
 def test_a_kill_for_want_of_memory_is_noted_and_no_excuse(
     monkeypatch: pytest.MonkeyPatch, kills: list[int], notes: tuple[str, ...]
 ) -> None:
     """It may be that of another test by its own limit."""
-    monkeypatch.setattr(shortage, "memory_kills", lambda: kills.pop(0))
-    monkeypatch.setattr(shortage, "used_up", lambda *_: Shortage())
+    monkeypatch.setattr(run_state, "memory_kills", lambda: kills.pop(0))
     found = begun((1.0, Exited("app", -9)))
     assert (found.outcome, found.notes) == ("failed", notes)
     assert found.reason.startswith("application service 'app' was killed by SIGKILL")

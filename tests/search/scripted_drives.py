@@ -12,7 +12,6 @@ import pytest
 from dodo_dsl.cli import search_session
 from dodo_dsl.outcome import with_margin
 from dodo_dsl.plan.model import Plan
-from dodo_dsl.run.machine_load import shortage
 from dodo_dsl.run.protocol import Exited, Ready, VerdictEvent
 from tests.check import examples
 from tests.run import scripted
@@ -88,7 +87,6 @@ def scripted_commands(folder: Path, spec: str, make: Callable[[Plan, int], Scrip
 def stub(patch: pytest.MonkeyPatch, make: Callable[[Plan, int], ScriptedBackend]) -> None:
     patch.setattr(asyncio, "run", scripted.run)
     patch.setattr(search_session, "CombinedBackends", lambda *_, **__: ScriptedBackends(make))
-    patch.setattr(shortage, "used_up", lambda *_: shortage.Shortage())  # it looks at all processes of the machine
     connect = sqlite3.connect
 
     def connected(path: Path) -> sqlite3.Connection:
