@@ -7,11 +7,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from dodo_dsl.outcome import MachineLoad, Outcome
+from dodo_dsl.outcome import Outcome
 from dodo_dsl.plan.added_services import PICTURES_FILE, RECORDING
 from dodo_dsl.run.backends import Backends, Job
 from dodo_dsl.run.engine import Engine
-from dodo_dsl.run.machine_load.judgement import too_busy
 from dodo_dsl.run.outcomes import describe, error_outcome, error_reason, system_error
 from dodo_dsl.run.rigs.pool import opened
 from dodo_dsl.run.run_state import Standing
@@ -84,9 +83,6 @@ class Attempts:
                     and (why := await asyncio.to_thread(_silent, job))
                 ):
                     outcome = replace(outcome, reason=f"{outcome.reason}; {why}")
-                if outcome.machine and not self._keep and (job.report / RECORDING).is_file():
-                    paused = await asyncio.to_thread(_paused, job, outcome.machine)
-                    outcome = replace(outcome, notes=(*outcome.notes, *paused))
                 if job.plan.pool:
                     outcome = replace(outcome, notes=(*outcome.notes, f"ran on rig '{chosen.plan.rig}'"))
         except Exception as error:  # noqa: BLE001  (whatever it is, it concerns this test alone)
@@ -108,18 +104,6 @@ def _silent(job: Job) -> str:
     with contextlib.suppress(OSError, OdvdError):
         return silent_consumer(job.plan, job.folder, job.report / RECORDING)
     return ""
-
-
-def _paused(job: Job, load: MachineLoad) -> tuple[str, ...]:
-    """A note on the longest pause of the application between two answers in real time, where that is long."""
-    from dodo_dsl.opendlv.odvd import OdvdError
-    from dodo_dsl.run.test_recording import long_pause
-
-    paused = ""
-    with contextlib.suppress(OSError, OdvdError):
-        paused = long_pause(job.plan, job.folder, job.report / RECORDING)
-    busy = too_busy(load)
-    return (f"{paused}; the machine was busy: {busy}" if busy else paused,) if paused else ()
 
 
 def is_undecided(outcome: Outcome) -> bool:

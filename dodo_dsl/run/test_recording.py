@@ -1,8 +1,4 @@
-"""What a recording says of its test: clock and duration, the longest pause of a program, and which one stayed silent.
-
-A pause is between two answers of the application in real time. A silent program got messages of another one and sent
-nothing.
-"""
+"""What a recording says of its test: clock and duration, and which program got messages of another and sent none."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,11 +16,9 @@ from dodo_dsl.opendlv.message_columns import Numbers
 from dodo_dsl.opendlv.message_set import OWN_IDS, MessageSet
 from dodo_dsl.opendlv.recording import Recording, RecordingError, Scanner
 from dodo_dsl.plan.model import ApplicationService, Plan
-from dodo_dsl.run.machine_load.judgement import MOST_PERIODS
-from dodo_dsl.run.run_state import pictured_by
 
 _AROUND = 60 * MICROSECONDS
-"""How far a mark may lie from the steps, and a message behind the end of a recording."""
+"""How far a message may lie behind the end of a recording."""
 PLAYER = MessageSet.standard().id("cluon.data.PlayerStatus")
 BEGIN, STEP, END = "dodo.TestBegin", "dodo.RecordedStep", "dodo.RecordingEnd"
 
@@ -63,7 +57,7 @@ def inspect(path: Path) -> TestRecording:
         if step is not None:
             marks = Marks.read(recording, messages)
             times = [time for _, _, time in marks.steps]
-            fault = _damage(recording) or marks.fault(begins) or _own_fault(recording, marks)
+            fault = _damage(recording) or marks.fault() or _own_fault(recording, marks)
             start = min(times) if fault else begin.sample_time
             return TestRecording(path, "lockstep", _seconds(max(times) - start), fault)
         if not begin.received:
@@ -92,23 +86,12 @@ class Marks:
         steps = tuple((row, mark.number, mark.time) for row, mark in zip(rows, said, strict=True))
         return cls(recording, steps, (id_, messages.id(END), messages.id(BEGIN)))
 
-    def fault(self, begins: Numbers) -> str:
-        """Steps that do not follow each other, and marks or a start that lie elsewhere."""
+    def fault(self) -> str:
+        """Steps that do not follow each other."""
         for (_, number, time), (row, next_number, next_time) in pairwise(self.steps):
             where = recording_times.place(self.recording, row)
             if next_number < number or (next_number == number) != (next_time == time) or next_time < time:
                 return f"{where} goes back, from step {number} to {next_number}"
-        times = [time for _, _, time in self.steps]
-        rows = self.recording.rows(self.ids)
-        sampled = self.recording.index["sampled"][rows]
-        apart = rows[(sampled < min(times) - _AROUND) | (sampled > max(times) + _AROUND)]
-        wrong = [row for row in apart.tolist() if row in begins or not self.recording.envelope(row).received]
-        if wrong:
-            some, have = (
-                ("1 mark", "has a time stamp") if len(wrong) == 1 else (f"{len(wrong):,} marks", "have time stamps")
-            )
-            where = recording_times.place(self.recording, wrong[0])
-            return f"{some} of the test {have} outside its steps, the first is {where}"
         return ""
 
 
@@ -123,26 +106,9 @@ def _own_fault(recording: Recording, marks: Marks) -> str:
 
     A player may begin its recording again, and then goes back to the times in it: steps alone give the order.
     """
-    received = _received(recording)
-    own = np.flatnonzero((received == 0) & ~np.isin(recording.index["data_type"], list(marks.ids)))
-    in_order = PLAYER not in recording.index["data_type"][own]
-    for rows in recording_times.streams(recording.index, own):
-        if fault := _apart(recording, rows) or recording_times.fault(recording, rows, in_order):
-            return fault
-    return recording_times.repeated(recording, np.flatnonzero(received == 0)) if in_order else ""
-
-
-def _apart(recording: Recording, rows: Numbers) -> str:
-    """Sample times, which alone count in lockstep, far from the others of the same message and sender."""
-    sampled = recording.index["sampled"][rows]
-    wrong = rows[~recording_times.together(sampled)]
-    if not len(wrong):
-        return ""
-    stamps = "a time stamp" if len(wrong) == 1 else "time stamps"
-    count = f"{len(wrong):,} of {len(rows):,} messages"
-    return (
-        f"{count}, the first is {recording_times.place(recording, int(wrong[0]))}, with {stamps} far from the others'"
-    )
+    types = recording.index["data_type"]
+    own = np.flatnonzero((_received(recording) == 0) & ~np.isin(types, list(marks.ids)))
+    return recording_times.fault(recording, own, in_order=PLAYER not in types[own])
 
 
 def _arrivals_fault(recording: Recording, end: Envelope | None) -> str:
@@ -179,39 +145,6 @@ def _seconds(time: int) -> float:
     return max(0, time) / MICROSECONDS
 
 
-_LEAST_MESSAGES = 10
-"""Of one kind: fewer are not answers to frames."""
-
-
-def long_pause(plan: Plan, folder: Path, recording: Path) -> str:
-    """A sentence on the longest pause of a message that a service declares; empty if none is long.
-
-    Long is more than ten periods of the frames, or of the message where that comes less often. ``folder`` is the
-    compiled test's. Raises OSError and OdvdError.
-    """
-    came, messages = _came(recording), MessageSet.load(*(folder / FILES / path for path in plan.messages))
-    came = came[:, came[1] > 0]  # what was on the bus
-    begins = _of(BEGIN, came, messages)[1] / MICROSECONDS
-    worst, text = 0.0, ""
-    for service in plan.application.services:
-        for output in service.outputs:
-            times = np.sort(_of(output, came, messages)[1]) / MICROSECONDS
-            times = times[times >= begins[0]] if len(begins) else times
-            if len(times) < _LEAST_MESSAGES:
-                continue
-            pauses = np.diff(times)
-            periods = float(pauses.max()) / max(_period_s(plan), float(np.median(pauses)))
-            if periods > max(worst, MOST_PERIODS):
-                at = times[int(pauses.argmax())] - (begins[0] if len(begins) else times[0])
-                name = output.partition("/")[0].rpartition(".")[2]
-                worst = periods
-                text = (
-                    f"application service '{service.name}' sent no {name} for "
-                    f"{pauses.max():.3g} s, as long as {periods:.0f} frames, after {at:.1f} s"
-                )
-    return text
-
-
 def _came(recording: Path) -> Numbers:
     """Ids, times of receipt in us, and sender stamps of all messages: (3, messages)."""
     parts = [np.empty((3, 0), np.int64)]
@@ -229,13 +162,6 @@ def _of(message: str, came: Numbers, messages: MessageSet) -> Numbers:
     chosen = (came[0] == messages.id(name)) & (not stamp or came[2] == int(stamp)) if is_known else []
     found: Numbers = came[:, chosen]
     return found
-
-
-def _period_s(plan: Plan) -> float:
-    """The longest period of the test's cameras; 0 if none has its own, as a recording that is played."""
-    cameras = pictured_by(plan)
-    rates = [float(f.value) for s in plan.services if s.name in cameras for f in s.flags if f.name == "freq"]
-    return 1 / min(rates) if rates and min(rates) > 0 else 0.0
 
 
 def silent_consumer(plan: Plan, folder: Path, recording: Path) -> str:
