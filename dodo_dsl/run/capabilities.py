@@ -203,17 +203,14 @@ def _findings(check: Callable[[], Iterator[Capability]]) -> Iterator[Capability]
 
 def left_behind() -> Iterator[Capability]:
     """What killed runs left."""
-    left = [f"test {about.get('test', '?')}" for prefix in (leases.CID, leases.PROJECT) for about in _orphans(prefix)]
+    left = []
+    for lease in (lease for prefix in (leases.CID, leases.PROJECT) for lease in leases.orphans(prefix)):
+        left.append(f"test {lease.left.get('test', '?')}")
+        lease.leave()
     if left:
         yield Capability("left behind", "warning", f"by killed runs: {', '.join(left)}", "dodo doctor --clean")
     else:
         yield Capability("left behind", "ok", "nothing of killed runs")
-
-
-def _orphans(prefix: str) -> Iterator[dict[str, Any]]:
-    for lease, about in leases.orphans(prefix):
-        yield about
-        lease.leave()
 
 
 def state_folder() -> Iterator[Capability]:

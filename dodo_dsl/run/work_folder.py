@@ -50,8 +50,8 @@ def work_folder() -> WorkFolder:
 
 def reap_folders() -> None:
     """Removes the folders of killed runs."""
-    for lease, about in leases.orphans(leases.RUN):
-        folder = Path(str(about.get("folder", "")))
+    for lease in leases.orphans(leases.RUN):
+        folder = Path(str(lease.left.get("folder", "")))
         if folder.name == f"{FOLDER_PREFIX}{lease.name.removeprefix(leases.RUN)}":
             _remove(folder, lease)
         else:

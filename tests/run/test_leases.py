@@ -14,7 +14,7 @@ import pytest
 from dodo_dsl.run import leases
 from dodo_dsl.run.leases import Lease, LeaseTimeout
 from tests.run.desk import ROOT
-from tests.run.scripted import one_by_one, run
+from tests.run.scripted import run
 
 
 @pytest.fixture
@@ -65,9 +65,9 @@ def test_a_lease_excludes_others_until_it_is_released(folder: Path) -> None:
     assert leases.try_lease("cid-121", {}) is None
     assert leases.holder("cid-121") == f"test mine of process {os.getpid()}"
     held.release()
-    assert leases.holder("cid-121") == "another process"
+    assert leases.holder("cid-121") == ""
     take("cid-121").release()
-    assert [path.name for path in folder.iterdir()] == ["leases.lock"]
+    assert list(folder.iterdir()) == []
 
 
 def test_shared_leases_exclude_only_exclusive_ones(folder: Path) -> None:
@@ -87,8 +87,8 @@ def test_what_was_left_belongs_to_those_who_inherited_it_and_then_to_nobody(fold
     held.leave()
     assert list(leases.orphans("cid-")) == []
     os.close(inherited)
-    ((orphan, about),) = leases.orphans("cid-")
-    assert (orphan.name, about) == ("cid-121", {"pid": os.getpid(), "test": "mine"})
+    (orphan,) = leases.orphans("cid-")
+    assert (orphan.name, orphan.left) == ("cid-121", {"pid": os.getpid(), "test": "mine"})
     assert leases.try_lease("cid-121", {}) is None, "an orphan is yielded held"
     orphan.release()
     assert list(leases.orphans("cid-")) == []
@@ -115,132 +115,22 @@ def test_a_busy_lease_is_waited_for_and_its_holder_named_once(folder: Path) -> N
     assert when == pytest.approx(20.0, abs=0.5)
 
 
-def test_waiters_are_served_in_the_order_in_which_they_came(folder: Path) -> None:
-    held, served, said = take("cid-121"), [], {name: [] for name in "abc"}
-
-    async def waiter(name: str) -> None:
-        lease = await leases.lease_any(["cid-121"], {"test": name}, said[name].append)
-        served.append(name)
-        await asyncio.sleep(3.0)
-        lease.release()
-
-    async def scene() -> None:
-        tasks = await one_by_one(*map(waiter, "abc"))
-        held.release()
-        late = leases.lease_any(["cid-121"], {"test": "late"}, said.setdefault("late", []).append)
-        (await late).release()
-        assert served == ["a", "b", "c"], "who comes when it is free waits behind them"
-        await asyncio.gather(*tasks)
-
-    run(scene())
-    mine = f"of process {os.getpid()}"
-    assert said["a"] == [f"waiting for test mine {mine}"]
-    assert said["b"] == [f"waiting for test mine {mine}, and 1 waits before this one", f"waiting for test a {mine}"]
-    assert said["c"][0] == f"waiting for test mine {mine}, and 2 wait before this one"
-    assert len(said["c"]) == 3 and said["late"][0].endswith("and 3 wait before this one")
-    assert [path.name for path in folder.iterdir()] == ["leases.lock"]
-
-
-def test_who_waits_for_any_is_served_by_the_first_that_is_free_and_holds_up_no_other(folder: Path) -> None:
-    """The first waits for two; the second for one of them and for another, which nobody wants."""
-    held = [take("cid-121"), take("cid-122")]
-
-    async def scene() -> list[str]:
-        first = asyncio.ensure_future(leases.lease_any(["cid-121", "cid-122"], {"test": "a"}, lambda _: None))
-        await asyncio.sleep(0.05)
-        second = await leases.lease_any(["cid-122", "cid-123"], {"test": "b"}, lambda _: None)
-        held[1].release()
-        names = [second.name, (await first).name]
-        for lease in (second, first.result()):
-            lease.release()
-        return names
-
-    assert run(scene()) == ["cid-123", "cid-122"]
-    held[0].release()
-
-
-def test_shared_use_waits_behind_an_exclusive_one_that_came_before(folder: Path) -> None:
-    held, served = take("machine", shared=True), []
-
-    async def waiter(name: str, shared: bool) -> None:
-        lease = await leases.lease_any(["machine"], {"test": name}, lambda _: None, shared)
-        served.append(name)
-        await asyncio.sleep(1.0)
-        lease.release()
-
-    async def scene() -> None:
-        tasks = await one_by_one(waiter("alone", False), waiter("one", True), waiter("two", True))
-        assert served == []
-        held.release()
-        await asyncio.gather(*tasks)
-
-    run(scene())
-    assert served == ["alone", "one", "two"]
-
-
-def test_who_gives_up_leaves_the_queue(folder: Path) -> None:
-    held = take("cid-121")
-
-    async def scene() -> None:
-        waiter = asyncio.ensure_future(leases.lease_any(["cid-121"], {"test": "gone"}, lambda _: None))
-        await asyncio.sleep(0.05)
-        assert len(list(folder.glob("queue.*"))) == 1
-        waiter.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await waiter
-        assert list(folder.glob("queue.*")) == []
-
-    run(scene())
-    held.release()
-
-
-WAITS = """
-import asyncio, sys
-from dodo_dsl.run import leases
-async def wait():
-    await leases.lease_any(["cid-121"], {"test": "dies"}, lambda text: print(text, flush=True))
-asyncio.run(wait())
-"""
-
-
-def test_a_waiter_that_is_killed_is_skipped_and_its_ticket_removed(folder: Path) -> None:
-    held = take("cid-121")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen([sys.executable, "-c", WAITS], env=environment, stdout=subprocess.PIPE, text=True) as killed:
-        assert killed.stdout is not None
-        assert killed.stdout.readline() == f"waiting for test mine of process {os.getpid()}\n"
-        said: list[str] = []
-
-        async def scene() -> None:
-            waiter = asyncio.ensure_future(leases.lease_any(["cid-121"], {"test": "next"}, said.append))
-            await asyncio.sleep(0.05)
-            held.release()
-            await asyncio.sleep(0.05)
-            assert not waiter.done(), "the first in the queue has not looked yet, or took it"
-            killed.kill()
-            killed.wait()
-            (await waiter).release()
-
-        run(scene())
-    assert said[0].endswith("and 1 waits before this one")
-    assert list(folder.glob("queue.*")) == []
-
-
 @pytest.mark.parametrize("text", ["", "[]", '{"names": 3}', "[" * 100_000])
 def test_a_damaged_file_stands_for_its_name_as_long_as_somebody_has_it(folder: Path, text: str) -> None:
-    for name in ("queue.1.1.lease", "cid-121.1.1.lease"):
-        (folder / name).write_text(text)
-    with (folder / "cid-122.1.1.lease").open("w") as file, (folder / "queue.2.1.lease").open("w") as other:
-        for each in (file, other):
-            each.write(text)
-            each.flush()
-            fcntl.flock(each, fcntl.LOCK_EX)
+    (folder / "cid-121.lease").write_text(text)
+    with (folder / "cid-122.lease").open("w") as file:
+        file.write(text)
+        file.flush()
+        fcntl.flock(file, fcntl.LOCK_EX)
         assert wait(["cid-122", "cid-121"]) == ("cid-121", 0.0, [])
         assert leases.holder("cid-122") == "another process"
-        ((orphan, about),) = leases.orphans("cid-")
-        assert (orphan.name, about) == ("cid-121", {})
-        orphan.release()
-    assert [path.name for path in folder.glob("queue.*")] == ["queue.2.1.lease"]
+
+
+def test_who_takes_what_a_killed_holder_had_gets_what_that_has_left(folder: Path) -> None:
+    take("cid-121").leave()
+    held = take("cid-121")
+    assert held.left["test"] == "mine"
+    held.release()
 
 
 def test_a_lease_that_cannot_be_written_is_not_held(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -248,7 +138,7 @@ def test_a_lease_that_cannot_be_written_is_not_held(folder: Path, monkeypatch: p
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(os, "write", full)
+        patch.setattr(os, "pwrite", full)
         with pytest.raises(OSError, match="No space left"):
             leases.try_lease("cid-121", {})
     take("cid-121").release()
@@ -261,11 +151,3 @@ def test_waiting_has_a_limit(folder: Path) -> None:
     holder = f"test mine of process {os.getpid()}"
     assert str(caught.value) == f"no cid came free within 60 s; {holder} holds one"
     held.release()
-
-
-def test_what_dead_holders_had_and_cannot_have_left_is_removed(folder: Path) -> None:
-    for name in ("machine", "device-1-3", "cid-121", "run-a", "docker-b"):
-        take(name).leave()
-    take("cid-122").release()
-    left = {path.name.partition(".")[0] for path in folder.glob("*.lease")}
-    assert left == {"cid-121", "run-a", "docker-b"}

@@ -174,8 +174,8 @@ def reap_projects(client: Any) -> Reaped:
     from docker.errors import DockerException
 
     reaped = Reaped()
-    for lease, about in leases.orphans(leases.PROJECT):
-        project, test = lease.name.removeprefix(leases.PROJECT), about.get("test", "?")
+    for lease in leases.orphans(leases.PROJECT):
+        project, test = lease.name.removeprefix(leases.PROJECT), lease.left.get("test", "?")
         try:
             count = remove_project(client, project, rests_s=())
         except (DockerException, OSError) as error:

@@ -15,6 +15,7 @@ from typing import Any
 from dodo_dsl.opendlv.address import group
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
+from dodo_dsl.run.process import leftovers
 from dodo_dsl.run.process.confinement import INTERPRETER, MOST_TRIES, MOUNT_GONE, PROGRAM, Confinement
 from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.leftovers import end_slot, remove_memories
@@ -119,10 +120,15 @@ async def host_slot(
         return None
 
     try:
-        held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
+        turn = await leases.lease_any(["turn"], about, say)  # who waits for the machine alone has it next
+        try:
+            held.append(await leases.lease_any(["machine"], about, say, shared=not alone))
+        finally:
+            turn.release()
         order = [plan.cid, *(c for c in cids if c != plan.cid)]
         lease = await leases.lease_any([f"{leases.CID}{c}" for c in order], about, say, attempt=attempt)
         held.append(lease)
+        leftovers.remove_left(lease)
         cid = int(lease.name.removeprefix(leases.CID))
         foreigner = await asyncio.get_running_loop().run_in_executor(None, listen, cid)
         if foreigner:

@@ -21,15 +21,18 @@ def reap() -> list[str]:
     """Removes what killed runs left on the host, by leases that nobody holds; returns a phrase for each test."""
     removed = []
     process_group.remove_unused()
-    for lease, about in leases.orphans(leases.CID):
-        slot = str(about.get("slot", ""))
-        if SLOT_NAME.fullmatch(slot):
-            killed = end_slot(slot)
-            memories = remove_memories(slot)
-            if killed or memories:
-                removed.append(f"{about.get('test', '?')}: {killed} processes and {memories} shared memories")
+    for lease in leases.orphans(leases.CID):
+        killed, memories = remove_left(lease)
+        if killed or memories:
+            removed.append(f"{lease.left.get('test', '?')}: {killed} processes and {memories} shared memories")
         lease.release()
     return removed
+
+
+def remove_left(lease: leases.Lease) -> tuple[int, int]:
+    """Ends what a dead holder of a CID has left; the numbers of processes and shared memories."""
+    slot = str(lease.left.get("slot", ""))
+    return (end_slot(slot), remove_memories(slot)) if SLOT_NAME.fullmatch(slot) else (0, 0)
 
 
 def end_slot(slot: str) -> int:

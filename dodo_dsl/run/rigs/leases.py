@@ -109,9 +109,8 @@ async def taken(
     """The same leases, to be released; all or, with LeaseTimeout, none."""
     held: list[leases.Lease] = []
     try:
-        with leases.arrived():
-            for name in [*([] if cid is None else [f"cid-{cid}"]), *device_leases(devices)]:
-                held.append(await leases.lease_any([name], {"test": user}, say, patience_s=patience_s))
+        for name in [*([] if cid is None else [f"cid-{cid}"]), *device_leases(devices)]:
+            held.append(await leases.lease_any([name], {"test": user}, say, patience_s=patience_s))
     except BaseException:
         release(held)
         raise

@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
+from typing import Any
 
 from dodo_dsl.run import leases
 from dodo_dsl.run.backends import Job
@@ -18,43 +19,31 @@ Open = Callable[[Job], AbstractAsyncContextManager[Backend]]
 
 @contextlib.asynccontextmanager
 async def opened(job: Job, say: Say, backend_of: Open) -> AsyncIterator[tuple[Job, Backend]]:
-    """The job for the rig that it runs on, with its backend; raises BackendError.
-
-    All that the test waits for, it waits for since now, so that no later test overtakes it.
-    """
+    """The job for the rig that it runs on, with its backend; raises BackendError."""
     async with contextlib.AsyncExitStack() as stack:
-        with leases.arrived(), contextlib.ExitStack() as tickets:
-            chosen = await _chosen(job, say, tickets) if job.others else job
-            backend = await stack.enter_async_context(backend_of(chosen))
-        yield chosen, backend
+        chosen = await _chosen(job, say, stack) if job.others else job
+        yield chosen, await stack.enter_async_context(backend_of(chosen))
 
 
-async def _chosen(job: Job, say: Say, tickets: contextlib.ExitStack) -> Job:
-    """The job for the first rig that is free, which a ticket keeps from others of a pool until its leases are taken."""
-    usable = _usable([job, *job.others])
-    by_rig = {one.plan.rig: _lease_names(one) for one in usable}
-    names = [name for found in by_rig.values() for name in found]
-    since = leases.arrival_time()
+async def _chosen(job: Job, say: Say, stack: contextlib.AsyncExitStack) -> Job:
+    """The job for the first rig that is free, which no other test of a pool chooses until the ``stack`` is left."""
+    usable = {f"rig-{one.plan.rig}": one for one in _usable([job, *job.others])}
 
-    def free() -> Job | None:
-        return next((one for one in usable if _is_free(by_rig[one.plan.rig], since)), None)
+    def attempt(name: str, about: dict[str, Any], shared: bool) -> leases.Lease | None:
+        cid, *devices = f"cid-{usable[name].plan.cid}", *device_leases(devices_of(usable[name].plan))
+        is_free = not is_claimed(cid) and not any(map(leases.holder, (cid, *devices)))
+        return leases.try_lease(name, about, shared) if is_free else None
 
-    with leases.ticket(names, since):
-        try:
-            chosen = await leases.in_turn(free, names, say, False, leases.DEFAULT_PATIENCE_S, since)
-        except leases.LeaseTimeout as error:
-            raise BackendError(f"none of the rigs {', '.join(by_rig)} came free: {error}") from error
-        tickets.enter_context(leases.ticket(by_rig[chosen.plan.rig], since, turn=True))
+    try:
+        patience_s = leases.DEFAULT_PATIENCE_S
+        lease = await leases.lease_any([*usable], {"test": job.plan.slug}, say, patience_s=patience_s, attempt=attempt)
+    except leases.LeaseTimeout as error:
+        rigs = ", ".join(one.plan.rig for one in usable.values())
+        raise BackendError(f"none of the rigs {rigs} came free: {error}") from error
+    stack.callback(lease.release)
+    chosen = usable[lease.name]
     say(f"on rig '{chosen.plan.rig}'")
     return chosen
-
-
-def _lease_names(job: Job) -> list[str]:
-    return [f"cid-{job.plan.cid}", *device_leases(devices_of(job.plan))]
-
-
-def _is_free(names: Sequence[str], since: int) -> bool:
-    return not leases.ahead(names, since) and not is_claimed(names[0])
 
 
 def _usable(jobs: Sequence[Job]) -> list[Job]:
