@@ -7,7 +7,6 @@ chunk at a time in memory.
 import contextlib
 import errno
 import functools
-import io
 import shutil
 import tarfile
 import time
@@ -23,18 +22,18 @@ from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.docker.client import engine_error
 
-MAX_BYTES = 4 << 30
+_CHUNK = 1 << 16
 
 
-def copy_out(container: Any, folder: str, target: Path, max_bytes: int = MAX_BYTES) -> None:
+def copy_out(container: Any, folder: str, target: Path) -> None:
     """Copies the regular files of a container's folder by their last name; links are skipped.
 
-    Each file is complete or absent. Raises OSError when the disk is full, or the stream is damaged or longer than
-    ``max_bytes``.
+    Each file is complete or absent. Raises OSError when the disk is full, or the stream is damaged.
     """
-    chunks, _ = container.get_archive(folder)
+    chunks, _ = container.get_archive(folder, chunk_size=_CHUNK)
+    stream: Any = _Stream(chunks)
     try:
-        with tarfile.open(fileobj=_Stream(chunks, max_bytes), mode="r|") as tar:
+        with tarfile.open(fileobj=stream, mode="r|") as tar:
             for member in tar:
                 name = Path(member.name).name
                 if member.isfile() and name not in ("", ".", "..") and (content := tar.extractfile(member)):
@@ -46,27 +45,17 @@ def copy_out(container: Any, folder: str, target: Path, max_bytes: int = MAX_BYT
         raise OSError(errno.EIO, f"the archive from the engine is damaged ({error})") from error
 
 
-class _Stream(io.RawIOBase):
-    """Chunks of bytes as a file that can be read once; raises OSError beyond ``max_bytes`` bytes."""
+class _Stream:
+    """Chunks of bytes as a file that can be read once."""
 
-    def __init__(self, chunks: Iterable[bytes], max_bytes: int) -> None:
-        self._chunks = iter(chunks)
-        self._max_bytes = max_bytes
-        self._taken = 0
-        self._rest = memoryview(b"")
+    def __init__(self, chunks: Iterable[bytes]) -> None:
+        self._chunks, self._rest = iter(chunks), b""
 
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        if not self._rest:
-            self._rest = memoryview(next((chunk for chunk in self._chunks if chunk), b""))
-            self._taken += len(self._rest)
-        if self._taken > self._max_bytes:
-            raise OSError(errno.EFBIG, f"more than {self._max_bytes:,} bytes")
-        count = min(len(buffer), len(self._rest))
-        buffer[:count], self._rest = self._rest[:count], self._rest[count:]
-        return count
+    def read(self, size: int) -> bytes:
+        while len(self._rest) < size and (chunk := next(self._chunks, b"")):
+            self._rest += chunk
+        data, self._rest = self._rest[:size], self._rest[size:]
+        return data
 
 
 PROJECT_LABEL = "com.docker.compose.project"
@@ -108,34 +97,25 @@ def remove_project(client: Any, project: str, rests_s: Sequence[float] = _RESTS_
     Goes on when one cannot be removed, tries it again after each of ``rests_s``, and raises the first such error at the
     end.
     """
-    from docker.errors import APIError
+    from docker.errors import APIError, DockerException, NotFound
 
-    removed = 0
-    for rest in (*rests_s, None):
-        count, problems = _removed(client, project)
-        removed += count
-        if not problems:
+    removed, problem = 0, None
+    for rest_s in (0.0, *rests_s):
+        if problem is not None and not isinstance(problem, APIError):
             break
-        if rest is None or not any(isinstance(problem, APIError) for problem in problems):
-            raise problems[0]
-        time.sleep(rest)
-    return removed
-
-
-def _removed(client: Any, project: str) -> tuple[int, list[Exception]]:
-    """How many things were removed, and why others were not."""
-    from docker.errors import DockerException, NotFound
-
-    removed, problems = 0, list[Exception]()
-    for remove in _removals(client, project):
-        try:
-            remove()
-            removed += 1
-        except NotFound:
-            continue
-        except (DockerException, OSError) as error:
-            problems.append(error)
-    return removed, problems
+        time.sleep(rest_s)
+        problem = None
+        for remove in _removals(client, project):
+            try:
+                remove()
+                removed += 1
+            except NotFound:
+                continue
+            except (DockerException, OSError) as error:
+                problem = problem or error
+        if problem is None:
+            return removed
+    raise problem or OSError("nothing was tried")
 
 
 def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
@@ -149,21 +129,11 @@ def _removals(client: Any, project: str) -> Iterator[Callable[[], None]]:
 
 def _remove_network(network: Any) -> None:
     """Removes a network, also where an endpoint is left of a container that could not start."""
-    from docker.errors import APIError, NotFound
-
-    try:
-        network.remove()
-    except NotFound:
-        raise
-    except APIError:
-        network.reload()
-        endpoints = network.attrs.get("Containers") or {}
-        left = [about["Name"] for key, about in endpoints.items() if key.startswith(_WITHOUT_CONTAINER)]
-        for name in left:
-            network.disconnect(name, force=True)
-        if not left:
-            raise
-        network.remove()
+    network.reload()
+    for key, about in (network.attrs.get("Containers") or {}).items():
+        if key.startswith(_WITHOUT_CONTAINER):
+            network.disconnect(about["Name"], force=True)
+    network.remove()
 
 
 def reap_projects(client: Any) -> Reaped:

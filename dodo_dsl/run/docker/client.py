@@ -1,7 +1,6 @@
 """The client of a Docker engine, and the texts of the engine's errors."""
 
 import contextlib
-import os
 import re
 import tarfile
 from collections.abc import Mapping, Sequence
@@ -34,8 +33,6 @@ def connect() -> Any:
     from docker.constants import DEFAULT_DOCKER_API_VERSION
     from docker.errors import DockerException
 
-    if lack := _lacks_certificate():
-        raise NoEngine(lack)
     try:
         with contextlib.closing(_client(DEFAULT_DOCKER_API_VERSION)) as first:
             version = first.api.version(api_version=False)["ApiVersion"]
@@ -56,15 +53,6 @@ def _client(version: str) -> Any:
     client = docker.from_env(version=version, max_pool_size=_CONNECTIONS)
     client.api.trust_env = not client.api.base_url.startswith("https:")
     return client
-
-
-def _lacks_certificate() -> str:
-    """What is missing of the client's own certificate, where the environment asks for TLS."""
-    if not os.environ.get("DOCKER_TLS_VERIFY") or not os.environ.get("DOCKER_HOST", "").startswith("tcp:"):
-        return ""
-    folder = Path(os.environ.get("DOCKER_CERT_PATH") or Path.home() / ".docker")
-    missing = next((name for name in ("ca.pem", "cert.pem", "key.pem") if not (folder / name).is_file()), "")
-    return f"DOCKER_TLS_VERIFY is set, and DOCKER_CERT_PATH, '{folder}', has no {missing}" if missing else ""
 
 
 def _reason(error: Exception) -> str:

@@ -6,7 +6,6 @@ Where engine and registry have none, it says where images of DoDo's services and
 import asyncio
 import threading
 from collections.abc import Callable, Coroutine, Iterable, Mapping
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -15,11 +14,6 @@ from dodo_dsl.run.docker.client import engine_error
 from dodo_dsl.run.process.commands import own_module
 from dodo_dsl.run.protocol import BackendError, Say
 from dodo_dsl.spec.deployment import build_command
-
-_UNKNOWN = "unknown"
-"""Of an image that does not say what it is for."""
-_SMALLER = {"amd64": "386", "arm64": "arm"}
-"""Whose programs most machines run, too."""
 
 
 class Pulls:
@@ -34,16 +28,14 @@ class Pulls:
     async def provide(
         self, own: Iterable[str], application: Iterable[str], say: Say, hints: Mapping[str, str] = MappingProxyType({})
     ) -> list[str]:
-        """Makes the images local; returns notes on those that could not be updated, or are for another kind of machine.
+        """Makes the images local; returns notes on those that could not be updated.
 
         ``hints`` say of images how to do without a pull. Raises BackendError.
         """
         self._hints.update(hints)
-        ours, theirs = sorted(set(own)), sorted(set(application))
-        waits = [self._pull_once(image, self._own, say) for image in ours]
-        waits += [self._pull_once(image, self._application, say) for image in theirs]
-        notes = [note for note in await asyncio.gather(*waits) if note]
-        return notes + await asyncio.to_thread(self._foreign, [*ours, *theirs])
+        waits = [self._pull_once(image, self._own, say) for image in sorted(set(own))]
+        waits += [self._pull_once(image, self._application, say) for image in sorted(set(application))]
+        return [note for note in await asyncio.gather(*waits) if note]
 
     async def _pull_once(self, image: str, work: Callable[[str, Say], str], say: Say) -> str | None:
         return await self.once(image, lambda: self._in_thread(work, image, say))
@@ -72,63 +64,44 @@ class Pulls:
             del self._tasks[key]
 
     def _own(self, image: str, say: Say) -> str:
-        return "" if self._architecture(image) else self._application(image, say)
+        return "" if self._has(image) else self._application(image, say)
 
     def _application(self, image: str, say: Say) -> str:
         try:
             self._pull(image, say)
         except BackendError as error:
-            if self._architecture(image):
+            if self._has(image):
                 return f"{error}; the local image is used"
             if image in self._hints:
                 raise BackendError(f"{error}; {self._hints[image]}") from error
             raise
         return ""
 
-    def _foreign(self, images: Iterable[str]) -> list[str]:
-        """A sentence on the images for each other kind of machine than the engine's."""
-        here = self._machine
-        kinds: dict[str, list[str]] = {}
-        for image in images:
-            kinds.setdefault(self._architecture(image), []).append(image)
-        usual = ("", here, _UNKNOWN, _SMALLER.get(here))
-        return [
-            f"images for {kind}, which this engine's machine ({here}) can only emulate: {', '.join(found)}"
-            for kind, found in kinds.items()
-            if here and kind not in usual
-        ]
-
-    @cached_property
-    def _machine(self) -> str:
-        """What the engine's machine runs, such as ``amd64``; empty if it does not say."""
-        from docker.errors import DockerException
-
-        try:
-            return str(self._client.api.version().get("Arch", ""))
-        except (DockerException, OSError) as error:
-            raise BackendError(f"the Docker engine does not say its version: {error}") from error
-
-    def _architecture(self, image: str) -> str:
-        """What a local image is for, such as ``arm64``; empty if there is no such image."""
+    def _has(self, image: str) -> bool:
         from docker.errors import DockerException, ImageNotFound
 
         try:
-            found = self._client.api.inspect_image(image)
+            self._client.api.inspect_image(image)
         except ImageNotFound:
-            return ""
+            return False
         except (DockerException, OSError) as error:
             raise BackendError(f"the Docker engine cannot inspect image {image}: {error}") from error
-        return str(found.get("Architecture") or _UNKNOWN)
+        return True
 
     def _pull(self, image: str, say: Say) -> None:
         from docker.errors import DockerException
 
-        progress = _Progress(image, say)
+        say(f"pulling {image}")
+        is_told = False
         try:
             for line in self._client.api.pull(image, stream=True, decode=True):
                 if self._interrupted.is_set():
                     return
-                progress.take(line)
+                if "error" in line:
+                    raise _problem(image, str(line["error"]))
+                if not is_told and str(line.get("status")).startswith("Retrying"):
+                    is_told = True
+                    say(f"pulling {image}: the connection broke, the engine retries")
         except (DockerException, OSError) as error:
             raise _problem(image, engine_error(error)) from error
 
@@ -140,35 +113,6 @@ def _problem(image: str, text: str) -> BackendError:
     if is_named and any(word in text for word in ("unauthorized", "denied", "no basic auth")):
         text = f"{text}; if the registry requires a login: docker login {host}"
     return BackendError(f"image {image} cannot be pulled: {text}")
-
-
-class _Progress:
-    """Reports the megabytes of an image's layers at each tenth, and once that the engine retries."""
-
-    def __init__(self, image: str, say: Say) -> None:
-        self._image = image
-        self._say = say
-        self._layers: dict[str, tuple[int, int]] = {}
-        self._reported = -1
-        self._retried = False
-
-    def take(self, line: dict[str, Any]) -> None:
-        if "error" in line:
-            raise _problem(self._image, str(line["error"]))
-        if str(line.get("status")).startswith("Retrying") and not self._retried:
-            self._retried = True
-            self._say(f"pulling {self._image}: the connection broke, the engine retries")
-        detail = line.get("progressDetail") or {}
-        if line.get("status") == "Downloading" and detail.get("total"):
-            self._layers[line["id"]] = (detail["current"], detail["total"])
-            self._report()
-
-    def _report(self) -> None:
-        done, total = (sum(part) for part in zip(*self._layers.values(), strict=True))
-        tenth = 10 * done // max(total, 1)
-        if tenth > self._reported:
-            self._reported = tenth
-            self._say(f"pulling {self._image}: {done / 1e6:.0f} of {total / 1e6:.0f} MB")
 
 
 def image_hints(plan: Plan) -> dict[str, str]:

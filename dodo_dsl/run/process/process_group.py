@@ -87,12 +87,6 @@ def remove_unused(proc: Path = Path("/proc/self")) -> None:
                     folder.rmdir()
 
 
-def holding(proc: Path = Path("/proc/self")) -> Iterator[Path]:
-    """The groups that count this process, its own first."""
-    for own, top, _ in _shown_groups(proc):
-        yield from (group for group in (own, *own.parents) if group.is_relative_to(top))
-
-
 def counted(process: Path, own: Path) -> tuple[float, dict[str, int]]:
     """Processor time in s, and the rows of memory, by the groups of a process; 0 and none if they are not counted.
 

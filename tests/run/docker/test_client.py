@@ -34,14 +34,6 @@ def test_an_engine_with_tls_is_trusted_by_its_own_authority(monkeypatch: pytest.
             connect()
 
 
-def test_certificates_that_are_not_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "ca.pem").touch()
-    for name, value in (("HOST", "tcp://127.0.0.1:9"), ("TLS_VERIFY", "1"), ("CERT_PATH", str(tmp_path))):
-        monkeypatch.setenv(f"DOCKER_{name}", value)
-    with pytest.raises(NoEngine, match=rf"DOCKER_CERT_PATH, '{tmp_path}', has no cert.pem"):
-        connect()
-
-
 def test_in_a_job_the_way_out_is_a_service(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DOCKER_HOST", "tcp://127.0.0.1:9")
     monkeypatch.setenv("GITLAB_CI", "true")

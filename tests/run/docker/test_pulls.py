@@ -1,16 +1,13 @@
 """Work that tests of a run share: once while it succeeds, again when it failed."""
 
 import asyncio
-import subprocess
 from collections.abc import Callable, Coroutine
-from pathlib import Path
 
 import pytest
 from docker.errors import ImageNotFound
 
 from dodo_dsl.plan.model import PlannedService
 from dodo_dsl.run.docker import pulls as docker_pulls
-from dodo_dsl.run.docker.client import connect
 from dodo_dsl.run.docker.pulls import Pulls
 from dodo_dsl.run.protocol import BackendError
 from tests.run.scripted import plan
@@ -80,23 +77,3 @@ def test_images_that_were_never_built() -> None:
     for name, told in hints.items():
         with pytest.raises(BackendError, match=rf"^image {name} cannot be pulled: not found; {told}$"):
             asyncio.run(Pulls(EmptyEngine()).provide([name], [], lambda _: None, hints))
-
-
-@pytest.mark.engine
-def test_an_image_for_another_kind_of_machine_is_noted_before_the_test(tmp_path: Path) -> None:
-    name = "dodo-test-foreign-machine"
-    (tmp_path / "Dockerfile").write_text("FROM scratch\nCOPY Dockerfile /\n")
-    command = ["docker", "buildx", "build", "--quiet", "--load", "--platform", "linux/s390x", "--tag", name, tmp_path]
-    subprocess.run(command, check=True, capture_output=True)
-    client = connect()
-    client.images.get(name).tag(name, "other")
-    try:
-        notes = asyncio.run(Pulls(client).provide([name], [f"{name}:other"], lambda _: None))
-        here = client.api.version()["Arch"]
-        expected = f"images for s390x, which this engine's machine ({here}) can only emulate: {name}, {name}:other"
-        assert notes[-1] == expected, "the application's image cannot be pulled anew"
-        subprocess.run([*command[:6], f"linux/{here}", *command[7:]], check=True, capture_output=True)
-        assert asyncio.run(Pulls(client).provide([name], [], lambda _: None)) == []
-    finally:
-        subprocess.run(["docker", "image", "rm", name, f"{name}:other"], check=True, capture_output=True)
-        client.close()

@@ -100,10 +100,6 @@ def test_where_a_group_is_made(tmp_path: Path, version: int, handing: str, paren
     assert found == ([tmp_path / parent] if parent else [])
 
 
-def test_a_group_that_is_not_seen_holds_nothing(tmp_path: Path) -> None:
-    assert list(process_group.holding(proc_of(tmp_path, 1, "/elsewhere"))) == []
-
-
 def test_groups_of_killed_runs_are_removed_and_new_ones_are_not(tmp_path: Path) -> None:
     proc = proc_of(tmp_path, 1, "/docker/own")
     old, new = (tmp_path / "tree/own" / f"dodo-{name}" for name in ("old", "new"))
