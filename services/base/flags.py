@@ -1,15 +1,11 @@
-"""Flags in OpenDLV style, ``--key=value``, and the text of ``--help``, made from the service's manifest.
+"""Flags in OpenDLV style, ``--key=value``, by the service's manifest, which the compiler validates."""
 
-The manifest is read as far as a command line needs it; the compiler validates manifests.
-"""
-
-import difflib
+import argparse
 import re
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import yaml
 
@@ -78,7 +74,7 @@ def bounds(about: About) -> str:
     return f"at most {high}" if high is not None else ""
 
 
-def example(about: About) -> str:
+def example_of(about: About) -> str:
     """An example value for a flag."""
     for value in (about.get("example"), about.get("default"), (about.get("choices") or [None])[0]):
         if isinstance(value, bool):
@@ -95,9 +91,16 @@ class Share(NamedTuple):
     of_one: float
 
 
+class Flags(dict[str, Any]):
+    """Values by parameter name, defaults filled in; an optional parameter without default is None.
+
+    A ``number`` is a float, an ``amount`` a float or a Share, an ``integer`` an int, a ``list`` a list of strings or
+    of what its ``of`` says, a ``boolean`` a bool, everything else a string; numbers are in the manifest's unit.
+    """
+
+
 Value = int | float | str | bool | list[Any] | Share | None
 
-_FLAG = re.compile(r"--(?P<name>[A-Za-z][A-Za-z0-9.-]*)(?:=(?P<value>.*))?", re.DOTALL)
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,20}")
 _KINDS = {
@@ -117,54 +120,33 @@ class FlagsError(ValueError):
     """A command line that the manifest does not allow; one sentence."""
 
 
-@dataclass(frozen=True)
-class Flags(Mapping[str, Any]):
-    """Values by parameter name, defaults filled in; an optional parameter without default is None.
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise FlagsError(message)
 
-    A ``number`` is a float, an ``amount`` a float or a Share, an ``integer`` an int, a ``list`` a list of strings or of
-    what its ``of`` says, a
-    ``boolean`` a bool, everything else a string; numbers are in the manifest's unit.
-    """
 
-    values_by_name: Mapping[str, Any]
-
-    def __getitem__(self, name: str) -> Any:
-        return self.values_by_name[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.values_by_name)
-
-    def __len__(self) -> int:
-        return len(self.values_by_name)
+def parser(manifest: Mapping[str, Any]) -> argparse.ArgumentParser:
+    """Parses a service's command line, and says in its help what the service does."""
+    example = f"example: {example_line(manifest)}"
+    command = " ".join(manifest["process"])
+    found = _Parser(command, "%(prog)s --key=value ...", manifest["description"], example, allow_abbrev=False)
+    for name, about in parameters(manifest).items():
+        more: dict[str, Any] = {"nargs": "?", "const": "true"} if about["type"] == "boolean" else {}
+        more |= {"required": bool(about.get("required")), "default": argparse.SUPPRESS, "help": _help(about)}
+        found.add_argument(f"--{name}", dest=name, metavar=example_of(about), **more)
+    return found
 
 
 def parse(manifest: Mapping[str, Any], argv: Sequence[str]) -> Flags:
     """The values that a command line gives; raises FlagsError."""
-    known = parameters(manifest)
-    given: dict[str, Value] = {}
-    for word in argv:
-        name, text = _split(word)
-        if name not in known:
-            raise FlagsError(f"unknown flag '--{name}'{_near(name, known)}")
-        if name in given:
-            raise FlagsError(f"--{name} is given twice")
-        given[name] = _value(name, known[name], text)
-    for name, about in known.items():
-        if about.get("required") and name not in given:
-            raise FlagsError(f"--{name} is missing: {about['help']}")
-    values = {name: given.get(name, _default(about)) for name, about in known.items()}
+    known, words = parameters(manifest), vars(parser(manifest).parse_args(argv))
+    given = {name: _value(name, known[name], text) for name, text in words.items()}
+    values = Flags({name: given.get(name, _default(about)) for name, about in known.items()})
     for name in given:
         for other, wanted in (known[name].get("when") or {}).items():
             if ("" if values[other] is None else values[other]) not in wanted:
                 raise FlagsError(f"--{name} is for {_wanted(other, wanted)}")
-    return Flags(values)
-
-
-def _split(word: str) -> tuple[str, str | None]:
-    match = _FLAG.fullmatch(word)
-    if match is None:
-        raise FlagsError(f"'{word}' is not a flag, expected --key=value")
-    return match["name"], match["value"]
+    return values
 
 
 def _default(about: About) -> Value:
@@ -172,27 +154,19 @@ def _default(about: About) -> Value:
     return float(value) if about["type"] in ("number", "amount") and isinstance(value, int) else value
 
 
-def _near(name: str, known: Mapping[str, object]) -> str:
-    close = difflib.get_close_matches(name, [*known, "help"], n=1)
-    return f", did you mean '--{close[0]}'?" if close else "; --help lists all flags"
-
-
-def _value(name: str, about: About, text: str | None) -> Value:
+def _value(name: str, about: About, text: str) -> Value:
     kind = about["type"]
-    if text is None:
-        if kind == "boolean":
-            return True
-        raise FlagsError(f"--{name} has no value, expected --{name}={example(about)}")
     if "of" in about:
         item = {**{key: fact for key, fact in about.items() if key != "of"}, "type": about["of"]}
         return [_value(name, item, part) for part in text.split(",") if part]
     value = _CONVERTERS.get(kind, str)(text) if text or kind in ("string", "list") else None
+    expected = _KINDS.get(kind, "") + (f" in{unit(about)}" if unit(about) else "")
     if value is None:
-        raise FlagsError(f"--{name}={text} is not {_expected(about)}")
+        raise FlagsError(f"--{name}={text} is not {expected}")
     if about.get("choices") and value not in about["choices"]:
         raise FlagsError(f"--{name}={text} is not one of {bounds(about)}")
     if isinstance(value, Share) and not about.get("or-share"):
-        raise FlagsError(f"--{name}={text} is a share, expected {_expected(about)}")
+        raise FlagsError(f"--{name}={text} is a share, expected {expected}")
     if not _allowed(about, value):
         raise FlagsError(f"--{name}={text} is out of range, expected {bounds(about)}{unit(about)}")
     return value
@@ -225,27 +199,11 @@ _CONVERTERS: dict[str, Callable[[str], Value]] = {
 }
 
 
-def _expected(about: About) -> str:
-    return _KINDS[about["type"]] + (f" in{unit(about)}" if unit(about) else "")
-
-
-def help_text(manifest: Mapping[str, Any]) -> str:
-    """What the service does, its flags with units, bounds and defaults, and a line that runs."""
-    known = parameters(manifest)
-    command = " ".join(manifest["process"])
-    lines = [f"{manifest['name']}: {manifest['description']}", "", f"usage: {command} --key=value ...", ""]
-    for name, about in known.items():
-        lines += [f"  --{name}  ({_facts(about)})", f"      {about['help']}"]
-    lines.append("  --help")
-    lines.append("      Show this help.")
-    return "\n".join([*lines, "", f"example: {example_line(manifest)}"]) + "\n"
-
-
 def example_line(manifest: Mapping[str, Any]) -> str:
     """A command that starts the service alone: with the manifest's example, or else with required flags."""
     known = parameters(manifest)
-    required = [f"--{name}={example(about)}" for name, about in known.items() if about.get("required")]
-    words = [f"--cid={example(known['cid'])}", *manifest["example"]] if "example" in manifest else required
+    required = [f"--{name}={example_of(about)}" for name, about in known.items() if about.get("required")]
+    words = [f"--cid={example_of(known['cid'])}", *manifest["example"]] if "example" in manifest else required
     return shlex.join([*manifest["process"], *words])
 
 
@@ -254,12 +212,9 @@ def _wanted(name: str, values: Sequence[str | bool]) -> str:
     return f"--{name}={' or '.join(str(value).lower() for value in values if value != '')}"
 
 
-def _facts(about: About) -> str:
-    kind = f"list of {about['of']}s" if "of" in about else about["type"]
-    facts = [kind + unit(about), ("one of " if about.get("choices") else "") + bounds(about)]
-    if about.get("required"):
-        facts.append("required")
-    elif about.get("default") not in (None, [], ""):
-        facts.append(f"default {example({'default': about['default'], 'type': about['type']})}")
+def _help(about: About) -> str:
+    facts = [about["type"] + unit(about), bounds(about)]
+    if about.get("default") not in (None, [], ""):
+        facts.append(f"default {example_of({'default': about['default'], 'type': about['type']})}")
     facts += [f"with {_wanted(other, wanted)}" for other, wanted in (about.get("when") or {}).items()]
-    return ", ".join(fact for fact in facts if fact)
+    return f"{about['help']} ({', '.join(filter(None, facts))})".replace("%", "%%")

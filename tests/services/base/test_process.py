@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,8 +17,7 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
-from services.base import Check
-from services.base.process import LONGEST, published, sentence, short_traceback
+from services.base.process import LONGEST, published
 from tests.services.base.conftest import ROOT, Start
 from tests.services.process import receive
 
@@ -182,26 +181,14 @@ def test_a_model_that_fails(start: Start, role: str, text: str) -> None:
     assert (code, out) == (1, '{"dodo": "ready"}\n')
     *steps, last = err.splitlines()
     assert re.sub(r":\d+, in", ":LINE, in", last) == f"tiny-service: CRITICAL: {text}"
-    if role == "unjudgeable":
-        assert steps == []
-    else:
-        assert steps[0] == "tiny-service: ERROR: Traceback without libraries (most recent call last):"
-        files = {line.split(",")[0].strip() for line in steps[1::2]}
-        assert files == {'File "base/tiny/__main__.py"'}
-        assert steps[-1].strip() in (Path(__file__).parent / "tiny/__main__.py").read_text()
-
-
-def test_all_of_a_traceback_with_verbose(start: Start) -> None:
-    *steps, last = start("--role=library", "--verbose").end()[2].splitlines()
-    assert last.startswith("tiny-service: CRITICAL: JSONDecodeError: ")
-    assert any("json/decoder.py" in line for line in steps)
+    assert bool(steps) == (role != "unjudgeable") == any("Traceback" in line for line in steps)
 
 
 @pytest.mark.parametrize(
     ("flags", "text"),
     [
         (["--role=unbuildable"], "tiny-service: CRITICAL: /no/such/map: cannot be read\n"),
-        (["--role=echo", "--frq=1"], "tiny-service: unknown flag '--frq', did you mean '--freq'?\n"),
+        (["--role=echo", "--frq=1"], "tiny-service: unrecognized arguments: --frq=1\n"),
     ],
 )
 def test_flags_that_cannot_be_met(start: Start, flags: list[str], text: str) -> None:
@@ -221,36 +208,6 @@ def test_starting_up_is_light() -> None:
     code = "import sys, services.base; print(sorted({'numpy', 'cv2', 'jsonschema'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-def raised(work: Callable[[], object]) -> Exception:
-    try:
-        work()
-    except Exception as error:  # noqa: BLE001  (whatever the work raises)
-        return error
-    raise AssertionError("nothing was raised")
-
-
-def test_the_innermost_place_of_its_own_code(tmp_path: Path) -> None:
-    """Also in a neighbour that several services share, and not in a library below it."""
-    shared, names = tmp_path / "my_services/shared.py", {}
-    shared.parent.mkdir()
-    shared.write_text("import json\n\ndef load(text):\n    return json.loads(text)\n")
-    exec(compile(shared.read_text(), shared, "exec"), names)
-    error = raised(lambda: names["load"]("["))
-    place = "my_services/shared.py:4, in load"
-    assert sentence(error, shared.parent / "judge").endswith(f"Expecting value: line 1 column 2 (char 1) ({place})")
-    assert short_traceback(error, shared.parent / "judge") == (
-        "Traceback without libraries (most recent call last):\n"
-        '  File "my_services/shared.py", line 4, in load\n    return json.loads(text)'
-    )
-
-
-def test_what_the_base_cannot_use_is_shown_there(tmp_path: Path) -> None:
-    error = raised(lambda: Check("step", 1.0, "deg").as_json())  # type: ignore[arg-type]
-    told = sentence(error, tmp_path / "my_services/judge")
-    assert told.startswith("AttributeError: 'str' object has no attribute 'items' (services/base/service.py:")
-    assert told.endswith(", in as_json)")
 
 
 LOG = "opendlv.system.LogMessage"

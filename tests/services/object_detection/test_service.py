@@ -9,7 +9,7 @@ import pytest
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from services.base import Context, Flags
-from services.base.flags import help_text, load_manifest, parse
+from services.base.flags import load_manifest, parse, parser
 from services.object_detection.service import ANNOUNCEMENT, LOGIC, ObjectDetection
 from tests.services.built import hand, refusal
 from tests.services.object_detection.test_truth import single, write
@@ -141,4 +141,4 @@ def test_a_truth_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
 
 
 def test_help_names_the_equations() -> None:
-    assert "(equation 4.3)" in help_text(load_manifest(ROOT / "services" / "object_detection"))
+    assert "(equation 4.3)" in parser(load_manifest(ROOT / "services" / "object_detection")).format_help()

@@ -83,7 +83,7 @@ def test_libcluon_gets_the_pictures_of_the_frames_it_sends(start, cid):
     [
         (["--map-path=/nowhere"], r"there is no file '/nowhere'"),
         ([f"--map-path={STRAIGHT}", "--height=241"], r"width and height must be even for I420, and 640 x 241 are not"),
-        ([], r"--map-path is missing"),
+        ([], r"are required: --map-path"),
     ],
 )
 def test_flags_that_cannot_be_met(cid, flags, message):
