@@ -18,7 +18,7 @@ from dodo_dsl.terminal import printable, unescaped
 
 _STYLES = {"passed": "green", "failed": "red", "error": "yellow"}
 _WORDS = {"passed": "passed", "failed": "failed", "error": "in error"}
-_FIELDS = {"state": "", "pace": None, "nearest": ""}
+_FIELDS = {"state": "", "pace": None}
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,6 @@ class LiveProgress:
             TextColumn("{task.description}", markup=False),
             TextColumn("{task.fields[state]}", markup=False),
             _PaceColumn(now),
-            TextColumn("{task.fields[nearest]}", markup=False),
             console=Console(file=unescaped(stream)),
             transient=True,
         )
@@ -99,7 +98,7 @@ class LiveProgress:
         now = self._now()
         pace = Pace(self._began.setdefault(slug, now), now, standing)
         if slug in self._tasks:
-            self._progress.update(self._tasks[slug], pace=pace, nearest=printable(standing.nearest))
+            self._progress.update(self._tasks[slug], pace=pace)
 
     def done(self, outcome: Outcome) -> None:
         self._ended[outcome.outcome] += 1

@@ -1,4 +1,4 @@
-"""What this machine offers to tests, by its kernel, disks and programs, and the removal of what killed runs left.
+"""What this machine offers to tests, by its kernel and programs, and the removal of what killed runs left.
 
 Programs are those that some tests need: a Docker engine, Compose, and the emulator of the rig's firmware.
 """
@@ -10,24 +10,21 @@ import os
 import shutil
 import socket
 import subprocess
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from dodo_dsl import advice, package_data
-from dodo_dsl.opendlv.address import RECEIVE_BUFFER, group
-from dodo_dsl.run import history, leases
+from dodo_dsl.opendlv.address import group
+from dodo_dsl.run import leases
 from dodo_dsl.run.docker import cleanup
 from dodo_dsl.run.docker.client import NoEngine, connect
-from dodo_dsl.run.docker.shared_files import problem, provide_image, unseen
 from dodo_dsl.run.process import host_isolation, leftovers
 from dodo_dsl.run.protocol import BackendError
 from dodo_dsl.run.rigs.leases import all_quarantined
 from dodo_dsl.run.rigs.problems import RigProblem
-from dodo_dsl.state_folder import NoStateFolder, state_path
 
 State = Literal["ok", "warning", "problem"]
 
@@ -47,8 +44,6 @@ _CID = 254
 _BUSES = "225.0.0.0/24"
 """The groups of all sessions."""
 _NO_ROUTE = (errno.ENETUNREACH, errno.ENODEV, errno.EADDRNOTAVAIL)
-_SYS = Path("/proc/sys")
-_FREE_BYTES = 2 << 30
 
 
 def namespaces() -> Iterator[Capability]:
@@ -82,34 +77,6 @@ def multicast() -> Iterator[Capability]:
         yield Capability("multicast", "ok", "works on the host")
 
 
-def receive_buffer() -> Iterator[Capability]:
-    """Whether sockets may buffer as much as OpenDLV requests."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        limit = receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # the kernel shows what it reserves
-    if limit < RECEIVE_BUFFER:
-        text = f"sockets may hold {limit:,} bytes, OpenDLV requests {RECEIVE_BUFFER:,}: bursts of messages may be lost"
-        yield Capability("receive buffer", "warning", text, _sysctl(f"net.core.rmem_max={RECEIVE_BUFFER}"))
-    else:
-        yield Capability("receive buffer", "ok", f"sockets may hold {limit:,} bytes")
-
-
-def _sysctl(setting: str) -> str:
-    """Sets a limit of the kernel; in a container, whose /proc/sys is read-only, it is its host's."""
-    path = _SYS / setting.partition("=")[0].replace(".", "/")
-    is_host = path.exists() and (os.geteuid() != 0 or os.access(path, os.W_OK))
-    return advice.as_root(f"sysctl -w {setting}") if is_host else f"on the host: sysctl -w {setting}"
-
-
-def disk() -> Iterator[Capability]:
-    """Whether there is room for recordings and images."""
-    for folder in dict.fromkeys((Path(tempfile.gettempdir()), Path.cwd())):
-        free = shutil.disk_usage(folder).free
-        state: State = "ok" if free >= _FREE_BYTES else "warning"
-        way = "" if state == "ok" else "free some space: recordings and images need it"
-        yield Capability("disk", state, f"{free / (1 << 30):.1f} GiB free in {folder}", way)
-
-
 FIRMWARE = "DODO_FIRMWARE"
 EMULATOR_PLACES = (package_data.root() / "build" / "firmware", Path("/opt/dodo/firmware"))
 _COMPOSE = (2, 20)
@@ -129,28 +96,15 @@ def docker_engine() -> Iterator[Capability]:
         tls = " with TLS" if client.api.base_url.startswith("https:") else ""
         text = f"version {version.get('Version')}, API {version.get('ApiVersion')}{where}{tls}"
         yield Capability("docker engine", "ok", text)
-        yield from _files_of(client)
-
-
-def _files_of(client: Any) -> Iterator[Capability]:
-    """Whether the engine sees the folders in which tests are, and in which they are compiled."""
-    try:
-        provide_image(client)
-    except BackendError as error:
-        yield Capability("files of tests", "warning", f"{error}; --backend docker needs it", "repair the engine")
-        return
-    with tempfile.NamedTemporaryFile(prefix="dodo-doctor-") as mark:
-        for place, path in (("this folder", Path.cwd()), ("TMPDIR", Path(mark.name).resolve())):
-            if missing := unseen(client, [path]):
-                text, way = problem(missing)
-                yield Capability("files of tests", "warning", f"{text}; in {place}, --backend docker needs it", way)
-                return
-    yield Capability("files of tests", "ok", "the docker engine sees this folder and TMPDIR")
 
 
 def compose_plugin() -> Iterator[Capability]:
     """Whether there is Compose of a version that DoDo supports."""
-    text = _output("docker", "compose", "version", "--short")
+    command = ["docker", "compose", "version", "--short"]
+    try:
+        text = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        text = ""
     numbers = tuple(int(n) for n in text.lstrip("v").split("-")[0].split(".")[:2] if n.isdecimal())
     if numbers >= _COMPOSE:
         yield Capability("compose", "ok", f"version {text}")
@@ -158,14 +112,6 @@ def compose_plugin() -> Iterator[Capability]:
     found = f"version {text} is older than 2.20" if numbers else "'docker compose' does not run"
     way = advice.docker_plugin("compose") if shutil.which("docker") else advice.docker()
     yield Capability("compose", "warning", f"{found}; --backend docker and mixed need it", way)
-
-
-def _output(*command: str) -> str:
-    try:
-        result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return result.stdout.strip() if result.returncode == 0 else ""
 
 
 def emulator_folder() -> Path | None:
@@ -213,16 +159,6 @@ def left_behind() -> Iterator[Capability]:
         yield Capability("left behind", "ok", "nothing of killed runs")
 
 
-def state_folder() -> Iterator[Capability]:
-    """Whether this user's state can be kept."""
-    try:
-        state_path(history.PATH_VARIABLE, "history.jsonl")
-    except NoStateFolder as problem:
-        yield Capability(
-            "state folder", "warning", str(problem), "without it there is no forecast of how long tests take"
-        )
-
-
 def rigs() -> Iterator[Capability]:
     """The rigs in quarantine."""
     try:
@@ -237,12 +173,9 @@ def rigs() -> Iterator[Capability]:
 CHECKS: tuple[Callable[[], Iterator[Capability]], ...] = (
     namespaces,
     multicast,
-    receive_buffer,
-    disk,
     docker_engine,
     compose_plugin,
     left_behind,
-    state_folder,
     rigs,
     emulated_rig,
 )

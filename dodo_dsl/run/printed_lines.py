@@ -36,8 +36,6 @@ MAX_PAYLOAD = 1 << 15
 """Bytes of a message that a line may make."""
 _MOST_WAITING = 50_000
 """Messages of a service in a step; the clock takes far fewer."""
-BUDGET_S = 5.0
-"""Processor time in s of a service's patterns in a test; then the rest is log."""
 LINES_READ = "dodo.LinesRead"
 _MOST_UNMATCHED, _WIDTH = 100, 200
 _INTEGER = re.compile(rb"[-+]?[0-9]{1,20}")
@@ -157,7 +155,7 @@ class LinePattern:
 class ServiceLines:
     """The lines of one service so far: the last one that matched, and those that did not since.
 
-    ``notes`` are sentences about lines that make no message, ``spent_s`` is what the patterns have taken.
+    ``notes`` are sentences about lines that make no message.
     """
 
     service: str
@@ -167,7 +165,6 @@ class ServiceLines:
     unmatched: deque[bytes] = field(default_factory=lambda: deque(maxlen=_MOST_UNMATCHED))
     said: set[str] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
-    spent_s: float = 0.0
     is_over: bool = False
     """Whether nothing more is to be matched."""
     unfinished: bytes = b""
@@ -206,40 +203,27 @@ class ServiceLines:
     def _printed(self, line: bytes, is_finished: bool) -> list[Printed]:
         found = []
         for pattern in self.patterns if len(line) <= MAX_LINE else ():
-            if self.is_over or self.spent_s > BUDGET_S:
+            if self.is_over:
                 break
-            before = time.thread_time()
             try:
                 printed = pattern.printed(line)
             except NoValue as error:
                 key, _, _ = str(error).partition(" ")
                 what = f"is not a valid {pattern.line.message}"
                 if is_finished:
-                    self.say_once(f"{what} {key}", f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")
+                    self._say_once(f"{what} {key}", f"a line of '{self.service}' {what}: {error}: '{_shown(line)}'")
                 continue
-            finally:
-                self.spent_s += time.thread_time() - before
             if printed is not None:
                 found.append(printed)
-        if self.spent_s > BUDGET_S:
-            self.is_over = True
-            self.say_once("over", f"{self._over}: what it prints from then on is log")
         return found
 
-    @property
-    def _over(self) -> str:
-        return f"the patterns of '{self.service}' took more than {BUDGET_S:g} s for its lines"
-
-    def say_once(self, key: str, sentence: str) -> None:
-        """What is wrong with a line, unless the same is said already, by its ``key``."""
+    def _say_once(self, key: str, sentence: str) -> None:
         if key not in self.said:
             self.said.add(key)
             self.notes.append(sentence)
 
     def silence(self, unfinished: bytes = b"") -> str:
         """What it printed instead of a match since the last one, in words."""
-        if self.spent_s > BUDGET_S:
-            return self._over
         since = "since its last match " if self.matched else ""
         if unfinished.strip() and unfinished != self.unfinished:
             return f"{since}'{self.service}' printed a line without its end: '{_shown(unfinished)}'"

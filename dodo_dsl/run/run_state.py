@@ -1,9 +1,8 @@
 """The state of one test while it runs: how far it is, and what decides it."""
 
 import signal
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from dodo_dsl.application.ros_topics import BRIDGE
 from dodo_dsl.check.senders import told_in_words
@@ -356,28 +355,12 @@ def pictured_by(plan: Plan) -> list[str]:
 
 @dataclass(frozen=True)
 class Standing:
-    """The ``seconds`` of its own time that a test has reached, and the check nearest to its limit, in words.
-
-    In real time its time goes on by itself, and this is that of its start, 0. Checks are known when their evaluator has
-    judged, so that ``nearest`` is empty if there is only one.
-    """
+    """The ``seconds`` of its own time that a test has reached; in real time that goes on by itself, from 0."""
 
     seconds: float
     is_lockstep: bool
-    nearest: str = ""
 
 
 def standing(state: RunState) -> Standing:
     """How far a test is, by what is known now."""
-    judged = (check for verdicts in state.facts.verdicts.values() for verdict in verdicts for check in verdict.checks)
-    seconds = state.time.seconds if state.time else 0.0
-    return Standing(seconds, state.plan.lockstep is not None, _nearest(judged))
-
-
-def _nearest(checks: Iterable[Mapping[str, Any]]) -> str:
-    known = [check for check in checks if check.get("margin_share") is not None]
-    if not known:
-        return ""
-    check = min(known, key=lambda each: float(each["margin_share"]))
-    unit = check.get("unit") or ""
-    return f"{check['name']} {check['value']:.4g} {unit}".rstrip() + f", margin {check['margin']:.4g} {unit}".rstrip()
+    return Standing(state.time.seconds if state.time else 0.0, state.plan.lockstep is not None)

@@ -43,56 +43,51 @@ class Inbox(Protocol):
         ...
 
 
-class Clock(Protocol):
+class Clock:
     """Test time, in microseconds since the epoch.
 
     ``relays``: messages come from the clock, not from the bus, and are sent at the test's time.
     """
 
-    relays: bool
+    relays = False
 
     @property
     def has_new_picture(self) -> bool:
         """Whether there is a picture that is not announced yet."""
-        ...
+        return False
 
     def now(self) -> int:
         """The time of the test."""
-        ...
+        raise NotImplementedError
 
     def steps(self, period: Fraction | int, inbox: Inbox, stopped: Callable[[], bool]) -> Iterator[int]:
         """The instants at which a service is due, one each ``period`` microseconds; messages come in between.
 
         Ends soon after ``stopped``, which a message or a signal can make true.
         """
-        ...
+        raise NotImplementedError
 
     def sent(self, envelope: Envelope) -> None:
         """The service has sent this message."""
-        ...
 
     def expect(self, time: int) -> None:
         """The service will show its next picture at this time (us) and none before; 0 when it does not know."""
-        ...
 
     def memory(self, name: str, size: int) -> SharedMemory:
         """New shared memory for pictures that are sampled by this clock; raises SharedMemoryError."""
-        ...
+        raise NotImplementedError
 
     def close(self, stopped: Callable[[], bool]) -> None:
         """The service ends; its last pictures can be read until ``stopped``."""
-        ...
 
 
-class RealTimeClock:
+class RealTimeClock(Clock):
     """Test time is the wall clock's at the start, and goes on evenly even if that is set.
 
     Steps are the scheduled instants, not the moments at which the processor got to them: a service that is late
     catches up with the times that it would have had, and skips steps only when it is more than 1 s late.
     """
 
-    relays = False
-    has_new_picture = False
     _has_memory = False
 
     def __init__(self) -> None:
@@ -111,12 +106,6 @@ class RealTimeClock:
             yield due
             number += 1
             number += self._skipped(start + round(number * period), period)
-
-    def sent(self, envelope: Envelope) -> None:
-        """Nothing to do: time goes on by itself."""
-
-    def expect(self, time: int) -> None:
-        """Nothing to do: time goes on evenly."""
 
     def memory(self, name: str, size: int) -> SharedMemory:
         self._has_memory = True

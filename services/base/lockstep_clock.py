@@ -11,7 +11,7 @@ them on: with the sample time of the frame, and without surplus answers. They ar
 the bus, which does not count here.
 """
 
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -26,7 +26,7 @@ from dodo_dsl.opendlv.posix_memory import PosixSegment
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import LOCK_PATIENCE, SharedMemory
 from dodo_dsl.opendlv.sysv_memory import Segment
-from services.base.clock import Inbox, look_until
+from services.base.clock import Clock, Inbox, look_until
 from services.base.clock_link import ClockClient
 
 _POLL_S = 0.0002
@@ -125,9 +125,7 @@ class Observer:
     def __init__(self, marked: Callable[[int, Sequence[Envelope]], Iterable[Envelope]] | None = None) -> None:
         self._marked = marked
         self._collected: list[Envelope] = []
-        self._relayed: deque[set[_Key]] = deque()
-        self._counts: Counter[_Key] = Counter()
-        """In how many of the sets each key is."""
+        self._relayed: deque[set[_Key]] = deque(maxlen=_REMEMBERED)
 
     def collect(self, envelope: Envelope) -> None:
         """An envelope that was on the bus."""
@@ -139,8 +137,7 @@ class Observer:
         The answer to this one, and what belongs to later ones, waits: whether it is there already is chance.
         """
         own = [envelope for envelope in relayed if not envelope.received]
-        keys = {_key(envelope) for envelope in own}
-        self._remember(keys)
+        self._relayed.append({_key(envelope) for envelope in own})
         collected, self._collected = self._collected, []
         for envelope in collected:
             if until <= envelope.sample_time <= EPOCH + LONGEST:
@@ -157,17 +154,8 @@ class Observer:
                 inbox.observe(envelope)
         self._collected = []
 
-    def _remember(self, keys: set[_Key]) -> None:
-        self._relayed.append(keys)
-        self._counts.update(keys)
-        if len(self._relayed) > _REMEMBERED:
-            for key in self._relayed.popleft():
-                self._counts[key] -= 1
-                if not self._counts[key]:
-                    del self._counts[key]
-
     def _is_known(self, key: _Key) -> bool:
-        return key in self._counts
+        return any(key in keys for keys in self._relayed)
 
 
 def _key(envelope: Envelope) -> _Key:
@@ -214,7 +202,7 @@ class StepSource(Protocol):
     def close(self) -> None: ...
 
 
-class LockstepClock:
+class LockstepClock(Clock):
     """Test time in the clock service's steps; ``name`` is the service's name in the test.
 
     Steps come from ``source``, by default from the clock service.

@@ -99,15 +99,12 @@ def _key(envelope: Envelope) -> Envelope:
     return envelope._replace(sent=0, received=0)
 
 
-class RecordingClock:
+class RecordingClock(Clock):
     """Test time goes from message to message of a recording; nothing waits. Raises OSError.
 
     Instants begin with the first message, not with the start of the service, which is in no recording. They end where
     recording ended.
     """
-
-    relays = False
-    has_new_picture = False
 
     def __init__(self, path: Path, messages: MessageSet) -> None:
         self._path, self._end_id = path, messages.id(RECORDING_END)
@@ -132,17 +129,8 @@ class RecordingClock:
             if stopped():
                 return
 
-    def sent(self, envelope: Envelope) -> None:
-        """It goes nowhere."""
-
-    def expect(self, time: int) -> None:
-        """There are no pictures."""
-
     def memory(self, name: str, size: int) -> SharedMemory:
         raise SharedMemoryError(f"a recording has no shared memory '{name}'")
-
-    def close(self, stopped: Callable[[], bool]) -> None:
-        """There is nothing to wait for."""
 
     def _arrivals(self) -> Iterator[Envelope]:
         """All messages, the end of the recording as one that was received then."""
