@@ -47,16 +47,6 @@ def test_without_a_compiler_it_says_what_to_install(unbuilt: Path, monkeypatch: 
         built()
 
 
-def test_sources_that_do_not_compile_leave_nothing(unbuilt: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    native = unbuilt / "services/clock/native"
-    native.mkdir(parents=True)
-    (native / "Makefile").write_text("all:\n\techo no >$(BUILD)/dodo-time\n\techo broken >&2; exit 1\n")
-    monkeypatch.setattr(package_data, "services", lambda: unbuilt / "services")
-    with pytest.raises(BackendError, match="DoDo's library cannot be built: broken"):
-        built()
-    assert not list(unbuilt.glob("dodo/*/dodo-time"))
-
-
 def test_programs_get_library_folder_and_number_beside_what_is_their_own() -> None:
     services = (ApplicationService("eye"), ApplicationService("driver"))
     test = plan()

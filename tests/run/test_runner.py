@@ -194,33 +194,6 @@ def test_a_machine_that_stays_too_busy_is_an_error(scene: Scene, retries: int) -
     assert len(a.notes) == retries + 1
 
 
-@pytest.mark.parametrize(("verdict", "began"), [(FAILED, ["a", "b"]), (PASSED, ["a", "b", "c", "a"])])
-def test_a_busy_machine_stops_no_run_and_fail_fast_stops_the_second_attempts(
-    scene: Scene, verdict: VerdictEvent, began: list[str]
-) -> None:
-    scene.policy, scene.capacity = Policy(fail_fast=True), 1
-
-    def make(tested: Plan, attempt: int) -> ScriptedBackend:
-        return always_too_busy(tested, attempt) if tested.slug == "a" else ScriptedBackend(tested, drives(1.0, verdict))
-
-    scene.backends.make = make
-    outcomes = scene.run(*plans("abc"))
-    assert (scene.backends.began, outcomes[0].reason) == (began, TOO_BUSY)
-    assert bool(outcomes[0].notes) == (verdict is PASSED)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "reason", "began"),
-    [(4.0, TOO_BUSY, ["a", "b"]), (8.5, "the run was interrupted", ["a", "b", "a"])],
-    ids=["before the second attempt", "during it"],
-)
-def test_a_signal_ends_the_second_attempts(crowded: Scene, seconds: float, reason: str, began: list[str]) -> None:
-    crowded.signals = ((seconds, signal.SIGINT),)
-    a, _ = crowded.run(*plans("ab"))
-    assert (a.outcome, a.reason, crowded.backends.began) == ("error", reason, began)
-    assert crowded.backends.closed == 1
-
-
 def test_a_kept_test_is_explained_and_not_tried_again(scene: Scene) -> None:
     scene.backends.make = always_too_busy
     assert endings(scene.run(plan("a"), keep=True)) == [("a", "error", TOO_BUSY)]
@@ -237,16 +210,6 @@ def test_errors_alone_are_retried(
     scene.policy, scene.backends.make = Policy(retries=retries), by_slug(a=stages)
     (outcome,) = scene.run(plan("a"))
     assert (outcome.outcome, len(outcome.notes), scene.backends.began) == (expected, attempts - 1, ["a"] * attempts)
-
-
-def test_a_report_that_cannot_be_moved_ends_the_retries_of_its_test_alone(logged: Scene) -> None:
-    (logged.folder / "report" / "a" / "attempts").mkdir(parents=True)
-    (logged.folder / "report" / "a" / "attempts" / "1").write_text("in the way")
-    logged.policy = Policy(retries=3)
-    a, b = logged.run(*plans("ab"))
-    assert (a.outcome, b.outcome) == ("error", "failed")
-    assert a.notes[0] == f"attempt 1 ended in error: {CRASHED}"
-    assert a.notes[1].startswith("not retried, because its report cannot be moved: ")
 
 
 @pytest.mark.parametrize(

@@ -46,21 +46,6 @@ def test_a_context_holds_nothing_that_no_application_sees(repository: Path, tmp_
     assert Path(found["build"]["context"]).name == repository.name
 
 
-def test_so_do_named_contexts_and_others_stay_where_they_are(repository: Path, tmp_path: Path) -> None:
-    own = str(repository)
-    others = {"same": own, "data": f"{own}/data", "base": "docker-image://python", "s": "service:b"}
-    build = _built(repository, {"context": own, "additional_contexts": others}, tmp_path / "copies")["build"]
-    assert build["additional_contexts"] == {**others, "same": build["context"]}
-    for context in (f"{own}/data", "https://example.org/a.git"):
-        assert _built(repository, {"context": context}, tmp_path / "copies")["build"]["context"] == context
-
-
-def test_a_dockerfile_may_be_kept_among_the_tests(repository: Path, tmp_path: Path) -> None:
-    build = {"context": str(repository), "dockerfile": "tests/map.json"}
-    found = _built(repository, build, tmp_path / "copies")["build"]["dockerfile"]
-    assert found == str(repository / "tests" / "map.json")
-
-
 @pytest.mark.parametrize("context", ["tests", "link", ".git", "sub/.git", "dodo-report"])
 def test_hidden_folders_are_no_context(context: str, repository: Path, tmp_path: Path) -> None:
     with pytest.raises(

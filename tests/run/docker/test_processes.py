@@ -2,8 +2,6 @@
 
 import asyncio
 import contextlib
-import tempfile
-import threading
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +12,7 @@ from docker.errors import APIError
 
 from dodo_dsl.application.model import SANDBOX
 from dodo_dsl.run.docker import container_use
-from dodo_dsl.run.docker.beside_processes import covers, uncovered
+from dodo_dsl.run.docker.beside_processes import uncovered
 from dodo_dsl.run.docker.container_use import ContainerUse
 from dodo_dsl.run.docker.side import ContainerSide
 from dodo_dsl.run.machine_load.service_use import Used
@@ -93,24 +91,6 @@ def test_a_test_on_the_network_of_another_host_does_not_begin(
         asyncio.run(begin())
 
 
-def test_one_thread_at_a_time_measures(proc: Proc) -> None:
-    """Another may have been given up, and still be at it."""
-    both, met = threading.Barrier(2), []
-
-    class Slow(Container):
-        def reload(self) -> None:
-            with contextlib.suppress(threading.BrokenBarrierError):
-                met.append(both.wait(0.1))
-
-    use = ContainerUse({"app": Slow("c0ffee", 0)}, proc=proc.root)
-    threads = [threading.Thread(target=use.take) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not met
-
-
 OF_1, OF_2 = "rss 5\nshmem 6\ntotal_rss 5000000\ntotal_shmem 1000000\n", "anon 5000000\nfile 777\nshmem 1000000\n"
 STATS = {
     "cpu_stats": {"cpu_usage": {"total_usage": 2_500_000_000}},
@@ -186,13 +166,3 @@ def test_what_is_mounted_over_shared_memory_is_named_where_the_test_needs_it(own
     container["Mounts"] = [*container["Mounts"], {"Destination": "/dev/shm/folder-of-services"}]
     assert uncovered(container) == hidden
     assert uncovered({"Mounts": container["Mounts"][-1:], "HostConfig": {}}) == ""
-
-
-def test_only_folders_are_covered() -> None:
-    """A file in the place of a folder would keep the container from starting."""
-    with tempfile.TemporaryDirectory(dir="/tmp") as name, tempfile.NamedTemporaryFile(dir="/tmp") as file:
-        volume, cover = covers([Path(name), Path(file.name), Path("/tmp/there-is-none")])
-        assert cover["target"] == f"{volume['target']}/{Path(name).name}"
-        assert (volume["source"], volume["read_only"]) == ("tmp", True)
-        assert covers([Path(name)])[0]["target"] != volume["target"]
-    assert covers([Path("/tmp/there-is-none")]) == []

@@ -11,10 +11,8 @@ from dodo_dsl.outcome import MachineLoad, ServiceUse, Wait
 from dodo_dsl.run.machine_load.meter import (
     FIRST_PERIOD_S,
     LAST_PATIENCE_S,
-    MOST_PERIOD_S,
     Meter,
     growth,
-    period_s,
 )
 from dodo_dsl.run.machine_load.service_use import Snapshot, Used
 from tests.run.scripted import load, run
@@ -76,22 +74,6 @@ def test_processes_that_came_and_went_may_have_been_the_others() -> None:
     assert (found.crowded_s, found.application.displaced_s) == (6.0, pytest.approx(1.8))
 
 
-def test_the_service_that_others_kept_waiting_the_longest_is_named() -> None:
-    """One waits more, but in the second half others have left."""
-    used = [{"a": Used(0.1 * n, 0.2 * n), "b": Used(0.1 * n, 0.1 * n + 0.8 * max(n - 5, 0))} for n in range(11)]
-    found = added((Snapshot(float(n), used[n], 2, 1.8 * min(n, 5)) for n in range(11)), lambda _: True).load()
-    assert found is not None and found.application is not None
-    assert (found.application.longest, found.crowded_s) == ("a", 5.0)
-    assert found.application.displaced_s == pytest.approx(1.0)
-    assert found.services == Wait(0.0, 0.0, 0.0, "")
-
-
-def test_two_snapshots_of_the_machine_at_least() -> None:
-    at = load(0.5)
-    assert [added(few).load() for few in ([], [at(1.0)], [at(1.0)] * 2)] == [None] * 3
-    assert added(replace(at(float(n)), busy_s=None) for n in range(9)).load() is None
-
-
 def test_snapshots_are_taken_from_begin_to_end() -> None:
     async def scene() -> list[float]:
         times: list[float] = []
@@ -107,11 +89,6 @@ def test_snapshots_are_taken_from_begin_to_end() -> None:
         return [time_s / FIRST_PERIOD_S for time_s in times]
 
     assert run(scene()) == pytest.approx([0.0, 1.0, 2.0, 2.5])
-
-
-def test_a_long_test_is_looked_at_less_often() -> None:
-    assert [period_s(t) for t in (0.0, 1.0, 1000.0)] == [FIRST_PERIOD_S, FIRST_PERIOD_S, MOST_PERIOD_S]
-    assert [period_s(0.0, took_s) for took_s in (0.02, 9.0)] == pytest.approx([0.06, MOST_PERIOD_S])
 
 
 def test_a_backend_that_does_not_answer_holds_up_nothing_for_long() -> None:
@@ -150,18 +127,6 @@ def test_growth(sizes: list[float], expected: float) -> None:
     assert found == (pytest.approx(expected, rel=0.02) if isinstance(expected, float) else expected)
 
 
-def test_a_test_that_stands_still_counts_by_its_time() -> None:
-    """As in lockstep, where the last answer does not come for two seconds."""
-    drive = [(0.1 * n, 100 * MB + n * 20 * MB) for n in range(11)]
-    assert growth([*[(0.0, MB)] * 50, *drive, *[drive[-1]] * 200]) == pytest.approx(200 * MB)
-    assert growth([(1.0, n * 50 * MB) for n in range(6)]) is None, "no time has passed"
-
-
-@pytest.mark.parametrize(("count", "expected"), [(0, None), (1, None), (3, None), (6, pytest.approx(500 * MB))])
-def test_a_few_frames_tell(count: int, expected: float | None) -> None:
-    assert growth([(0.1 * n, n * 50 * MB) for n in range(count)]) == expected
-
-
 @pytest.mark.parametrize(("step", "expected"), [(6, None), (5, pytest.approx(5 * MB, rel=0.1))])
 def test_between_two_times_of_a_clock_in_steps_nobody_knows(step: int, expected: float | None) -> None:
     """As in lockstep, where ten pictures pass in a quarter of a second: a step then stands still for two."""
@@ -182,12 +147,3 @@ def test_figures_are_by_the_test_s_own_time() -> None:
     (use,) = added(snapshots, test_s=lambda: next(times)).figures(["a", "b"])
     expected = ServiceUse("a", 5.0, pytest.approx(0.05), 900_000_000, pytest.approx(MB, rel=0.01), 2_000_000_000)
     assert (use, added([]).figures(["a"])) == (expected, ())
-
-
-def test_a_service_that_ended_has_grown_until_then() -> None:
-    size = [n * 1_000_000 if n < 50 else 0 for n in range(100)]
-    times = iter(0.1 * n for n in range(100))
-    taken = (Snapshot(0.0, {"b": Used(memory=7), "a": Used(memory=size[n])}) for n in range(100))
-    first, second = added(taken, test_s=lambda: next(times)).figures(["a", "b"])
-    assert (first.memory_growth_bytes_per_s, first.memory_limit_bytes) == (pytest.approx(10 * MB), None)
-    assert (second.service, second.memory_growth_bytes_per_s) == ("b", 0.0)

@@ -2,14 +2,12 @@
 
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.machine_load.processes import above, memory
-from dodo_dsl.run.machine_load.service_use import Snapshot, Used, UseReader, busy_s
-from dodo_dsl.run.process.children import Children
+from dodo_dsl.run.machine_load.processes import memory
+from dodo_dsl.run.machine_load.service_use import Snapshot, UseReader, busy_s
 
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 MB = 1 << 20
@@ -131,30 +129,6 @@ def test_what_processes_share_counts_once(proc: Proc) -> None:
     assert proc.megabytes() == pytest.approx(50, abs=1e-5), "one has ended meanwhile"
 
 
-def test_system_v_memories_count_beside_what_is_mapped(proc: Proc, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the service that made them; those of a creator that has ended, in own namespaces."""
-    proc.put(10, 1, megabytes=3)
-    (proc.root / "sysvipc").mkdir()
-    rows = ((10, 0, 50), (10, 1, 7), (1, 0, 900), (77, 0, 9))
-    text = "".join(f"{pid} {users} {size * MB} {MB}\n" for pid, users, size in rows)
-    (proc.root / "sysvipc" / "shm").write_text(f"cpid nattch rss swap\n{text}")
-    (proc.root / "1").mkdir()
-    assert proc.megabytes() == 62
-    (proc.root / "loadavg").write_text("1 1 1 1/9 4711\n")
-    monkeypatch.setattr(os, "getpid", lambda: 1)
-    assert proc.megabytes() == 72
-
-
-def test_who_uses_more_memory_than_it_may(proc: Proc) -> None:
-    """With what it started, and exactly: shared pages count once."""
-    for pid, parent, shares in ((10, 1, 40), (11, 10, 40), (20, 1, 90), (30, 2, 90)):
-        proc.put(pid, parent, megabytes=90, shares=shares)
-    services = {10: "app", 20: "other"}
-    assert above({"app": 80 * MB, "other": 91 * MB}, services, proc.root) == {}
-    assert above({"app": 79 * MB, "other": 89 * MB}, services, proc.root) == {"app": 80 * MB, "other": 90 * MB}
-    assert above({"app": 1}, {77: "app"}, proc.root) == {}, "it has ended"
-
-
 STAT = "cpu  9 9\ncpu0 100 20 300 9999 9999 4 5 60 8888 7777\ncpu1 1 1 1 9999 9999 1 1 1 0 0\ncpu10 7 7 7\nintr 5\n"
 
 
@@ -175,20 +149,3 @@ def test_what_only_a_descriptor_holds_counts_once() -> None:
     assert 50 < (memory([os.getpid()], []) - before) / MB < 100
     os.close(file)
     os.close(copy)
-
-
-@pytest.mark.parametrize("is_counted", [True, False])
-def test_what_ended_is_the_applications(tmp_path: Path, is_counted: bool) -> None:
-    """With all that it waited for; where nobody counts the rest, what began and ended may be the application's."""
-    ended: list[str] = []
-    children = Children(lambda name, _: ended.append(name))
-    children._is_all_counted = is_counted
-    inner = "import time\nwhile time.process_time() < 0.1: pass"
-    code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {inner!r}])"
-    with (tmp_path / "log").open("w") as log:
-        children.start("app", [sys.executable, "-c", code], {}, str(tmp_path), log.fileno())
-    while not ended:
-        children.reap()
-    found = children.with_ended(Snapshot(1.0, {"app": Used(), "camera": Used(7.0)}, changes=3))
-    assert found.services["app"].processor_s > 0.1
-    assert (found.services["camera"].processor_s, found.changes) == (7.0, 0 if is_counted else 3)

@@ -16,7 +16,6 @@ import pytest
 
 from dodo_dsl.run import capabilities, leases
 from dodo_dsl.run.process import host_isolation, leftovers
-from dodo_dsl.run.process.fork_server_client import ForkServer
 from dodo_dsl.run.process.host_isolation import host_slot, isolation_refusal
 from dodo_dsl.run.process.slot import SLOT_VARIABLE, Slot
 from dodo_dsl.run.protocol import BackendError
@@ -118,24 +117,6 @@ def test_what_a_killed_run_left_is_removed(cid: int, folder: Path) -> None:
         assert (mine.wait(), other.poll()) == (-15, None)
     assert list(Path("/tmp").glob(f"{name}*")) == list(folder.glob("*.lease")) == []
     assert leftovers.reap() == []
-
-
-@pytest.mark.parametrize("slot", ["", "/etc/passwd", "dodo-", "*", None])
-def test_a_strange_record_removes_nothing_but_itself(slot: object, folder: Path) -> None:
-    lease = leases.try_lease("cid-121", {"test": "strange", "slot": slot})
-    assert lease is not None
-    lease.leave()
-    assert leftovers.reap() == []
-    assert list(folder.glob("*.lease")) == []
-
-
-@pytest.mark.slow
-def test_a_fork_server_answers_as_a_sandbox_of_its_own_does() -> None:
-    server = ForkServer()
-    try:
-        assert asyncio.run(isolation_refusal(server)) == asyncio.run(isolation_refusal())
-    finally:
-        server.close()
 
 
 BLAMES = re.compile("install bubblewrap|allow user namespaces|make namespaces")

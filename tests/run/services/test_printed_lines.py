@@ -2,13 +2,9 @@
 
 import asyncio
 import math
-import os
 import random
-import resource
 import time
-from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,8 +13,7 @@ from dodo_dsl.application.printed_lines import PatternError, compiled
 from dodo_dsl.opendlv.envelope import Envelope, decode_frame
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.plan.model import Line
-from dodo_dsl.run.printed_lines import MAX_LINE, LinePattern, NoValue, PrintedLines, sample_time, value
-from dodo_dsl.run.service_output import ServiceOutput
+from dodo_dsl.run.printed_lines import NoValue, PrintedLines, sample_time, value
 from tests.run.helpers import Bench
 
 STEERING = "opendlv.proxy.GroundSteeringRequest"
@@ -121,15 +116,6 @@ def test_lines_for_a_terminal_are_the_messages_of_plain_ones(desk: Desk) -> None
     assert desk.silence() == "since its last match 'app' printed no line"
     desk.print(b"\x1b[1mgroup_0X;\x1b[m")
     assert desk.silence() == "since its last match no line of 'app' matched, the nearest is 'group_0X;'"
-
-
-@pytest.mark.parametrize(
-    "match", ["\x1b\\[32m(?P<groundSteering>[0-9.]+)", "(?:\x1b\\[[0-9]*m)?(?P<groundSteering>[0-9.]+)"]
-)
-def test_a_pattern_may_know_the_colours(tmp_path: Path, match: str) -> None:
-    assert [found for _, _, found in Desk(tmp_path, Line(match, STEERING)).print(b"\x1b[32m0.5\x1b[m")] == [
-        {"groundSteering": 0.5}
-    ]
 
 
 def test_without_a_sample_time_it_is_of_now(tmp_path: Path) -> None:
@@ -265,14 +251,6 @@ def test_what_does_not_convert_is_said_once_and_is_no_message(desk: Desk) -> Non
     ]
 
 
-def test_a_message_that_is_too_large_is_said_once(tmp_path: Path) -> None:
-    desk = Desk(tmp_path, Line("(?P<s>x+)", "t.All"), messages=TYPES)
-    assert len(desk.print(b"x" * 10_000)) == 1
-    assert desk.print(b"x" * MAX_LINE, b"x" * MAX_LINE) == []
-    (said,) = desk.said
-    assert said.startswith("a line of 'app' is not a valid t.All: it has more than 32768 bytes: 'xxx")
-
-
 def test_silence_in_words(desk: Desk) -> None:
     assert desk.silence() == "'app' printed no line"
     desk.print(b"ready", b"group_06,1584542902573412,0.04\x1b", b"bye")
@@ -285,79 +263,6 @@ def test_silence_in_words(desk: Desk) -> None:
     desk.print(b"group_06;nan;0.5", b"done")
     assert desk.silence() == "since its last match no line of 'app' matched, the nearest is 'group_06;nan;0.5'"
     assert [each.never for each in desk.lines.unmatched({})] == [False]
-
-
-def fuzzed(count: int) -> Iterable[bytes]:
-    """Lines that are nearly of the form, far from it, huge, or garbage; each tenth is as it should be."""
-    choose = random.Random(36)
-    good = b"group_06;%d;0.5"
-    for number in range(count):
-        line = bytearray(good % number)
-        if number % 10:
-            for _ in range(choose.randrange(1, 6)):
-                place = choose.randrange(len(line) + 1)
-                line[place : place + choose.randrange(3)] = choose.randbytes(choose.randrange(4))
-        if number % 5000 == 1:
-            line *= choose.randrange(1, 4000)
-        yield bytes(line).replace(b"\n", b"\t") + choose.choice((b"\n", b"\r\n"))
-
-
-def fuzz(folder: Path, count: int, terminal: bool) -> tuple[int, int]:
-    """How many messages lines made that were written in pieces, and by how many KiB memory grew after the first."""
-    plan_lines = Desk(folder, GROUP_06)
-    made = {"valid": 0}
-    messages = plan_lines.messages
-    steering = messages.id(STEERING)
-
-    def count_frame(frame: bytes, to: object = ()) -> None:
-        envelope = decode_frame(frame)
-        if envelope.data_type == steering:
-            made["valid"] += fields(messages, envelope) == {"groundSteering": 0.5}
-
-    plan_lines.lines.connect(count_frame)
-
-    async def scene() -> int:
-        match = partial(plan_lines.lines.match, "app")
-        output = ServiceOutput(folder / "app.log", lambda _: False, terminal, match=match)
-        choose, waiting, began = random.Random(7), b"", 0
-        os.set_blocking(output.writer, False)
-
-        async def write(data: bytes) -> None:
-            while data:
-                try:
-                    data = data[os.write(output.writer, data[: choose.randrange(1, 4096)]) :]
-                except BlockingIOError:  # a terminal holds 4 KiB
-                    await asyncio.sleep(0.0002)
-                await asyncio.sleep(0)
-
-        for number, line in enumerate(fuzzed(count)):
-            waiting += line
-            if len(waiting) > 3000:
-                await write(waiting)
-                waiting = b""
-            if number == count // 5:
-                began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        await write(waiting)
-        output.release_writer()
-        await asyncio.wait_for(output.done.wait(), 60)
-        output.close()
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - began
-
-    grown = asyncio.run(scene())
-    return made["valid"], grown
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("terminal", [False, True], ids=["pipe", "terminal"])
-def test_fuzzed_lines(tmp_path: Path, terminal: bool) -> None:
-    valid, grown = fuzz(tmp_path, 10_000, terminal)
-    assert valid >= 1_000
-    assert grown < 32 << 10
-
-
-def test_patterns_have_only_the_messages_that_they_name() -> None:
-    with pytest.raises(KeyError):
-        LinePattern(Line("(?P<x>.)", "a.B"), MessageSet.standard())
 
 
 def test_a_large_pattern_is_refused_as_the_time_of_a_line_grows_with_it_too() -> None:

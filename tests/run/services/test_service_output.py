@@ -84,11 +84,6 @@ def test_a_long_line_is_in_the_log_and_its_begin_in_the_tail(tmp_path: Path) -> 
     assert read.tail == ["before", "x" * 300, "after", "end"]
 
 
-def test_bytes_that_are_not_utf_8_are_replaced_in_the_tail(tmp_path: Path) -> None:
-    read = Read(tmp_path, [b"caf\xe9\n"])
-    assert (read.log, read.tail) == (b"caf\xe9\n", ["caf\N{REPLACEMENT CHARACTER}"])
-
-
 def test_lines_count_beyond_the_limit_of_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(service_output, "_MAX_LOG", 1 << 20)
     lines = b"".join(b"%07d\n" % n for n in range(200_000))
@@ -102,23 +97,6 @@ def test_lines_count_beyond_the_limit_of_the_log(tmp_path: Path, monkeypatch: py
 def test_a_service_that_keeps_its_output_open_is_not_waited_for(tmp_path: Path) -> None:
     read = Read(tmp_path, [b"a\n", b"b"], is_hung=True)
     assert (read.lines, read.log) == ([b"a", b"b"], b"a\nb")
-
-
-def test_a_log_that_cannot_be_written_is_said_in_the_tail(small_disk: Path) -> None:
-    with pytest.raises(OSError, match="No space left"):
-        (small_disk / "rest").write_bytes(bytes(100_000))
-    lines: list[bytes] = []
-
-    async def scene() -> list[str]:
-        output = ServiceOutput(small_disk / "app.log", lambda line: lines.append(line) is not None)
-        os.write(output.writer, b"a\nb\n")
-        output.release_writer()
-        await asyncio.wait_for(output.done.wait(), 10)
-        output.close()
-        return output.tail()
-
-    assert asyncio.run(scene())[-1] == "... dodo: the log cannot be written: No space left on device"
-    assert lines == [b"a", b"b"]
 
 
 def test_a_terminal_is_read_empty_where_its_program_rests(tmp_path: Path) -> None:
@@ -189,20 +167,3 @@ def test_another_terminal_says_what_was_printed_until_now(tmp_path: Path) -> Non
     finally:
         service_output._ECHO_S = before
     assert b"^R" not in (tmp_path / "app.log").read_bytes()
-
-
-def test_handing_over_stops_reading_and_keeps_pipe_and_log(tmp_path: Path) -> None:
-    lines: list[bytes] = []
-
-    async def scene() -> tuple[bytes, str]:
-        output = ServiceOutput(tmp_path / "app.log", lambda line: lines.append(line) is not None)
-        reader, log = output.hand_over()
-        os.write(output.writer, b"later\n")
-        await asyncio.sleep(0)
-        os.write(log, b"by another\n")
-        data = os.read(reader, 100)
-        output.release_writer()
-        output.close()
-        return data, (tmp_path / "app.log").read_text()
-
-    assert (asyncio.run(scene()), lines) == ((b"later\n", "by another\n"), [])

@@ -6,14 +6,11 @@ import socket
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from dodo_dsl.opendlv.packets import RUNNER_SOCKET, Connection
-from dodo_dsl.outcome import Response, with_margin
+from dodo_dsl.outcome import Response
 from dodo_dsl.run.protocol import (
     Event,
     Foreign,
@@ -170,56 +167,6 @@ def test_what_the_clock_says(text: str) -> None:
 )
 def test_other_lines_are_log(text: bytes) -> None:
     assert read("track", True, text) is None
-
-
-NAMES = st.text(st.characters(blacklist_categories=("Cs",)), min_size=1, max_size=20)
-FINITE = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**9), 10**9)
-CHECKS = st.fixed_dictionaries(
-    {
-        "name": NAMES,
-        "value": st.none() | FINITE,
-        "limit": st.dictionaries(st.sampled_from(["min", "max"]), FINITE),
-        "unit": st.just("") | NAMES,
-        "ok": st.booleans(),
-    }
-)
-
-
-@settings(max_examples=50)
-@given(st.booleans(), NAMES, st.lists(CHECKS, max_size=4), st.booleans())
-def test_every_well_formed_verdict_is_taken(
-    passed: bool, reason: str, checks: list[dict[str, Any]], ascii_: bool
-) -> None:
-    document = {"dodo": "verdict", "outcome": "passed" if passed else "failed", "reason": reason, "checks": checks}
-    text = json.dumps(document, ensure_ascii=ascii_).encode()
-    expected = VerdictEvent("track", passed, reason, tuple(map(with_margin, checks)))
-    assert read("track", True, b" " + text + b"\r\n") == expected
-
-
-@given(st.binary(max_size=200) | st.text(max_size=100).map(lambda t: ('{"dodo": ' + t).encode("utf-8", "replace")))
-def test_any_line_is_read(raw: bytes) -> None:
-    for is_evaluator in (True, False):
-        read("dodo-clock", is_evaluator, raw)
-
-
-VALUES = st.recursive(
-    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
-    lambda inner: (
-        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from([*CHECK, "min", "max"]), inner, max_size=6)
-    ),
-    max_leaves=8,
-)
-KINDS = st.sampled_from(["verdict", "ready", "lost", "time", "stopped"]) | VALUES
-
-
-@given(
-    st.fixed_dictionaries(
-        {"dodo": KINDS}, optional=dict.fromkeys(("outcome", "reason", "checks", "messages", "seconds"), VALUES)
-    )
-)
-@pytest.mark.thorough
-def test_any_message_is_read(message: dict[str, Any]) -> None:
-    read("dodo-clock", True, json.dumps(message).encode())
 
 
 NOTE = b'{"dodo": "note", "text": "so"}'

@@ -1,11 +1,9 @@
 """The tiny service as a process on a real bus."""
 
-import logging
 import re
 import subprocess
 import sys
 import uuid
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,7 +15,6 @@ from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
-from services.base.process import LONGEST, published
 from tests.services.base.conftest import ROOT, Start
 from tests.services.process import receive
 
@@ -131,22 +128,6 @@ def test_a_source_that_runs_out_ends_the_judge(start: Start, cid: int) -> None:
     assert "DEBUG: the end has come" in err
 
 
-@pytest.mark.thorough
-def test_the_memory_of_a_source_stays_until_it_is_stopped(start: Start, cid: int) -> None:
-    name = f"dodo-test-{uuid.uuid4().hex}"
-    with Session(cid) as session:
-        source = start("--role=source", f"--name={name}", "--freq=1")
-        assert source.line() == READY
-        session.send(BEGIN())
-        assert source.line() == {"dodo": "end-of-input"}
-        assert heard(session, 2901)
-        with SharedMemory.attach(name):
-            assert source.process.poll() is None
-        source.stop()
-        assert source.end() == (0, "", "")
-        assert not Path("/tmp", name).exists()
-
-
 def test_messages_under_another_stamp_are_noted(start: Start, cid: int) -> None:
     with Session(cid) as session:
         service = start("--role=echo")
@@ -212,44 +193,6 @@ def test_starting_up_is_light() -> None:
 
 LOG = "opendlv.system.LogMessage"
 LAST = "the last line of this test"
-
-
-@pytest.fixture
-def sessions(cid: int) -> Iterator[tuple[Session, Session]]:
-    with Session(cid) as ours, Session(cid) as theirs:
-        yield ours, theirs
-
-
-def logged(session: Session, sender_stamp: int = 3) -> list[tuple[int, str]]:
-    """Severities and texts up to the last line."""
-    lines = []
-    while not lines or lines[-1][1] != LAST:
-        message = receive(session, LOG, sender_stamp)[1]
-        lines.append((message.level, message.description))
-    return lines[:-1]
-
-
-def test_each_line_with_its_severity(sessions: tuple[Session, Session]) -> None:
-    ours, theirs = sessions
-    log = logging.getLogger("published")
-    log.setLevel(logging.DEBUG)
-    with published(ours, 3):
-        log.debug("a %s", "detail")
-        log.info("a fact")
-        log.warning("odd\nthing")
-        log.error("x" * 2 * LONGEST)
-        log.warning(LAST)
-    log.warning("this is not reported to the runner")
-    assert logged(theirs) == [(7, "a detail"), (6, "a fact"), (4, "odd thing"), (3, "x" * LONGEST)]
-    assert theirs.receive(0.0) is None
-
-
-def test_the_error_that_ends_it(sessions: tuple[Session, Session]) -> None:
-    ours, theirs = sessions
-    with pytest.raises(ValueError, match="lost"), published(ours, 0):
-        raise ValueError("the rig is lost")
-    message = receive(theirs, LOG)[1]
-    assert (message.level, message.description) == (2, "the rig is lost")
 
 
 def test_a_service_says_on_the_bus_what_it_logs_where_it_is_asked_to(start: Start, cid: int) -> None:

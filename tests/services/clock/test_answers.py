@@ -3,7 +3,7 @@
 import pytest
 
 from dodo_dsl.opendlv.envelope import Envelope
-from services.clock.answers import MOST_SURPLUS, Answers, MessageFilter, filters
+from services.clock.answers import MOST_SURPLUS, Answers, MessageFilter
 from services.clock.exchange import ApplicationFloods
 
 STEER, PEDAL, BOX, READY = 1090, 1086, 1134, 1054
@@ -61,23 +61,6 @@ def test_an_answer_with_its_frames_sample_time_counts_however_early_it_is_heard(
     assert [e.payload for e in answers.collect()] == [b"swift", b"to this one"]
 
 
-def test_each_of_two_cameras_may_be_answered() -> None:
-    answers = Answers(REQUIRED)
-    show(answers, FRAME, FRAME + 7)
-    answers.take(said(STEER, FRAME))
-    answers.take(said(PEDAL, FRAME + 7))
-    assert answers.missing == []
-
-
-def test_nothing_counts_before_the_first_frame() -> None:
-    answers = Answers(REQUIRED, (MessageFilter("box", BOX),))
-    answers.take(said(STEER, ELSEWHEN))
-    answers.take(said(BOX, ELSEWHEN))
-    show(answers, FRAME)
-    assert answers.missing == ["steer", "pedal"]
-    assert answers.collect() == []
-
-
 def test_done_ends_the_answer_whatever_came() -> None:
     answers = answering(said(STEER, FRAME), done=MessageFilter("ready", READY, 2))
     answers.take(said(READY, FRAME, stamp=1))
@@ -110,30 +93,9 @@ def test_answers_under_another_stamp_are_no_answers_but_are_handed_on() -> None:
     assert answers.missing == []
 
 
-def test_one_who_answers_twice_drives_as_one_who_answers_once() -> None:
-    once = answering(said(STEER, FRAME, b"a"), said(PEDAL, FRAME, b"b"))
-    twice = answering(*(said(kind, FRAME, data) for kind, data in ((STEER, b"a"), (STEER, b"x"), (PEDAL, b"b"))))
-    twice.take(said(PEDAL, FRAME, b"y"))
-    assert once.collect() == twice.collect()
-
-
-def test_names_with_and_without_a_stamp() -> None:
-    assert filters(["a.B", "a.B/3"], {"a.B": 5}) == (MessageFilter("a.B", 5), MessageFilter("a.B/3", 5, 3))
-    for wrong in ("a.C", "a.B/x"):
-        with pytest.raises(ValueError, match="is not a message, expected a name such as"):
-            filters([wrong], {"a.B": 5})
-
-
 def test_a_flood_is_far_more_than_one_surplus_message_to_a_frame() -> None:
     answers = answering(said(STEER, FRAME), *[said(STEER, FRAME)] * MOST_SURPLUS)
     with pytest.raises(ApplicationFloods, match="more than 100 steers that nobody asked for"):
         answers.take(said(STEER, FRAME))
     answers.expect([NEXT])
     answers.take(said(STEER, FRAME))
-
-
-def test_an_application_is_silent_until_anything_that_matters_comes() -> None:
-    answers = answering(said(BOX, FRAME))
-    assert answers.is_silent
-    answers.take(said(PEDAL, ELSEWHEN))
-    assert not answers.is_silent

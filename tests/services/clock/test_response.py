@@ -1,13 +1,11 @@
 """How long answers took, and what is made of it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.clock.resting import ResponseTimes, processor_name
+from services.clock.resting import ResponseTimes
 
 times = st.lists(st.floats(0.0, 10.0), min_size=1, max_size=50)
 
@@ -37,20 +35,3 @@ def test_without_a_second_answer_there_is_nothing_to_report() -> None:
     response = ResponseTimes()
     response.add(1, 0.5)
     assert response.facts() == {}
-
-
-@pytest.mark.parametrize(
-    ("text", "name"),
-    [
-        ("processor\t: 0\nmodel name\t: Some CPU @ 2 GHz\ncpu MHz\t\t: 1999.6\n", "Some CPU @ 2 GHz, 2000 MHz"),
-        ("processor\t: 0\nBogoMIPS\t: 108.00\n\nHardware\t: BCM2835\nModel\t\t: Raspberry Pi 5\n", "Raspberry Pi 5"),
-        ("", ""),
-    ],
-)
-def test_the_processor_is_named_as_linux_does(text: str, name: str, tmp_path: Path) -> None:
-    (tmp_path / "cpuinfo").write_text(text)
-    assert processor_name(tmp_path / "cpuinfo") == name
-
-
-def test_a_machine_without_proc_has_no_name(tmp_path: Path) -> None:
-    assert processor_name(tmp_path / "missing") == ""

@@ -18,7 +18,6 @@ from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session
 from dodo_dsl.opendlv.shared_memory import SharedMemory
 from services.base.lockstep_clock import EPOCH
-from services.clock import agent as agents
 from services.clock import resting
 from services.clock.agent import TimeAgent
 from services.clock.answers import filters
@@ -213,16 +212,6 @@ def test_a_flood_ends_the_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         sent.take(steering(EPOCH))
 
 
-def test_copied_sample_times_are_counted() -> None:
-    sent = SentMessages(filters([STEER], IDS))
-    sent.expect([7, 9])
-    for sampled in ((7,), (7, 9), (7, 8), ()):
-        for each in sampled:
-            sent.take(steering(EPOCH, each))
-        sent.collect(EPOCH, EPOCH + STEP)
-    assert (sent.answers, sent.uncopied) == (3, 1)
-
-
 def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
     """By the agent; by the wall clock where a process has ended, whose last part is not known."""
     sent = SentMessages(filters([STEER], IDS))
@@ -243,21 +232,6 @@ def test_what_is_computed_for_each_answer_is_measured(tmp_path: Path) -> None:
     facts = driven.facts()
     assert (facts["answers"], facts["worst_frame"], facts["uncopied"]) == (2, 3, 2)
     assert 1e-6 < facts["worst_s"] < 9.0, "no more than passed on the wall"
-
-
-def test_where_a_service_has_ended_the_runner_has_time_to_end_the_test(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    slept: list[float] = []
-    monkeypatch.setattr(resting, "GONE_S", 0.05)
-    monkeypatch.setattr(resting.time, "sleep", slept.append)
-    with agent(tmp_path, lambda until: [reached(until, gone=[1])]) as time:
-        driven = application(time)
-        driven.start(EPOCH, ())
-        assert slept
-        slept.clear()
-        driven.await_answer(EPOCH + STEP)
-    assert slept == [], "once for each"
 
 
 class Cameras(Link):
@@ -286,15 +260,6 @@ def test_the_first_picture_of_a_camera_is_shown_when_the_application_waits_for_i
     assert [service for service, show in link.sent if show.announces] == ["left", "right", "left", "right"]
 
 
-def test_a_camera_that_nobody_looks_at_is_noted(tmp_path: Path) -> None:
-    with agent(tmp_path) as time:
-        driven = application(time, link=Cameras(left=5000))
-        driven.start(EPOCH, ("left",))
-        driven.await_answer(EPOCH + STEP)
-    assert driven.facts() == {}
-    assert driven.notes == ["no program of the application waited for a frame of 'left'"]  # type: ignore[attr-defined]
-
-
 def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(tmp_path: Path) -> None:
     notes = [{"kind": "static", "service": 0, "name": "busybox"}, {"kind": "odd", "service": 0, "name": "x"}]
     begun = iter([[0], [0, 1], [0, 1], [0]])
@@ -308,12 +273,6 @@ def test_notes_are_told_once_and_services_that_never_loaded_the_clock_are_named(
     first, second = driven.notes  # type: ignore[attr-defined]
     assert first.startswith("not all services began at once")
     assert second == "service 'driver' started 'busybox', a statically linked program, which keeps the machine's time"
-
-
-def test_without_an_agent_the_test_cannot_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(agents, "PATIENCE_S", 0.0)
-    with pytest.raises(ServiceSilent, match="lets the application's time go on"):
-        application(TimeAgent(tmp_path)).start(EPOCH, ())
 
 
 def expected(steps: int, every: int) -> list[tuple[int, float]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.run.process import places, process_group
+from dodo_dsl.run.process import process_group
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 from tests.run.desk import ROOT
 from tests.run.helpers import PASS, READY, WAIT, Bench
@@ -21,17 +21,6 @@ import threading
 for _ in range(20):
     threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
 """
-
-
-@as_root
-def test_ids_come_from_millions_where_they_are_mapped(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert len({places.own_user() for _ in range(20)}) == 20
-    for rows, users in ((" 0 100000 65536\n", places.OWN_USERS[1]), ("0 0 1\n1 1 4294967294", places.OWN_USERS[0])):
-        monkeypatch.setattr(Path, "read_text", lambda _, rows=rows: rows)
-        assert places.own_user() in users
-    monkeypatch.setattr(Path, "read_text", lambda _: "0 100000 1\n")
-    with pytest.raises(OSError, match="has no user ids from 64000 to 64999"):
-        places.own_user()
 
 
 @pytest.mark.slow
@@ -72,42 +61,6 @@ def test_a_program_that_cannot_be_executed_is_an_error(tmp_path: Path) -> None:
     (outcome,) = bench.run(replace(plan, application=replace(plan.application, services=apps)))
     reason = f"service 'app' could not be started: {program}: No such file or directory"
     assert (outcome.outcome, outcome.reason) == ("error", reason)
-
-
-def proc_of(folder: Path, version: int, group: str) -> Path:
-    """A ``/proc/self`` that shows a tree of control groups in a folder."""
-    options, controllers = ("rw,pids", "pids") if version == 1 else ("rw", "")
-    kind = "cgroup" if version == 1 else "cgroup2"
-    proc = folder / "proc"
-    proc.mkdir()
-    (proc / "cgroup").write_text(f"7:memory:/elsewhere\n{0 if version == 2 else 8}:{controllers}:{group}\n")
-    (proc / "mountinfo").write_text(
-        f"30 25 0:26 / /sys rw - sysfs sysfs rw\n31 30 0:27 /docker {folder}/tree rw - {kind} none {options}\n"
-    )
-    (folder / "tree" / "own").mkdir(parents=True)
-    return proc
-
-
-@pytest.mark.parametrize(
-    ("version", "handing", "parent"),
-    [(1, "", "tree/own"), (2, "tree/own", "tree/own"), (2, "tree", "tree"), (2, "", None)],
-)
-def test_where_a_group_is_made(tmp_path: Path, version: int, handing: str, parent: str | None) -> None:
-    proc = proc_of(tmp_path, version, "/docker/own")
-    if handing:
-        (tmp_path / handing / "cgroup.subtree_control").write_text("memory pids\n")
-    found = list(process_group._parents(proc))
-    assert found == ([tmp_path / parent] if parent else [])
-
-
-def test_groups_of_killed_runs_are_removed_and_new_ones_are_not(tmp_path: Path) -> None:
-    proc = proc_of(tmp_path, 1, "/docker/own")
-    old, new = (tmp_path / "tree/own" / f"dodo-{name}" for name in ("old", "new"))
-    for folder in (old, new):
-        folder.mkdir()
-    os.utime(old, (0, 0))
-    process_group.remove_unused(proc)
-    assert (old.exists(), new.exists()) == (False, True)
 
 
 def is_empty(group: Path) -> bool:

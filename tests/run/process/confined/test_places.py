@@ -2,7 +2,6 @@
 
 import json
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -63,16 +62,6 @@ def test_writes_stay_apart(own: Path) -> None:
     assert (own / "data").read_text() == "as it was"
 
 
-def test_where_no_overlay_can_be_mounted_it_is_read_only(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(namespaces, "overlay", refused)
-
-    def scene() -> object:
-        places = Places(str(own), USER)
-        return [(places.folder / "data").read_text(), places.writable]
-
-    assert within(scene, own) == ["as it was", False]
-
-
 def test_a_folder_that_its_user_could_not_read_is_an_error_and_not_the_applications_fault(
     own: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,20 +70,6 @@ def test_a_folder_that_its_user_could_not_read_is_an_error_and_not_the_applicati
     assert within(lambda: bool(Places(str(own), USER)), own) == [str(own), said]
     own.chmod(0o755)
     assert within(lambda: bool(Places(str(own), USER)), own) is True
-
-
-def test_neither_umask_nor_tmpdir_decide_about_its_folders(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    elsewhere = own.parent / "elsewhere"
-    elsewhere.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(elsewhere))
-
-    def scene() -> object:
-        os.umask(0o077)
-        places = Places(str(own), USER)
-        return [oct(path.stat().st_mode & 0o777) for path in (places.folder.parent, places.folder, places.home)]
-
-    assert within(scene, own) == ["0o755"] * 3
-    assert list(elsewhere.iterdir()) == []
 
 
 @pytest.mark.thorough
@@ -107,16 +82,3 @@ def test_what_it_may_read_is_shown_as_its_own_where_the_kernel_can(own: Path, mo
     monkeypatch.setattr(namespaces, "bind_as", refused)
     assert within(owners, own) == [own.stat().st_uid] * 3 + [0]
     assert within(lambda: str(Places("/usr", USER).read("/no/such/path"))) == "/no/such/path"
-
-
-@pytest.mark.parametrize("place", namespaces.SHARED, ids=str)
-@pytest.mark.thorough
-def test_folders_of_shared_places_stay_where_they_are_needed_and_files_do_not(place: Path) -> None:
-    with tempfile.TemporaryDirectory(dir=place) as name, tempfile.NamedTemporaryFile(dir=place) as file:
-        Path(name, "test").touch()
-        there = lambda: [Path(name, "test").exists(), Path(file.name).exists()]  # noqa: E731
-        assert within(there, Path(name, "test"), Path(file.name)) == [True, False]
-        assert within(lambda: Path(name).exists()) is False
-        assert within(lambda: list(map(str, Places("/usr", USER).shared[str(place)].glob("*/test"))), Path(name)) == []
-        mounted = within(lambda: Places("/usr", USER).mounted, Path(name))
-        assert isinstance(mounted, list) and name in mounted

@@ -59,40 +59,6 @@ def test_a_service_that_does_not_say_its_address_is_believed(enter: Join, capsys
     assert admitted(*track) == [True, False]
 
 
-def test_the_address_of_a_service_that_left_is_nobody_s(
-    enter: Join, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """What it sent before counts, however late it is taken."""
-    (pose, _), track = enter("pose"), enter("track")
-    send(pose)
-    address_book.leave(tmp_path, "pose", pose.address)
-    send(pose)
-    assert admitted(*track) == [True, False]
-
-
-class Watching(Service):
-    """Takes poses, and observes everything."""
-
-    def __init__(self) -> None:
-        self.taken: list[int] = []
-        self.seen: list[tuple[int, bool]] = []
-        self.inputs = {(FRAME, 0): lambda _message, time: self.taken.append(time)}
-        self.observe = lambda envelope: self.seen.append((envelope.sample_time, envelope.received > 0))
-
-
-def test_what_does_not_count_is_recorded_as_never_received(enter: Join, capsys: pytest.CaptureFixture[str]) -> None:
-    pose, (session, members) = enter("pose"), enter("track")
-    application = enter("stranger", False)[0]
-    service = Watching()
-    loop = Loop("track", service, session, RealTimeClock(), 0, members)
-    for sender, time in ((pose[0], 1), (application, 2)):
-        sender.send(sender.messages.type(FRAME)(), time)
-        envelope = session.receive(5.0)
-        assert envelope is not None
-        loop.handle(envelope)
-    assert (service.taken, service.seen) == ([1], [(1, True), (2, False)])
-
-
 STEERING = "opendlv.proxy.GroundSteeringRequest"
 BOX = "opendlv.logic.perception.DetectionBoundingBox"
 
@@ -188,20 +154,6 @@ def test_by_message_and_sender_stamp(monkeypatch: pytest.MonkeyPatch) -> None:
     assert table.producers(of("opendlv.sim.Command", 99)) == Producers("opendlv.sim.Command")
 
 
-@pytest.mark.parametrize(
-    ("services", "who"),
-    [
-        ((), "no service of this test sends"),
-        (("pose",), "only 'pose' may send"),
-        (("a", "b"), "only 'a' and 'b' may send"),
-        (("a", "b", "c"), "only 'a', 'b' and 'c' may send"),
-        (("a", "b", "c", "d"), "only services of the test may send"),
-    ],
-)
-def test_the_reason(services: tuple[str, ...], who: str) -> None:
-    assert Producers("opendlv.sim.Frame/0", services).reason == f"the application sent opendlv.sim.Frame/0, which {who}"
-
-
 def test_the_runner_is_known_by_its_address(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -216,9 +168,3 @@ def test_the_runner_is_known_by_its_address(
     reason = "the application sent dodo.TestBegin, which only the runner may send"
     assert json.loads(line) == {"dodo": "foreign", "reason": reason}
     assert not table.is_of_runner(of("dodo.Alive", 0), runner), "signs of life have an address of their own"
-
-
-@pytest.mark.parametrize("text", ["opendlv.sim.Frame/x=pose", "opendlv.sim.Fram/0=pose"])
-def test_words_that_make_no_table(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
-    with pytest.raises(ValueError, match=r"Fram"):
-        loaded(monkeypatch, text)

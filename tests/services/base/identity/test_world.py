@@ -1,17 +1,15 @@
 """What only a simulation has goes to the test's services, and not to the bus."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-from dodo_dsl.opendlv import address_book
 from dodo_dsl.opendlv.envelope import Envelope
 from dodo_dsl.opendlv.message_set import MessageSet
 from dodo_dsl.opendlv.session import Session, SessionError
 from services.base.clock import RealTimeClock
 from services.base.loop import Loop
-from services.base.members import TOLD, TRUTH, WORLD_VARIABLE, Members, World
+from services.base.members import TOLD, TRUTH, WORLD_VARIABLE, Members
 from services.base.service import Output, Service
 from tests.services.base.identity.conftest import Join
 
@@ -109,20 +107,6 @@ def test_what_reaches_no_service_of_the_test_does_not_come_to_the_bus(
     assert taken(application) == []
 
 
-def test_truth_without_services_that_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(WORLD_VARIABLE, raising=False)
-    monkeypatch.setenv(TRUTH, f"{READING}/0")
-    with pytest.raises(
-        ValueError, match="DODO_TRUTH names what the application must not get, and DODO_WORLD no service"
-    ):
-        World.load(MESSAGES)
-
-
-def test_services_that_may_not_say_where_they_listen_are_a_world(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(WORLD_VARIABLE, f"own?={FRAME}/0")
-    assert World.load(MESSAGES)
-
-
 def test_outside_of_a_test_the_bus_carries_everything(
     application: Session, cid: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -161,11 +145,3 @@ def test_the_application_reaches_no_service_alone(
     runner = enter("dodo-runner")[0]
     runner.send_directly(frame("dodo.TestBegin"), [track[0].address])
     assert taken(*track) == ["dodo.TestBegin"]
-
-
-def test_who_has_left_or_is_unknown_hears_nothing(enter: Join, application: Session, tmp_path: Path) -> None:
-    pose, track = enter("pose"), enter("track")
-    pose[1].send(frame())
-    address_book.leave(tmp_path, "track", track[0].address)
-    pose[1].send(frame())
-    assert (taken(*track), taken(application)) == ([FRAME], [])
