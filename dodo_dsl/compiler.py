@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -27,10 +28,9 @@ from dodo_dsl.spec.rig import PORT
 from dodo_dsl.spec.vary import Values
 
 if TYPE_CHECKING:  # what only plans need is loaded where tests are planned: it takes as long as the rest
-    from dodo_dsl.emit.pipeline import Pipeline
-    from dodo_dsl.emit.pipeline_jobs import JobOptions
     from dodo_dsl.emit.render import File
     from dodo_dsl.plan.build import Compiled
+    from dodo_dsl.plan.pipeline import JobOptions, Pipeline
 
 UNSATISFIED = ("no-producer", "no-sample", "true-pose")
 """The rules by which a service consumes what nobody produces."""
@@ -134,7 +134,7 @@ class Compilation:
 
     compiled: "Compiled"
     jobs: "Pipeline"
-    problems: tuple[Diagnostic, ...]
+    problems: tuple[Diagnostic, ...] = ()
 
     @property
     def pipeline(self) -> "File":
@@ -275,23 +275,19 @@ def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Co
 
     ``options`` hold for all jobs of the pipeline.
     """
-    from dodo_dsl.emit.pipeline import artifact_problems, pipeline, pipeline_folder, pipeline_problems
-    from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS
     from dodo_dsl.plan.build import build
+    from dodo_dsl.plan.pipeline import MOST_JOBS, JobOptions, pipeline
 
     if checked.application is None:
         raise NoApplication
-    deployment, application, settings = checked.deployment, checked.application, checked.settings
-    options = options or NO_OPTIONS
     compiled = build(
-        checked.tests, checked.manifests, deployment, application, out.resolve(), settings, options.from_repository
+        checked.tests, checked.manifests, checked.deployment, checked.application, out.resolve(), checked.settings
     )
-    jobs = pipeline(compiled.suite, pipeline_folder(out), options)
-    files = {spec.slug: str(spec.path) for spec in checked.specs}
-    shown = {plan.spec: files[plan.slug] for plan in compiled.suite.plans}
-    limits = pipeline_problems(compiled.suite, jobs)
-    problems = [
-        replace(problem, span=replace(problem.span, file=shown.get(problem.span.file, problem.span.file)))
-        for problem in [*limits, *artifact_problems(compiled, options)]
-    ]
-    return Compilation(compiled, jobs, tuple(ordered(problems)))
+    jobs = pipeline(compiled.suite, out, options or JobOptions())
+    if (number := len(jobs.jobs)) <= MOST_JOBS:
+        return Compilation(compiled, jobs)
+    (path, most), *_ = Counter(spec.path for spec in checked.specs).most_common(1)
+    place = next(spec for spec in checked.specs if spec.path == path).span("name")
+    message = f"the child pipeline has {number} jobs, {most} of this test; gitlab.com's free tier allows {MOST_JOBS}"
+    hint = "compile fewer tests into one pipeline, or run them in one job with the template 'run' and 'parallel'"
+    return Compilation(compiled, jobs, (Diagnostic(place, "pipeline-limit", message, hint, "warning"),))

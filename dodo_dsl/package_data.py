@@ -9,7 +9,7 @@ _PACKAGE = Path(__file__).resolve().parent
 INSTALLED = "lib*/python3*/*-packages/dodo_dsl/_data"
 """What ``root`` is of an installed wheel, below the folder of a Python. An editable install has a copy there, too."""
 
-PIPELINES = ("application", "deployment", "run")
+PIPELINES = ("tests", "run")
 """The templates for GitLab, each of them a component in its folder."""
 
 

@@ -1,8 +1,13 @@
-"""``dodo images builds``: the application's builds, checked, as a compose file for ``docker buildx bake``."""
+"""``dodo images builds``: the application's builds, checked, as a compose file for ``docker buildx bake``.
+
+With ``--push`` it is built and pushed, without the variables of this process: no build sees a pipeline's token.
+"""
 
 import argparse
 import json
+import os
 import shutil
+import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,11 +17,13 @@ from dodo_dsl import compiler
 from dodo_dsl.application import hidden_paths
 from dodo_dsl.application.construction import checked_builds
 from dodo_dsl.application.interpolation import EnvironmentProblem
-from dodo_dsl.application.model import ApplicationSource
+from dodo_dsl.application.model import ApplicationSource, image_variable
 from dodo_dsl.application.read import read_application
 from dodo_dsl.cli import selection
 from dodo_dsl.cli.errors import Exit, UsageError
 from dodo_dsl.diagnostics import format_text, has_errors
+from dodo_dsl.images import docker_command
+from dodo_dsl.images.docker_command import DockerError
 from dodo_dsl.run.docker.builds import HiddenContext, own_contexts
 from dodo_dsl.run.hidden_paths import of_repository
 from dodo_dsl.spec.deployment import Deployment
@@ -25,10 +32,12 @@ from dodo_dsl.spec.deployment import Deployment
 def add(parser: argparse.ArgumentParser) -> None:
     selection.add_application(parser)
     parser.add_argument(
-        "--contexts", type=Path, metavar="DIR",
-        help="build from copies in this folder, without tests, reports, compiled tests and .git: keep it until the "
-        "images are built (default: the folders themselves)"
+        "--push", metavar="P",
+        help="build and push each as P/SERVICE, from copies without tests, reports, compiled tests and .git; print "
+        "lines DODO_IMAGE_<SERVICE>=IMAGE with digests"
     )  # fmt: skip
+    parser.add_argument("--tag", metavar="T", default="latest", help="with --push: tag of the images (default: latest)")
+    parser.add_argument("--platform", metavar="P,...", default="", help="with --push: platforms of the images")
 
 
 def show(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -47,20 +56,45 @@ def show(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         builds = checked_builds(source)
     except EnvironmentProblem as error:
         raise UsageError(f"the application's builds: {error}") from error
-    if options.contexts:
-        builds = _own_contexts(builds, _hidden(source, deployment, files), options.contexts)
+    if options.push:
+        with tempfile.TemporaryDirectory(prefix="dodo-builds-") as folder:
+            hidden = _hidden(source, deployment, files)
+            try:
+                services = own_contexts(builds["services"], hidden, Path(folder).resolve(), Path.cwd())
+            except (HiddenContext, OSError, shutil.Error) as error:
+                raise UsageError(f"--push: {error}") from error
+            for line in _push({**builds, "services": services}, options, Path(folder)):
+                stdout.write(f"{line}\n")
+        return Exit.OK
     stdout.write(json.dumps(builds, indent=2) + "\n")
     return Exit.OK
 
 
-def _own_contexts(builds: dict[str, Any], hidden: Sequence[Path], folder: Path) -> dict[str, Any]:
-    """The same builds with their own contexts in a folder; raises UsageError if it cannot be made."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        own = Path(tempfile.mkdtemp(dir=folder))
-        return {**builds, "services": own_contexts(builds["services"], hidden, own.resolve(), Path.cwd())}
-    except (HiddenContext, OSError, shutil.Error) as error:
-        raise UsageError(f"--contexts: {error}") from error
+_PASSED = ("PATH", "HOME", "DOCKER_CONFIG", "DOCKER_HOST", "DOCKER_TLS_VERIFY", "DOCKER_CERT_PATH", "BUILDX_BUILDER")
+"""What the docker command needs of the environment."""
+
+
+def _push(builds: dict[str, Any], options: argparse.Namespace, folder: Path) -> list[str]:
+    """Builds and pushes the images, and names each with its digest; raises DockerError."""
+    images = {name: f"{options.push}/{name}" for name in builds["services"]}
+    if not images:
+        return []
+    services = {name: {**each, "image": f"{images[name]}:{options.tag}"} for name, each in builds["services"].items()}
+    file, metadata = folder / "builds.yml", folder / "metadata.json"
+    file.write_text(json.dumps({**builds, "services": services}))
+    words = ["docker", "buildx", "bake", "--file", str(file), "--push", "--metadata-file", str(metadata)]
+    words += ["--set", f"*.platform={options.platform}"] if options.platform else []
+    environment = {name: os.environ[name] for name in _PASSED if name in os.environ}
+    docker_command.require()
+    if subprocess.call(words, env=environment, stdout=subprocess.DEVNULL):
+        raise DockerError("the application's images cannot be built and pushed; the output above says why")
+    told = [each for each in json.loads(metadata.read_text()).values() if isinstance(each, dict)]
+    digests = {each.get("image.name", ""): each.get("containerimage.digest") for each in told}
+    if missing := [name for name in images if not digests.get(services[name]["image"])]:
+        raise DockerError(f"the build of '{missing[0]}' has said no digest")
+    return [
+        f"{image_variable(name)}={image}@{digests[services[name]['image']]}" for name, image in sorted(images.items())
+    ]
 
 
 def _hidden(source: ApplicationSource, deployment: Deployment, files: Sequence[Path]) -> list[Path]:

@@ -5,16 +5,18 @@ With ``--check --fix`` it writes what has exactly one fix into the files, and sh
 
 import argparse
 import difflib
+import json
 import os
+import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from dodo_dsl import atomic, package_data
-from dodo_dsl.cli import display, pipeline_file, pipeline_options, selection
+from dodo_dsl.cli import display, selection
 from dodo_dsl.cli.display import Verbosity, write_diagnostics
-from dodo_dsl.cli.errors import Exit, UsageError
+from dodo_dsl.cli.errors import Exit, UsageError, files_of_the_user
 from dodo_dsl.compiler import Checked, plan
 from dodo_dsl.diagnostics import (
     Diagnostic,
@@ -28,6 +30,9 @@ from dodo_dsl.diagnostics import (
     ordered,
     shown_path,
 )
+from dodo_dsl.opendlv import regular_file
+from dodo_dsl.plan.pipeline import DEFAULT_TAGS, JobOptions
+from dodo_dsl.plan.test_files import FilesError
 from dodo_dsl.terminal import printable
 
 Fixes = dict[Span, Fix]
@@ -82,9 +87,7 @@ EXAMPLES = """examples:
   dodo compile --check                     problems of all tests; writes nothing
   dodo compile --check --fix               writes what has exactly one fix, and shows it as a diff
   dodo compile --check --format gitlab     the same as a code quality report
-  dodo compile --jobs 4 --times dodo-report        four jobs that take about as long, for many short tests
   dodo compile --tags '' --image dodo-runner       its jobs run on any runner, in this image
-  dodo compile --files repository          its jobs take recordings from their checkout, and not from an artifact
 """
 
 
@@ -110,10 +113,74 @@ def add(parser: argparse.ArgumentParser) -> None:
                         help="with --check: correct names, units and spaces that have exactly one fix")  # fmt: skip
     parser.add_argument("--format", choices=tuple(FORMATS), default="text",
                         help="format of diagnostics (default: text); with gitlab the text goes to stderr")  # fmt: skip
-    parser.add_argument("--times", type=Path, action="append", default=[], metavar="REPORT",
-                        help="with --jobs: results or report with the tests' times; repeatable")  # fmt: skip
-    pipeline_options.add(parser)
+    parser.add_argument("--tags", type=_tags, default=DEFAULT_TAGS, metavar="TAGS",
+                        help="tags of the runners of all jobs but those on rigs, separated by commas, or a JSON list; "
+                        "'' for none (default: sil)")  # fmt: skip
+    parser.add_argument("--image", default="", metavar="IMAGE",
+                        help="image of all jobs but those on rigs (default: the runner's own)")  # fmt: skip
+    parser.add_argument("--services", type=_services, default=(), metavar="LIST",
+                        help="services of all jobs but those on rigs, as a JSON list of what GitLab takes "
+                        "(default: none)")  # fmt: skip
+    parser.add_argument("--before-script", default="", metavar="COMMANDS",
+                        help="first commands of all jobs but those on rigs (default: none)")  # fmt: skip
+    parser.add_argument("--run-options", default="", metavar="OPTIONS",
+                        help="dodo run options of every test; the variable DODO_RUN_OPTIONS replaces them")  # fmt: skip
+    parser.add_argument("--images", type=Path, metavar="FILE",
+                        help="lines DODO_IMAGE_<SERVICE>=IMAGE of the application's images that were built: tests run "
+                        "in containers of them")  # fmt: skip
     selection.add_application(parser)
+
+
+_IMAGE = re.compile(r"DODO_IMAGE_[A-Z0-9_]+=[A-Za-z0-9_.:/@-]+")
+_NOTHING = ":"
+"""The shell's command that does nothing, which a template has where no commands are given."""
+
+
+def _job_options(options: argparse.Namespace) -> JobOptions:
+    """Raises UsageError for a file of images that is none."""
+    images: tuple[str, ...] = ()
+    if options.images:
+        with files_of_the_user():
+            images = tuple(regular_file.text(options.images).splitlines())
+        for number, line in enumerate(images, 1):
+            if not _IMAGE.fullmatch(line):
+                like = "DODO_IMAGE_STEERING=registry.example.org/steering:1"
+                raise UsageError(f"{options.images}:{number}: expected a line such as {like}")
+    before = options.before_script.strip()
+    return JobOptions(
+        options.tags,
+        options.image.strip(),
+        options.services,
+        "" if before == _NOTHING else before,
+        options.run_options.strip(),
+        images,
+    )
+
+
+def _tags(text: str) -> tuple[str, ...]:
+    """``sil,docker``, or the JSON list as which a GitLab variable holds an input of type array."""
+    words = _json_list(text) if text.strip().startswith("[") else text.split(",")
+    if words is None or not all(isinstance(word, str) for word in words):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list of tags, such as '[\"sil\"]' or 'sil,docker'")
+    return tuple(dict.fromkeys(word.strip() for word in words if word.strip()))
+
+
+def _services(text: str) -> tuple[str | dict[str, Any], ...]:
+    found = _json_list(text or "[]")
+    if found is None or not all(
+        (one and isinstance(one, str)) or (isinstance(one, dict) and "name" in one) for one in found
+    ):
+        expected = "a JSON list of names, such as '[\"docker:dind\"]', or of mappings with a name"
+        raise argparse.ArgumentTypeError(f"'{text.strip()}' is not {expected}")
+    return tuple(found)
+
+
+def _json_list(text: str) -> list[Any] | None:
+    try:
+        found = json.loads(text)
+    except ValueError:
+        return None
+    return found if isinstance(found, list) else None
 
 
 def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
@@ -122,8 +189,6 @@ def main(options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
         raise UsageError("--fix applies to --check")
     if options.images and options.check:
         raise UsageError("--images are for what is written: call dodo compile without --check")
-    if options.times and not options.jobs:
-        raise UsageError("--times are for --jobs")
     checked = selection.select(options.path, (), options.application)
     if options.fix:
         checked = _fixed(checked, options, stdout if options.format == "text" else stderr)
@@ -169,11 +234,15 @@ def _show(diagnostics: Sequence[Diagnostic], style: str, stdout: TextIO, stderr:
 
 
 def _check(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
-    diagnostics, stale = ordered([*checked.diagnostics, *pipeline_file.problems(checked.deployment.root)]), {}
+    diagnostics, stale = checked.diagnostics, {}
     sound = checked.sound()
     if sound.specs:
-        made = plan(sound, options.output, pipeline_options.job_options(options))
-        diagnostics = ordered([*diagnostics, *made.problems])
+        try:
+            made = plan(sound, options.output, _job_options(options))
+        except FilesError:
+            _show(diagnostics, options.format, stdout, stderr)
+            raise
+        diagnostics = tuple(ordered([*diagnostics, *made.problems]))
         if options.output.is_dir() and not has_errors(diagnostics):
             from dodo_dsl.emit.output_folder import differences
 
@@ -217,7 +286,7 @@ def _names(names: Sequence[str]) -> str:
 def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr: TextIO) -> int:
     from dodo_dsl.emit.output_folder import add_images, stale_folders, write
 
-    jobs = pipeline_options.job_options(options)
+    jobs = _job_options(options)
     if not checked.ok:
         _show(checked.diagnostics, options.format, stdout, stderr)
         return Exit.USAGE
@@ -236,10 +305,6 @@ def _write(checked: Checked, options: argparse.Namespace, stdout: TextIO, stderr
         stdout.write(f"{_count(len(plans))} compiled into {options.output}\n")
         if gone:
             stdout.write(f"removed {_count(len(gone), 'stale test')}: {_names(gone)}\n")
-    if options.jobs and made.compiled.suite.plans:
-        from dodo_dsl.cli.forecast import packing_text
-
-        (stdout if options.format == "text" else stderr).write(packing_text(made.compiled.suite, made.jobs))
     return Exit.OK
 
 

@@ -22,7 +22,6 @@ from dodo_dsl.cli.new_files import (
     application_files,
     deployment_files,
     dodo_yml,
-    included,
     missing_schemas,
     own_compose_file,
     ros_python,
@@ -180,7 +179,7 @@ def new_application(language: str, answers: str, stdout: TextIO, stderr: TextIO)
     around = [file for file in deployment_files(root, images=images, ros=answers == ROS) if file.path not in made]
     kept = [file for file in around if file.path.exists()]
     write_new([*own, *(file for file in around if file not in kept), *first], stdout)
-    included = _say_kept(kept, images, stdout, stderr)
+    included = _say_kept(kept, images, stdout)
     program = next(file.path.name for file in own if file.path.stem == "steering")
     builds = _ros_builds(language) if answers == ROS else _BUILDS.get(language, ())
     steps = [*builds, f"dodo run {_FIRST}", f"make {program} and the test yours"]
@@ -202,7 +201,7 @@ def new_deployment(stdout: TextIO, stderr: TextIO) -> int:
     written = [file.path.name for file in new if file.path.name in COMPOSE_FILES]
     others = ", ".join(new_files.other_compose_files(Path.cwd())) if written else ""
     write_new(new, stdout)
-    included = _say_kept(there, False, stdout, stderr)
+    included = _say_kept(there, False, stdout)
     if not new:
         stdout.write("\nnothing to write\n")
         return Exit.OK
@@ -215,17 +214,13 @@ def new_deployment(stdout: TextIO, stderr: TextIO) -> int:
     return Exit.OK
 
 
-def _say_kept(kept: Sequence[New], images: bool, stdout: TextIO, stderr: TextIO) -> list[str]:
+def _say_kept(kept: Sequence[New], images: bool, stdout: TextIO) -> list[str]:
     """Says which files stay as they are, and what they lack; returns what the user has to do about the pipeline."""
-    steps = []
+    steps: list[str] = []
     for file in kept:
         stdout.write(f"kept: {shown_path(str(file.path))}{_lack(file)}\n")
         if file.path.name == new_files.PIPELINE:
-            pipeline = new_files.kept_pipeline(file.path)
-            if pipeline.warning:
-                stderr.write(f"warning: {pipeline.warning}\n")
-            if not pipeline.includes_dodo:
-                steps.append(pipeline.step(included(images)))
+            steps += filter(None, [new_files.kept_pipeline(file.path, images)])
     return steps
 
 

@@ -6,6 +6,7 @@ Of a file that is kept it says what it lacks, and what in it meets DoDo's pipeli
 import functools
 import importlib.util
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -150,9 +151,10 @@ def ros_python() -> str:
     return "python" if importlib.util.find_spec("rclpy") else ROS_PYTHON
 
 
-def included(images: bool) -> tuple[str, ...]:
-    """The templates that a repository's pipeline includes to run its tests, and with ``images`` to build them first."""
-    return ("deployment", "application") if images else ("deployment",)
+def include(images: bool, stage: str = "test") -> str:
+    """The lines of a pipeline that include DoDo's jobs, which build images first where the application has to be."""
+    inputs = f"{{stage: {stage}, images: true}}" if images else f"{{stage: {stage}}}"
+    return f"include:\n  - local: .gitlab/dodo/tests.gitlab-ci.yml\n    inputs: {inputs}  # stage: one of yours\n"
 
 
 def deployment_files(root: Path, *, images: bool = False, ros: bool = False) -> list[New]:
@@ -165,7 +167,7 @@ def deployment_files(root: Path, *, images: bool = False, ros: bool = False) -> 
         dodo_yml(root, application if own_compose_file(root) or not compose_file(root) else ""),
         New(root / application, filled("deployment/docker-compose.yml")),
         New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
-        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", templates=included(images))),
+        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", include=include(images))),
         *(
             New(root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml", pipeline_template(name))
             for name in package_data.PIPELINES
@@ -177,64 +179,27 @@ def deployment_files(root: Path, *, images: bool = False, ros: bool = False) -> 
 
 PIPELINE = ".gitlab-ci.yml"
 IGNORED = ".gitignore"
-_JOB = "compile"
-_STAGE = "test"
-_OWN = ("script", "trigger", "extends", "run")
-"""What its own job has, and no change to a job of the template."""
 
 
-@dataclass(frozen=True)
-class KeptPipeline:
-    """``warning`` is empty if no job has the name of DoDo's; ``stages`` where the stage of DoDo's jobs is there."""
+def kept_pipeline(path: Path, images: bool) -> str:
+    """What the user has to do so that a pipeline file that is kept has DoDo's jobs; empty where it has them.
 
-    includes_dodo: bool = False
-    warning: str = ""
-    stages: tuple[str, ...] = ()
-
-    def step(self, templates: Sequence[str]) -> str:
-        """What the user has to do so that the pipeline includes these templates."""
-        files = " and ".join(f".gitlab/dodo/{name}.gitlab-ci.yml" for name in templates)
-        if not self.stages:
-            return f"include {files} in {PIPELINE}"
-        reason = f"'{_STAGE}' is not among its stages: {', '.join(self.stages)}"
-        return f"include {files} in {PIPELINE}, with 'inputs: {{stage: {self.stages[0]}}}', as {reason}"
-
-
-def kept_pipeline(path: Path) -> KeptPipeline:
-    """What a pipeline file that is kept says; one that cannot be read says nothing, as GitLab will refuse it."""
+    One that cannot be read has none, as GitLab will refuse it.
+    """
     node, _ = source.read(path)
-    if not isinstance(node, source.Mapping):
-        return KeptPipeline()
-    return KeptPipeline(_includes_dodo(node), _warning(node, path), _stages(node))
+    root = source.plain(node) if isinstance(node, source.Mapping) else {}
+    if "dodo" in str(root.get("include", "")):
+        return ""
+    written = root.get("stages")
+    stages = [printable(name) for name in written if isinstance(name, str)] if isinstance(written, list) else []
+    lines = include(images, "test" if "test" in stages or not stages else stages[0])
+    return f"add to {PIPELINE}:\n\n{textwrap.indent(lines, '        ')}"
 
 
 def missing_lines(file: New) -> list[str]:
     """The lines of a new file that the one in its place lacks; slashes around a path make no difference."""
     there = {line.strip().strip("/") for line in file.path.read_text(encoding="utf-8", errors="replace").splitlines()}
     return [line for line in file.content.decode().splitlines() if line.strip("/") not in there]
-
-
-def _includes_dodo(root: source.Mapping) -> bool:
-    included = root.get("include")
-    return included is not None and any(
-        isinstance(node, source.Scalar) and "dodo" in node.text for node in source.walk(included)
-    )
-
-
-def _warning(root: source.Mapping, path: Path) -> str:
-    entry = root.entries.get(_JOB)
-    if entry is None or not isinstance(entry.value, source.Mapping) or not entry.value.entries.keys() & set(_OWN):
-        return ""
-    place = f"{shown_path(str(path))}:{entry.key.line}:{entry.key.column}"
-    return f"{place}: GitLab merges this job '{_JOB}' with DoDo's job of the same name; give yours another name"
-
-
-def _stages(root: source.Mapping) -> tuple[str, ...]:
-    node = root.get("stages")
-    if not isinstance(node, source.Sequence) or node.tag:
-        return ()
-    names = tuple(printable(item.text) for item in node.items if isinstance(item, source.Scalar))
-    return () if _STAGE in names or len(names) < len(node.items) else names
 
 
 def write_new(files: Sequence[New], stdout: TextIO) -> None:

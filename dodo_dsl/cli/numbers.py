@@ -55,6 +55,15 @@ def minutes(text: str) -> float:
     return value
 
 
+def shard(text: str) -> tuple[int, int]:
+    """``I/N``: the part of several that is meant, from 1 on, and how many there are."""
+    index, _, total = text.partition("/")
+    found = [numbers.whole(part) if numbers.is_whole(part) else 0 for part in (index, total)]
+    if not 1 <= found[0] <= found[1]:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a part of several, expected 1/4 to 4/4 for four")
+    return found[0], found[1]
+
+
 def positive(text: str) -> int:
     """A whole number of at least 1."""
     value = numbers.whole(text) if numbers.is_whole(text) else 0

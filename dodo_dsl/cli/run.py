@@ -19,7 +19,7 @@ from dodo_dsl.cli.display import Verbosity, chatter
 from dodo_dsl.cli.errors import Exit, UsageError, of_outcomes
 from dodo_dsl.cli.forecast import at_once, expectation, run_forecast
 from dodo_dsl.cli.loading import Loading, loading
-from dodo_dsl.cli.numbers import positive, seconds, seed
+from dodo_dsl.cli.numbers import positive, seconds, seed, shard
 from dodo_dsl.cli.provenance import Origin, origin, recording
 from dodo_dsl.cli.report import REPORT
 from dodo_dsl.cli.run_jobs import prepare
@@ -110,6 +110,7 @@ EXAMPLES = """examples:
   dodo run sil-closed-straight --samples 16    at 16 values of its ranges, the same ones for each --seed
   dodo run sil-closed-straight --watch         again whenever spec, map or application is saved
   dodo run -q                                  only what did not pass, and the counts
+  dodo run --shard 2/4                         the second of four parts, for jobs that share the tests
   dodo run --compiled generated/sil-closed-straight --report dodo-report
 
 exit codes: 0 all passed, 1 some failed, or repetitions in lockstep differ, 2 wrong usage or spec, 3 some ended in
@@ -135,6 +136,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-j", "--jobs", type=positive, metavar="N", help="concurrent tests (default: as many as the cores allow)"
     )
+    parser.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N",
+                        help="run part I of N parts of the tests, such as 2/4 (default: all)")  # fmt: skip
     parser.add_argument("--clock", choices=tuple(CLOCKS), help="override the specs' clock")
     parser.add_argument("--wall-timeout", type=seconds, metavar="S", help="maximum wall time of a test in lockstep")
     parser.add_argument("--isolation", choices=("network", "host"), help="override the specs' isolation")
@@ -179,6 +182,9 @@ def _main(options: argparse.Namespace, stdout: TextIO) -> int:
     with work_folder() as folder, loading(options, folder.lease.descriptor) as load:
         with chatter(stdout, options.verbosity) as quietly:
             jobs, deployment = prepare(options, folder.path, quietly)
+            if not jobs:
+                quietly.write("no test is in this part of the tests\n")
+                return Exit.OK
             _refuse_to_keep([job.plan for job in jobs] if options.keep else [])
             runner = runner_of(options, jobs, deployment, quietly, load)
         gc.freeze()

@@ -20,7 +20,8 @@ from dodo_dsl.cli.display import write_diagnostics
 from dodo_dsl.cli.errors import UsageError, require_extra
 from dodo_dsl.compiler import Checked, narrowed, plan
 from dodo_dsl.diagnostics import has_errors, ordered, told_once
-from dodo_dsl.emit.output_folder import PLAN_FILE, write
+from dodo_dsl.emit.output_folder import write
+from dodo_dsl.emit.render import PLAN_FILE
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.plan_json import PlanError, from_json
@@ -104,7 +105,9 @@ def prepare(options: argparse.Namespace, folder: Path, stdout: TextIO) -> tuple[
         job = Job(plan, folders[run.test], report / plan.slug, families[run.test], work=folder)
         first = found.get(plan.slug)
         found[plan.slug] = replace(first, others=(*first.others, job)) if first else job
-    return list(found.values()), deployment
+    part, parts = options.shard
+    mine = set(list(dict.fromkeys(job.test for job in found.values()))[part - 1 :: parts])
+    return [job for job in found.values() if job.test in mine], deployment
 
 
 def load_compiled(folder: Path, settings: Settings) -> Plan:

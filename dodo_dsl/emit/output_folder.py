@@ -4,7 +4,6 @@ import difflib
 import errno
 import filecmp
 import json
-import os
 import shutil
 import stat
 from collections.abc import Collection, Mapping, Sequence
@@ -12,13 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dodo_dsl import atomic
-from dodo_dsl.emit.render import File, render_plan
+from dodo_dsl.emit.render import PLAN_FILE, File, render_plan
 from dodo_dsl.opendlv import regular_file
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.plan.test_files import SHARED, is_shared_name, link
 
-PLAN_FILE = "test.json"
 FILES = "files"
 
 
@@ -38,17 +36,12 @@ def _of_test(compiled: Compiled, plan: Plan, out: Path) -> dict[Path, _Entry]:
     copies = (
         (files / copy.target, _Link(copy.link) if copy.shared else copy.source) for copy in compiled.copies[plan.slug]
     )
-    return {**{out / file.path: file.text for file in render_plan(plan, compiled.defaults)}, **dict(copies)}
+    return {**{out / file.path: file.text for file in render_plan(plan)}, **dict(copies)}
 
 
 def _of_all(compiled: Compiled, out: Path) -> dict[Path, _Entry]:
-    """The files that tests share: copies, or links to those of the repository; the name depends on the content."""
-    folder = out / SHARED
-    shared = {copy.shared: copy for copies in compiled.copies.values() for copy in copies if copy.shared}
-    return {
-        folder / name: _Link(os.path.relpath(copy.source, folder.resolve())) if copy.is_linked else copy.source
-        for name, copy in shared.items()
-    }
+    """The files that tests share; the name depends on the content."""
+    return {out / SHARED / copy.shared: copy.source for c in compiled.copies.values() for copy in c if copy.shared}
 
 
 def write(compiled: Compiled, pipeline: File, out: Path) -> None:

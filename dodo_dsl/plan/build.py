@@ -9,7 +9,6 @@ from pathlib import Path
 
 import msgspec
 
-from dodo_dsl import package_data
 from dodo_dsl.application import hidden_paths
 from dodo_dsl.application.construction import Setting
 from dodo_dsl.application.model import ApplicationSource
@@ -26,7 +25,7 @@ from dodo_dsl.plan.added_services import DRAWN, hardware, lockstep
 from dodo_dsl.plan.application import plan_application
 from dodo_dsl.plan.model import Application, Flag, Place, Plan, PlannedService, Pooled, Suite, is_device
 from dodo_dsl.plan.test_files import FileCopy, FilesError, standing_once
-from dodo_dsl.spec.arguments import Argument, ResolvedService, default_value
+from dodo_dsl.spec.arguments import Argument, ResolvedService
 from dodo_dsl.spec.deployment import Deployment
 from dodo_dsl.spec.load import Settings, of_test
 from dodo_dsl.spec.manifest import Manifest, Parameter
@@ -40,15 +39,10 @@ _MOST_OF_TOPICS = 120_000
 
 @dataclass(frozen=True)
 class Compiled:
-    """A suite with the files that each test needs, by slug.
-
-    ``defaults`` are the flags' values that services of DoDo have without being given them, by service and flag: what a
-    manifest of the deployment says need not be what its program does.
-    """
+    """A suite with the files that each test needs, by slug."""
 
     suite: Suite
     copies: Mapping[str, tuple[FileCopy, ...]]
-    defaults: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def build(
@@ -58,12 +52,8 @@ def build(
     application: ApplicationSource,
     out: Path,
     settings: Settings,
-    from_repository: bool = False,
 ) -> Compiled:
-    """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below.
-
-    Large files of the repository are linked instead of copied where they come ``from_repository``.
-    """
+    """The Plans of tests that ``check`` found no errors in; ``out`` is the folder that they will be written below."""
     ordered = sorted(tests, key=lambda test: test.spec.slug)
     cids = addresses.of_tests(ordered, deployment, application)
     specs = {test.spec.path: test.spec.location.root for test in ordered}
@@ -79,9 +69,8 @@ def build(
     )
     builders = [_Builder(test, cid, shared) for test, cid in zip(ordered, cids, strict=True)]
     plans = [builder.plan() for builder in builders]
-    files = {plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)}
-    files = standing_once(files, _in_repository(deployment, out)) if from_repository else standing_once(files)
-    plans = [_sharing(plan, files[plan.slug]) for plan in plans]
+    files = standing_once({plan.slug: tuple(sorted(b.files)) for plan, b in zip(plans, builders, strict=True)})
+    plans = [replace(p, shared={copy.target: copy.shared for copy in files[p.slug] if copy.shared}) for p in plans]
     named = itertools.chain.from_iterable(builder.named for builder in builders)
     if more := hidden_paths.files(application, deployment, specs.values(), {*specs, *named}):
         if len(more) > hidden_paths.MOST:
@@ -90,31 +79,7 @@ def build(
             )
             raise FilesError(f"{what}: keep tests in a folder of theirs ('registry' in dodo.yml)")
         plans = [replace(p, application=replace(p.application, hidden=(*hidden, *more))) for p in plans]
-    return Compiled(Suite(tuple(plans), deployment.gates), files, _defaults(plans, manifests))
-
-
-def _defaults(plans: Sequence[Plan], manifests: Mapping[str, Manifest]) -> dict[str, dict[str, str]]:
-    used = {service.uses for plan in plans for service in plan.services}
-    shipped = [m for name in sorted(used) if (m := manifests[name]).folder.parent == package_data.services()]
-    return {
-        manifest.name: {p.name: value.text for p in manifest.parameters.values() if (value := default_value(p))}
-        for manifest in shipped
-    }
-
-
-def _in_repository(deployment: Deployment, out: Path) -> Callable[[Path], bool]:
-    """Whether a job that checks out the repository has a file; raises FilesError if ``out`` cannot link to it."""
-    root = deployment.root.resolve()
-    if not out.is_relative_to(root):
-        raise FilesError(f"--files repository needs an output folder in the repository '{root}', and '{out}' is none")
-    shipped = package_data.registry().resolve()
-    is_own = not shipped.is_relative_to(root) or package_data.root().resolve() == root
-    return lambda path: path.is_relative_to(root) and (is_own or not path.is_relative_to(shipped))
-
-
-def _sharing(plan: Plan, files: Sequence[FileCopy]) -> Plan:
-    shared = {copy.target: copy.shared for copy in files if copy.shared}
-    return replace(plan, shared=shared) if shared else plan
+    return Compiled(Suite(tuple(plans), deployment.gates), files)
 
 
 def _limits(application: ApplicationSource, deployment: Deployment) -> SandboxLimits:

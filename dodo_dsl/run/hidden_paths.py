@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from dodo_dsl import package_data
-from dodo_dsl.emit.pipeline import CHILD
+from dodo_dsl.emit.render import CHILD
 from dodo_dsl.outcome import NEXT_REPORT
 from dodo_dsl.plan.model import Application
 from dodo_dsl.plan.test_files import SHARED

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dodo_dsl.emit.containers import copy_command
+from dodo_dsl.emit.compose import copy_command
 from dodo_dsl.plan.model import Application
 from dodo_dsl.spec.sandbox_limits import SandboxLimits
 

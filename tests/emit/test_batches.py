@@ -3,10 +3,9 @@
 from collections import Counter
 
 import pytest
+from dodo_dsl.emit.pipeline_jobs import PipelineJob, packed
 from hypothesis import given
 from hypothesis import strategies as st
-
-from dodo_dsl.emit.pipeline_jobs import PipelineJob, packed
 
 PLACES = [("sil", False, ""), ("dil", False, ""), ("hil", True, ""), ("hil", True, "one"), ("hil", True, "two")]
 TESTS = st.lists(st.tuples(st.sampled_from(PLACES), st.floats(0, 600)), min_size=1, max_size=40)

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
 from dodo_dsl.emit.containers import FILES_MOUNT, Defaults, Variable, containers
+
 from dodo_dsl.plan.model import Flag, Place, Plan, PlannedService
 from tests.run.helpers import Bench
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from dodo_dsl.emit.pipeline import CHILD
 
 from dodo_dsl import compiler, source
-from dodo_dsl.emit.pipeline import CHILD
 from dodo_dsl.emit.render import _templates, render_plan
 from tests.emit.readers import ROOT, tree
 

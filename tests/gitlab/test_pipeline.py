@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 import yaml
+from dodo_dsl.emit.pipeline import artifact_problems, pipeline_problems
+from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, JobOptions
 
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.emit import pipeline as emitted
 from dodo_dsl.emit import render
-from dodo_dsl.emit.pipeline import artifact_problems, pipeline_problems
-from dodo_dsl.emit.pipeline_jobs import NO_OPTIONS, JobOptions
 from dodo_dsl.emit.render import File
 from dodo_dsl.plan.build import Compiled
 from dodo_dsl.plan.model import Plan, Pooled, Suite

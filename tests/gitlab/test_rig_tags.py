@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from dodo_dsl.emit.pipeline import pipeline
 
 from dodo_dsl import compiler
-from dodo_dsl.emit.pipeline import pipeline
 from dodo_dsl.plan.model import Plan, Suite
 from dodo_dsl.plan.plan_json import from_json, to_json
 from dodo_dsl.run.rigs.permission import refuse_unattended

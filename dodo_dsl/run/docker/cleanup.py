@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dodo_dsl import atomic
-from dodo_dsl.emit.containers import REPORT
+from dodo_dsl.emit.compose import REPORT
 from dodo_dsl.plan.model import Plan
 from dodo_dsl.run import leases
 from dodo_dsl.run.docker.client import engine_error

@@ -21,8 +21,8 @@ from dodo_dsl.application import secret_variables
 from dodo_dsl.application.host_paths import is_port
 from dodo_dsl.application.interpolation import EnvironmentProblem, escaped, interpolate
 from dodo_dsl.application.model import FILES
-from dodo_dsl.emit.containers import CHANNEL
-from dodo_dsl.emit.output_folder import PLAN_FILE
+from dodo_dsl.emit.compose import CHANNEL
+from dodo_dsl.emit.render import PLAN_FILE
 from dodo_dsl.plan.added_services import ANSWERS_VARIABLE, RUNNER_VARIABLE, without_time
 from dodo_dsl.plan.model import LAYERS, Application, Plan
 from dodo_dsl.run.application_files import application_paths, variables_of

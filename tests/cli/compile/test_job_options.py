@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 import pytest
-
 from dodo_dsl.cli.pipeline_options import services, tags
+
 from tests.check import examples
 from tests.emit.readers import pipeline, run
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-
 from dodo_dsl.cli.pipeline_file import problems
+
 from dodo_dsl.diagnostics import Diagnostic
 from tests.check import examples
 from tests.emit.readers import run

@@ -10,7 +10,7 @@ import pytest
 from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.cli.main import parser
 from dodo_dsl.cli.run_jobs import prepare
-from dodo_dsl.emit.output_folder import PLAN_FILE
+from dodo_dsl.emit.render import PLAN_FILE
 from dodo_dsl.plan.plan_json import from_json
 from dodo_dsl.run.backends import Job
 from dodo_dsl.spec.deployment import Deployment
