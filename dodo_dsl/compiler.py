@@ -287,7 +287,8 @@ def plan(checked: Checked, out: Path, options: "JobOptions | None" = None) -> Co
     if (number := len(jobs.jobs)) <= MOST_JOBS:
         return Compilation(compiled, jobs)
     (path, most), *_ = Counter(spec.path for spec in checked.specs).most_common(1)
-    place = next(spec for spec in checked.specs if spec.path == path).span("name")
+    spec = next(spec for spec in checked.specs if spec.path == path)
+    place = spec.spans.get("matrix", spec.span("name"))
     message = f"the child pipeline has {number} jobs, {most} of this test; gitlab.com's free tier allows {MOST_JOBS}"
     hint = "compile fewer tests into one pipeline, or run them in one job with the template 'run' and 'parallel'"
     return Compilation(compiled, jobs, (Diagnostic(place, "pipeline-limit", message, hint, "warning"),))

@@ -27,7 +27,7 @@ EXAMPLES = """examples:
   dodo images push --prefix registry.example.org/dodo
   dodo images push --platform linux/amd64,linux/arm64 --prefix registry.example.org/dodo
   dodo images pull --for kiwi-dynamic                 on the rig's computer, before its first test
-  dodo images builds --contexts /tmp/c > builds.yml  the application's own, checked, for docker buildx bake
+  dodo images builds --push registry.example.org/car  the application's own, checked
 """
 _INDEX_HINT = "if a build cannot reach the package index, --offline-wheels downloads the packages on this machine"
 
@@ -49,7 +49,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     _action(actions, "push", "push images to their registry; log in with 'docker login' first")
     text = "pull the images that the tests of a rig need, if there is room for them"
     image_pull.add(actions.add_parser("pull", help=text, description=text))
-    text = "check the application's builds, and write them as a compose file for 'docker buildx bake'"
+    text = "check the application's builds, and write them as a compose file; with --push, build and push them"
     application_builds.add(actions.add_parser("builds", help=text, description=text))
 
 

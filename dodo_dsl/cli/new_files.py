@@ -187,11 +187,12 @@ def kept_pipeline(path: Path, images: bool) -> str:
     One that cannot be read has none, as GitLab will refuse it.
     """
     node, _ = source.read(path)
-    root = source.plain(node) if isinstance(node, source.Mapping) else {}
-    if "dodo" in str(root.get("include", "")):
+    root = node.entries if isinstance(node, source.Mapping) else {}
+    if "include" in root and "dodo" in str(source.plain(root["include"].value)):
         return ""
-    written = root.get("stages")
-    stages = [printable(name) for name in written if isinstance(name, str)] if isinstance(written, list) else []
+    written = root["stages"].value if "stages" in root else None
+    known = written.items if isinstance(written, source.Sequence) and not written.tag else ()
+    stages = [printable(item.text) for item in known if isinstance(item, source.Scalar)]
     lines = include(images, "test" if "test" in stages or not stages else stages[0])
     return f"add to {PIPELINE}:\n\n{textwrap.indent(lines, '        ')}"
 

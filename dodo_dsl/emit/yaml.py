@@ -25,7 +25,7 @@ def text(value: Mapping[str, Any]) -> str:
 def _lines(value: Mapping[str, Any], pad: str, is_whole: bool = False) -> Iterator[str]:
     for key, below in value.items():
         anchor = f" &{key[2:]}" if is_whole and key.startswith("x-") else ""
-        head = f"{pad}{'<<' if key == '<<' else _string(key)}:{anchor}"
+        head = f"{pad}{_key(key, below)}:{anchor}"
         line = f"{head} {flow(below)}"
         if is_whole and pad == "" and isinstance(below, Mapping) and below:
             yield from ("", head)
@@ -47,11 +47,15 @@ def flow(value: Any) -> str:
     if isinstance(value, str):
         return _string(value)
     if isinstance(value, Mapping):
-        pairs = (f"{'<<' if key == '<<' else _string(key)}: {flow(each)}" for key, each in value.items())
+        pairs = (f"{_key(key, each)}: {flow(each)}" for key, each in value.items())
         return f"{{{', '.join(pairs)}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(flow, value))}]"
     return json_text(value)
+
+
+def _key(key: str, below: Any) -> str:
+    return key if isinstance(below, Alias) else _string(key)
 
 
 @functools.lru_cache(maxsize=10_000)

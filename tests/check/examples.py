@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 
 from dodo_dsl import compiler
-from dodo_dsl.cli import pipeline_file
 from dodo_dsl.diagnostics import Diagnostic
 from dodo_dsl.emit.render import File, render_plan
 
@@ -82,8 +81,8 @@ def write(example: str, folder: Path, encoding: str = "utf-8") -> None:
 
 
 def problems(folder: Path) -> list[Diagnostic]:
-    """Every problem that ``dodo compile --check`` finds in the folder's tests and its pipeline, planning included."""
-    return [*compiled(folder)[0], *pipeline_file.problems(folder)]
+    """Every problem that ``dodo compile --check`` finds in the folder's tests, planning included."""
+    return compiled(folder)[0]
 
 
 def compiled(folder: Path) -> tuple[list[Diagnostic], list[File]]:

@@ -12,8 +12,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "components.md"
 ABOUT = {
     "run": "One job that runs the tests of a repository, as many at once as the runner's cores allow.",
-    "deployment": "Compiles the tests of a repository, and runs each in a job of a child pipeline, also on rigs.",
-    "application": "As `deployment`, and builds images of an application for the tests, or for another repository.",
+    "tests": "Compiles the tests of a repository, and runs each in a job of a child pipeline, also on rigs.",
 }
 HEAD = """# Components
 

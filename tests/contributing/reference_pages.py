@@ -69,16 +69,14 @@ SETTINGS = {
 }
 PIPELINES = {
     "DODO_API_TOKEN": "token by which `dodo report --gitlab` fetches the reports of child pipelines",
-    "DODO_COMPILE_OPTIONS": "further options of `dodo compile`, such as `--jobs 4`",
-    "DODO_REGISTRY": "the registry to log in to before tests pull images; empty for none",
+    "DODO_COMPILE_OPTIONS": "further options of `dodo compile`",
     "DODO_RUN_OPTIONS": "options of `dodo run` in every test, in place of the input `run-options`",
     "DODO_SEARCH_STORAGE": "address of the PostgreSQL database of searches; its password is `PGPASSWORD`",
-    "DODO_TAG": "the tag of runners, if the input `tags` names none; default `sil`",
+    "DODO_PARENT_PIPELINE_ID": "of a child pipeline: the pipeline whose job `dodo-compile` has its tests",
 }
 INPUTS = {
-    "DODO_BUILT_IMAGES", "DODO_COMPOSE_FILE", "DODO_DEPLOYMENT", "DODO_DEPLOYMENT_BRANCH", "DODO_FILES",
-    "DODO_NO_TESTS", "DODO_PLATFORMS", "DODO_TESTS", "DODO_TEST_ARTIFACTS_ACCESS", "DODO_TEST_BEFORE_SCRIPT",
-    "DODO_TEST_IMAGE", "DODO_TEST_OPTIONS", "DODO_TEST_SERVICES", "DODO_TEST_TAGS", "DODO_VERSION",
+    "DODO_BUILD", "DODO_COMPOSE_FILE", "DODO_DEPLOYMENT", "DODO_DEPLOYMENT_BRANCH", "DODO_PLATFORMS", "DODO_TESTS",
+    "DODO_TEST_BEFORE_SCRIPT", "DODO_TEST_IMAGE", "DODO_TEST_OPTIONS", "DODO_TEST_SERVICES", "DODO_TEST_TAGS",
 }  # fmt: skip
 """What templates for GitLab hand from an input to a job: set the input."""
 SERVICES = {
@@ -127,7 +125,7 @@ def environment() -> str:
         for title, rows in tables.items()
     )
     inputs = ", ".join(f"`{name}`" for name in sorted(INPUTS))
-    said = f"Templates for GitLab hand inputs to jobs in {inputs}: set [the inputs](../how-to/gitlab.md#inputs)."
+    said = f"Templates for GitLab hand inputs to jobs in {inputs}: set [the inputs](components.md)."
     return f"{VARIABLES}{told}\n{said}\n"
 
 

@@ -32,8 +32,12 @@ def run(*words: str) -> tuple[int, str, str]:
 def pipeline(text: str) -> dict[str, Any]:
     """A child pipeline as GitLab sees it: each job with what it extends, and no hidden one."""
     read = yaml.safe_load(text)
-    made = {k: {**read[v["extends"]], **v} if isinstance(v, dict) and "extends" in v else v for k, v in read.items()}
-    return {key: value for key, value in made.items() if not key.startswith(".")}
+
+    def extended(value: Any) -> Any:
+        is_job = isinstance(value, dict) and "extends" in value
+        return {**extended(read[value["extends"]]), **value} if is_job else value
+
+    return {key: extended(value) for key, value in read.items() if not key.startswith(".")}
 
 
 def tree(folder: Path) -> dict[str, bytes]:

@@ -133,24 +133,6 @@ def test_files_that_tests_share_stand_once(pair: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.thorough
-def test_files_of_the_repository_are_not_copied(pair: Path, tmp_path: Path) -> None:
-    assert run("compile", "--files", "repository", "sil-b")[0] == 0
-    assert [path for path in pair.rglob("*.json") if not path.is_symlink()] == [pair / "sil-b/test.json"]
-    found = {path.resolve().relative_to(tmp_path).parts[0] for path in (pair / SHARED).iterdir()}
-    assert found == {"registry"}
-    before = tree(pair)
-    assert run("compile", "--files", "repository", "sil-b", "--check")[0] == 0
-    assert run("compile", "sil-b", "--check")[0] == 1
-    assert run("compile", "sil-b")[0] == 0 and links(pair) == []
-    assert run("compile", "--files", "repository", "sil-b")[0] == 0 and tree(pair) == before
-    assert tree(tmp_path / "registry")["maps/straight/map.json"] == before["sil-b/files/maps/straight/map.json"]
-    assert run("compile", "--files", "repository")[0] == 0 and links(pair / SHARED)
-    assert run("compile")[0] == 0 and links(pair / SHARED) == []
-    code, _, err = run("compile", "--files", "repository", "sil-b", "--output", str(tmp_path.parent / "elsewhere"))
-    assert code == 2 and "needs an output folder in the repository" in err
-
-
-@pytest.mark.thorough
 def test_nothing_is_written_through_links_that_look_like_shared_files(pair: Path, tmp_path: Path) -> None:
     """A repository may hold its output, with links that lead elsewhere."""
     (tmp_path / "theirs").mkdir()

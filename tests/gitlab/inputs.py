@@ -3,7 +3,6 @@
 import functools
 import json
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,6 @@ import yaml
 
 from dodo_dsl import package_data
 from dodo_dsl.package_data import PIPELINES
-from tests.gitlab.rules import is_made, may_be_there
 
 TEMPLATES = [package_data.templates() / name / "template.yml" for name in PIPELINES]
 TYPES = {"string": str, "array": list, "boolean": bool, "number": (int, float)}
@@ -75,16 +73,8 @@ def _interpolated(node: Any, values: Config) -> Any:
 
 
 def _text(value: Any) -> str:
-    """As Ruby writes it within a text."""
-    return value if isinstance(value, str) else _ruby(value)
-
-
-def _ruby(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, dict):
-        return "{" + ", ".join(f":{key}=>{_ruby(below)}" for key, below in value.items()) + "}"
-    return "[" + ", ".join(map(_ruby, value)) + "]" if isinstance(value, list) else json.dumps(value)
+    """As Ruby writes it within a text; lists are of texts alone."""
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def merged(*configs: Config) -> Config:
@@ -104,29 +94,6 @@ def jobs(*configs: Config) -> Config:
         if isinstance(value, dict) and name not in KEYWORDS and not name.startswith(".")
     }
     return {name: job for name, job in found.items() if {"script", "trigger"} & job.keys()}
-
-
-def listed(config: Config, variables: Mapping[str, str]) -> set[str]:
-    """The names of the jobs that GitLab adds to a pipeline with these variables; none where it makes no such pipeline.
-
-    As GitLab does, a job needs what it needs: without one that is not optional there is no pipeline at all.
-    """
-    workflow = config.get("workflow")
-    if not is_made(workflow, variables):
-        return set()
-    found = {
-        name: job
-        for name, job in jobs(config).items()
-        if may_be_there(job, variables, by_workflow="rules" in (workflow or {}))
-    }
-    for name, job in found.items():
-        needed = {n if isinstance(n, str) else n["job"] for n in job.get("needs", []) if not _is_optional(n)}
-        assert needed <= found.keys(), f"{name} needs {needed - found.keys()}"
-    return set(found)
-
-
-def _is_optional(need: Any) -> bool:
-    return isinstance(need, dict) and bool(need.get("optional"))
 
 
 def _extended(name: str, config: Config) -> Config:

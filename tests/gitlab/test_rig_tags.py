@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from dodo_dsl.emit.pipeline import pipeline
 
 from dodo_dsl import compiler
 from dodo_dsl.plan.model import Plan, Suite
+from dodo_dsl.plan.pipeline import DEFAULT_TAGS, pipeline
 from dodo_dsl.plan.plan_json import from_json, to_json
 from dodo_dsl.run.rigs.permission import refuse_unattended
 from dodo_dsl.run.rigs.problems import RigProblem
@@ -57,10 +57,10 @@ def test_jobs_have_the_tag_of_their_rig_s_kind(
     tmp_path: Path,
 ) -> None:
     found = plans(tmp_path, rigs, registry)
-    made = pipeline(Suite(tuple(found.values())), "generated")
+    made = pipeline(Suite(tuple(found.values())), Path("generated"))
     jobs = {job.name: job for job in made.jobs}
-    assert [jobs[name].tags or made.options.tags for name in TESTS] == [*(tuple(tag.split()) for tag in tags), ("sil",)]
-    assert [(jobs[name].rig, not jobs[name].on_rig) for name in TESTS[:3]] == [(one, not one) for one in groups]
+    assert [jobs[name].tags or DEFAULT_TAGS for name in TESTS] == [*(tuple(tag.split()) for tag in tags), ("sil",)]
+    assert [(jobs[name].rig, not jobs[name].tags) for name in TESTS[:3]] == [(one, not one) for one in groups]
     assert tuple(name for name in TESTS if found[name].is_real) == real
     for name, tag, group in zip(TESTS, tags, groups, strict=False):
         plan = from_json(to_json(found[name]))

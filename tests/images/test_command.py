@@ -1,6 +1,5 @@
 """dodo images: what it says and how it ends when something is missing."""
 
-import json
 import shutil
 from io import StringIO
 from pathlib import Path
@@ -136,10 +135,11 @@ def test_builds_have_contexts_of_their_own(docker: Path, monkeypatch: pytest.Mon
     (root / "dodo.yml").write_text("dodo: 1\nregistry: [., tests]\napplication: docker-compose.yml\n")
     (root / "docker-compose.yml").write_text("services: {a: {build: ., command: --cid=111}}\n")
     monkeypatch.chdir(root)
-    code, said = run("builds", "--contexts", str(docker.parent / "contexts"))
-    assert code == Exit.OK, said
-    context = Path(json.loads(said)["services"]["a"]["build"]["context"].replace("$$", "$"))
+    told = '{"a": {"image.name": "r/a:latest", "containerimage.digest": "sha256:0"}}'
+    script(docker, f"case $2 in bake) /bin/cp -a ${{4%/*}} {docker.parent}/kept; echo '{told}' > $7 ;; esac")
+    assert run("builds", "--push", "r") == (Exit.OK, "DODO_IMAGE_A=r/a@sha256:0\n")
+    (context,) = (docker.parent / "kept").rglob("a$b")
     found = sorted(path.name for path in context.rglob("*") if path.is_file())
-    assert (context.name, found) == ("a$b", ["README.md", "docker-compose.yml", "dodo.yml", "main.py"])
-    docker.write_text("a file")
-    assert run("builds", "--contexts", str(docker))[0] == Exit.USAGE
+    assert found == ["README.md", "docker-compose.yml", "dodo.yml", "main.py"]
+    script(docker, "case $2 in bake) echo '{}' > $7 ;; esac")
+    assert "the build of 'a' has said no digest" in run("builds", "--push", "r")[1]

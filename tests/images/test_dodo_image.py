@@ -34,8 +34,8 @@ def test_it_has_what_jobs_call(dodo: str) -> None:
 
 
 def runner_flags() -> list[str]:
-    """What docs/how-to/gitlab-runners.md has a runner allow the container of a job."""
-    page = (ROOT / "docs" / "how-to" / "gitlab-runners.md").read_text()
+    """What docs/how-to/gitlab.md has a runner allow the container of a job."""
+    page = (ROOT / "docs" / "how-to" / "gitlab.md").read_text()
     (block,) = [text for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "cap_add" in text]
     settings = tomllib.loads(block)["runners"][0]["docker"]
     capabilities = [f"--cap-add={name}" for name in settings["cap_add"]]

@@ -33,13 +33,6 @@ def test_large_files_of_several_tests_stand_once(tmp_path: Path) -> None:
     assert [copy.target for copy in shared["three"]] == ["a.rec", "a$2.rec"]
 
 
-@pytest.mark.usefixtures("large")
-def test_what_the_repository_has_is_linked_whoever_needs_it(tmp_path: Path) -> None:
-    (one,) = standing_once(found(tmp_path, one="a.rec small.rec"), lambda path: path.name == "a.rec")["one"][:1]
-    assert one.is_linked and one.source == tmp_path / "a.rec"
-    assert not any(copy.shared for copy in standing_once(found(tmp_path, one="a.rec"))["one"])
-
-
 @pytest.mark.parametrize("target", ["a.rec", "recordings/a.rec", "deep/er/a.rec"])
 def test_a_link_leads_to_the_shared_file_on_the_machine_and_in_containers(target: str) -> None:
     copy = FileCopy(target, Path("x"), "name")
@@ -47,23 +40,11 @@ def test_a_link_leads_to_the_shared_file_on_the_machine_and_in_containers(target
     assert posixpath.normpath(f"/dodo/files/{target}/../{copy.link}") == f"/{SHARED}/name"
 
 
-def test_shared_files_are_those_that_were_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    name = f"{hashlib.sha256(b'drive').hexdigest()}-a.rec"
-    folder, shared = tmp_path / "out" / "dil-a", {"a.rec": name}
+def test_a_shared_file_stays_beside_its_tests(tmp_path: Path) -> None:
+    folder, place = tmp_path / "out/dil-a", tmp_path / "out" / SHARED / "0-a.rec"
     (folder / "files").mkdir(parents=True)
-    (folder / "files/a.rec").symlink_to(f"../../{SHARED}/{name}")
-    place = folder.parent / SHARED
-    place.mkdir()
-    assert "has to stay with them" in file_problem(folder, shared)
-    (place / name).symlink_to("../../a.rec")
-    assert "'a.rec' is not in this checkout; commit it" in file_problem(folder, shared)
-    (tmp_path / "a.rec").write_text("drive")
-    assert file_problem(folder, shared) == ""
-    (tmp_path / "a.rec").write_text("drives")
-    assert "has the SHA-256" in file_problem(folder, shared)
-    (tmp_path / "a.rec").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
-    assert "is a pointer of Git LFS: install git-lfs" in file_problem(folder, shared)
-    (tmp_path / "a.rec").write_text("drive")
-    (folder / "files/a.rec").unlink()
-    assert "compile the test again" in file_problem(folder, shared)
+    (folder / "files/a.rec").symlink_to(f"../../{SHARED}/0-a.rec")
+    assert "has to stay beside the compiled tests" in file_problem(folder, {"a.rec": "0-a.rec"})
+    place.parent.mkdir()
+    place.write_text("drive")
+    assert file_problem(folder, {"a.rec": "0-a.rec"}) == ""

@@ -1,11 +1,13 @@
 """``dodo compile --tags --image --run-options --images``."""
 
 import argparse
+import json
 from pathlib import Path
 
 import pytest
-from dodo_dsl.cli.pipeline_options import services, tags
 
+from dodo_dsl.cli.compile import _services as services
+from dodo_dsl.cli.compile import _tags as tags
 from tests.check import examples
 from tests.emit.readers import pipeline, run
 
@@ -32,38 +34,16 @@ def test_other_lists_are_refused(text: str) -> None:
         tags(text)
 
 
-DIND = {"name": "docker:dind", "alias": "docker", "command": ["--tls=false"], "variables": {"A": 'b "c" => :d'}}
+def test_services_are_a_list_of_what_gitlab_takes() -> None:
+    dind = {"name": "docker:dind", "alias": "docker", "command": ["--tls=false"]}
+    for found in ([], ["redis", "a: b"], [dind, "redis"]):
+        assert services(f" {json.dumps(found)}") == tuple(found)
+    assert services("") == ()
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("", ()),
-        (" []", ()),
-        (' ["redis", "a: b"]', ("redis", "a: b")),
-        (
-            ' [{"name":"docker:dind","alias":"docker","command":["--tls=false"],"variables":{"A":"b \\"c\\" => :d"}}]',
-            (DIND,),
-        ),
-        (
-            ' [{:name=>"docker:dind", :alias=>"docker", :command=>["--tls=false"], '
-            ':variables=>{:A=>"b \\"c\\" => :d"}}]',
-            (DIND,),
-        ),
-        (
-            '[{name: "docker:dind", alias: "docker", command: ["--tls=false"], variables: {A: "b \\"c\\" => :d"}}]',
-            (DIND,),
-        ),
-        ('[{"name" => "a\\#{x}", :pull_policy => nil}, "b"]', ({"name": "a#{x}", "pull_policy": None}, "b")),
-    ],
-)
-def test_services_are_a_list_as_gitlab_writes_it_in_any_version(text: str, found: tuple[object, ...]) -> None:
-    assert services(text) == found
-
-
-@pytest.mark.parametrize("text", ["redis", "[1]", '["a"', "[[]]", '[""]', '[{alias: "a"}]', '["a\\nb"]', '["C:\\\\x"]'])
+@pytest.mark.parametrize("text", ["redis", "[1]", '["a"', "[[]]", '[""]', '[{"alias": "a"}]', '[{:name=>"a"}]', "{}"])
 def test_other_services_are_refused(text: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match="service"):
+    with pytest.raises(argparse.ArgumentTypeError, match="is not a JSON list of names"):
         services(text)
 
 
@@ -85,7 +65,7 @@ def test_the_pipeline_has_them() -> None:
     code, out, _ = run("compile", "--services", "docker:dind")
     assert code == 2, "neither a list nor a job that would run without it"
     code, out, _ = run("compile", "--check", "--tags", "")
-    assert code == 1 and '-  tags: ["docker"]\n' in out
+    assert code == 1 and "-  tags: [docker]\n" in out
 
 
 @pytest.mark.thorough

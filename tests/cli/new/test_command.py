@@ -5,8 +5,10 @@ import re
 import shutil
 import subprocess
 import sys
+import textwrap
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -335,8 +337,8 @@ def test_an_application_in_c_plus_plus_has_what_builds_it(empty: Path) -> None:
     (service,) = yaml.safe_load((empty / "docker-compose.yml").read_text())["services"].values()
     assert service["x-dodo-process"] == ["build/steering"]
     assert "build/" in (empty / ".gitignore").read_text().splitlines()
-    included = [entry["local"] for entry in yaml.safe_load((empty / ".gitlab-ci.yml").read_text())["include"]]
-    assert [Path(path).name for path in included] == ["deployment.gitlab-ci.yml", "application.gitlab-ci.yml"]
+    (included,) = yaml.safe_load((empty / ".gitlab-ci.yml").read_text())["include"]
+    assert (Path(included["local"]).name, included["inputs"]["images"]) == ("tests.gitlab-ci.yml", True)
     assert dodo("compile", "--check") == (0, "1 test checked: no problems\n", "")
     standard = {definition.name: definition for definition in odvd.load(STANDARD)}
     own = {definition.name: definition for definition in odvd.load(empty / "messages.odvd")}
@@ -508,7 +510,14 @@ def test_a_deployment_takes_the_compose_file_that_is_there(empty: Path) -> None:
     assert before.items() <= contents(empty).items()
     assert not (empty / "docker-compose.yml").exists()
     assert yaml.safe_load((empty / "dodo.yml").read_text())["application"] == "compose.yml"
-    assert "include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml" in out
+    assert pasted(out)["inputs"] == {"stage": "test"}
+
+
+def pasted(said: str) -> dict[str, Any]:
+    """What the lines say that are to be added to the pipeline."""
+    text = said.partition("add to .gitlab-ci.yml:\n")[2].partition("dodo new sil-first")[0].partition("commit and")[0]
+    (entry,) = yaml.safe_load(textwrap.dedent(text))["include"]
+    return dict(entry)
 
 
 OWN_PIPELINE = """\
@@ -525,48 +534,27 @@ def test_what_meets_the_pipeline_that_is_there_is_told(empty: Path, what: str) -
     (empty / ".gitlab-ci.yml").write_text(OWN_PIPELINE)
     (empty / ".gitignore").write_text("*.o\n/generated\n")
     code, out, err = dodo("new", what)
-    told = "GitLab merges this job 'compile' with DoDo's job of the same name; give yours another name"
-    assert (code, err) == (0, f"warning: .gitlab-ci.yml:3:1: {told}\n")
+    assert (code, err) == (0, "")
     assert "kept: .gitignore, which lacks dodo-report/, gl-code-quality-report.json\n" in out
-    assert (
-        "include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml, with 'inputs: {stage: build}', "
-        "as 'test' is not among its stages: build, deploy\n"
-    ) in out
+    assert pasted(out) == {"local": ".gitlab/dodo/tests.gitlab-ci.yml", "inputs": {"stage": "build"}}
     assert ("name your services in docker-compose.yml" in out) is (what == "--deployment")
     assert (empty / ".gitlab-ci.yml").read_text() == OWN_PIPELINE
 
 
-def test_images_need_both_templates_in_the_pipeline_that_is_there(empty: Path) -> None:
-    (empty / ".gitlab-ci.yml").write_text("lint: {script: [make lint]}\n")
-    _, out, err = dodo("new", "--application", "--language", "cpp")
-    files = ".gitlab/dodo/deployment.gitlab-ci.yml and .gitlab/dodo/application.gitlab-ci.yml"
-    assert (f"include {files} in .gitlab-ci.yml\n" in out, err) == (True, "")
-
-
 @pytest.mark.parametrize(
-    "text",
-    [
-        "compile: {before_script: [make], artifacts: {paths: [generated/, build/]}}\n",
-        "compile:stages: [\n",
-        "spec: {}\n---\ncompile: {script: [make]}\n",
-        "stages: !reference [.all, stages]\ncompile: !reference [.build]\n",
-        "stages: [!reference [.all, stages], deploy]\n",
-        "",
-    ],
-    ids=["a change to DoDo's job", "no YAML", "two documents", "references", "a reference to some", "empty"],
+    "text", ["a:stages: [\n", "spec: {}\n---\na: {script: [make]}\n", "stages: !reference [.all, stages]\n", ""]
 )
-def test_a_pipeline_without_such_a_job_is_fine(empty: Path, text: str) -> None:
+def test_a_pipeline_that_says_no_stage_has_that_of_gitlab(empty: Path, text: str) -> None:
     (empty / ".gitlab-ci.yml").write_text(text)
     code, out, err = dodo("new", "--deployment")
-    assert (code, err) == (0, "")
-    assert "include .gitlab/dodo/deployment.gitlab-ci.yml in .gitlab-ci.yml\n" in out
+    assert (code, err, pasted(out)["inputs"]) == (0, "", {"stage": "test"})
 
 
 def test_who_has_included_the_templates_is_not_told_to(repository: Path) -> None:
     shutil.rmtree(repository / ".gitlab")
     (repository / "docker-compose.yml").write_text("services: {app: {image: example, command: --cid=111}}\n")
     out = dodo("new", "--deployment")[1]
-    assert "wrote .gitlab/dodo/deployment.gitlab-ci.yml\n" in out
+    assert "wrote .gitlab/dodo/tests.gitlab-ci.yml\n" in out
     assert "kept: .gitignore\n" in out
     assert "include " not in out
     assert "name your services" not in out

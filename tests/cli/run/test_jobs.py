@@ -196,7 +196,7 @@ def test_a_compiled_test_without_its_shared_files_is_not_run(folder: Path) -> No
     prepared(folder)
     path = folder / "out/example" / PLAN_FILE
     path.write_text(path.read_text().replace('"shared": {}', f'"shared": {{"a.rec": "{"0" * 64}-a.rec"}}'))
-    with pytest.raises(UsageError, match=r"example: 'a\.rec' is missing: '.*_files' belongs to the compiled tests"):
+    with pytest.raises(UsageError, match=r"example: 'a\.rec' is missing: .* beside the compiled tests"):
         run_compiled(folder, path.parent)
 
 
