@@ -13,8 +13,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dodo_dsl import package_data
-from tests.images.conftest import base_image, built  # noqa: F401
 from tests.report.joined.gitlab_api import serving
 
 pytestmark = pytest.mark.slow
@@ -24,32 +22,28 @@ CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 PROGRAMS = CACHE / "dodo/gitlab-ci-local/node_modules/.bin"
 FOREIGN = """\
 include:
-  - local: .gitlab/dodo/application.gitlab-ci.yml
+  - local: .gitlab/dodo/tests.gitlab-ci.yml
     inputs:
       compose-file: kiwi/docker-compose.yml
       needs: [configure]
       before-script: echo "before $CI_JOB_NAME${OURS:+ with what is ours}"
-      variables: [DODO_RUN_OPTIONS, DODO_REGISTRY]
-  - local: .gitlab/dodo/deployment.gitlab-ci.yml
-    inputs:
-      needs: [configure]
-      before-script: echo "before $CI_JOB_NAME${OURS:+ with what is ours}"
-      variables: [DODO_RUN_OPTIONS, DODO_REGISTRY]
+      variables: [DODO_RUN_OPTIONS]
 stages: [prepare, test, release]
 default: {before_script: [echo of foreign jobs only]}
-variables: {DODO_RUN_OPTIONS: "", DODO_REGISTRY: "", GIT_STRATEGY: none, OURS: "1"}
+variables: {DODO_RUN_OPTIONS: "", GIT_STRATEGY: none, OURS: "1"}
 configure: {stage: prepare, script: [echo configured]}
-lint: {script: [echo linted]}
+compile: {script: [echo compiled]}
 publish: {stage: release, script: [echo published]}
-dodo-images: {script: ["echo DODO_IMAGE_STEERING=example > dodo-images.env; touch dodo-deployment.gitlab-ci.yml"]}
 """
-"""Both templates in a pipeline with stages, jobs and defaults of its own. Its images are built elsewhere."""
+"""In a pipeline with stages, jobs and defaults of its own."""
 NO_TAGS = ("#/definitions/tags/minItems", "#/additionalProperties")
 """What GitLab allows and the schema in gitlab-ci-local does not."""
 ONE_JOB = """\
 include:
   - local: .gitlab/dodo/run.gitlab-ci.yml
-    inputs: {tests: sil-*-straight, run-options: -j 1}
+    inputs: {run-options: -j 1}
+variables: {}
+dodo-run: {parallel: 2}
 """
 TESTS = ("sil-closed-left-curve", "sil-closed-straight")
 
@@ -86,7 +80,8 @@ def pipeline(folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
     path = os.pathsep.join([str(PROGRAMS), str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "DODO_LEASES": str(folder / ".leases")}
     allowed = [word for path in NO_TAGS for word in ("--ignore-schema-paths", path)]
-    command = ["gitlab-ci-local", "--home", str(folder / ".home"), "--concurrency", "1", *allowed, *words]
+    command = ["gitlab-ci-local", "--home", str(folder / ".home"), "--concurrency", "1", "--force-shell-executor"]
+    command += [*allowed, *words]
     return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=900
     )
@@ -96,12 +91,7 @@ def artifact(folder: Path, job: str, name: str) -> Path:
     return folder / ".gitlab-ci-local/artifacts" / job / name
 
 
-@pytest.mark.engine
-@pytest.mark.usefixtures("built")
 def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> None:
-    """The parent has built an image, so the child's tests run in containers."""
-    written = repository / ".gitlab/dodo/deployment.gitlab-ci.yml"
-    assert written.read_bytes() == (package_data.templates() / "deployment/template.yml").read_bytes()
     with serving(repository / ".gitlab-ci-local/artifacts") as api:
         variables = api.environment(CI_JOB_URL="https://gitlab.example.org/-/jobs/5").items()
         result = pipeline(
@@ -113,11 +103,9 @@ def test_the_parent_compiles_and_the_child_runs_every_test(repository: Path) -> 
     plain = re.sub(r"\x1b\[[0-9;]*m", "", result.stdout)
     said = re.findall(r"^(?:\t\[dodo-tests\] -> )?([\w-]+) +> *(.*)", plain, re.MULTILINE)
     foreign = {name for name, words in said if "of foreign jobs only" in words}
-    assert foreign == {"configure", "lint", "publish"}
+    assert foreign == {"configure", "compile", "publish"}
     before = {name for name, words in said if words == f"before {name}"}
-    assert before >= {"compile", "dodo-check", *TESTS}, "all jobs with a script, also of the child, and without OURS"
-    image = artifact(repository, "compile", f"generated/{TESTS[0]}/.env").read_text().splitlines()[-1]
-    assert image == "DODO_IMAGE_STEERING=example"
+    assert before >= {"dodo-compile", *TESTS}, "all jobs with a script, also of the child, and without OURS"
     for name in TESTS:
         (case,) = ElementTree.parse(artifact(repository, name, "dodo-report/junit.xml")).iter("testcase")
         assert (case.get("name"), case.get("classname")) == (name, "sil")
@@ -141,28 +129,28 @@ def steer_the_other_way(repository: Path) -> None:
 
 
 def test_a_failing_application_fails_its_job(repository: Path) -> None:
-    """The exit code of a job of two tests says so; the report is kept."""
+    """The exit code says so; the report is kept."""
     steer_the_other_way(repository)
-    run(repository, sys.executable, "-m", "dodo_dsl", "compile", "--jobs", "1")
+    run(repository, sys.executable, "-m", "dodo_dsl", "compile")
     child = repository / "generated/child.gitlab-ci.yml"
-    result = pipeline(repository, "--file", str(child.relative_to(repository)), "--variable", "PARENT_PIPELINE_ID=1")
+    words = ("--file", str(child.relative_to(repository)), "--variable", "DODO_PARENT_PIPELINE_ID=1")
+    result = pipeline(repository, *words)
     assert result.returncode == 1, result.stdout[-4000:] + result.stderr[-2000:]
     assert "FAIL" in result.stdout
-    (written,) = artifact(repository, "*", "").parent.glob("*/dodo-report/junit.xml")  # of a job with a coded name
-    cases = list(ElementTree.parse(written).iter("testcase"))
-    assert [case.get("name") for case in cases] == list(TESTS)
-    assert all("wall" in str(failure.get("message")) for case in cases for failure in case.iter("failure"))
-    assert cases[1].find("failure") is not None
+    (case,) = ElementTree.parse(artifact(repository, TESTS[1], "dodo-report/junit.xml")).iter("testcase")
+    assert "wall" in str(case.find("failure").get("message"))  # type: ignore[union-attr]
 
 
 @pytest.mark.proof
-def test_and_so_does_one_job_for_all(repository: Path) -> None:
+def test_and_so_do_jobs_that_share_the_tests(repository: Path) -> None:
     steer_the_other_way(repository)
     (repository / ".gitlab-ci.yml").write_text(ONE_JOB)
+    commit(repository)
     result = pipeline(repository)
     assert result.returncode == 1, result.stdout[-4000:] + result.stderr[-2000:]
-    (case,) = ElementTree.parse(artifact(repository, "dodo-run", "dodo-report/junit.xml")).iter("testcase")
-    assert (case.get("name"), [child.tag for child in case.iter("failure")]) == ("sil-closed-straight", ["failure"])
+    written = (repository / ".gitlab-ci-local/artifacts").glob("*/dodo-report/junit.xml")
+    cases = [[case.get("name") for case in ElementTree.parse(path).iter("testcase")] for path in written]
+    assert sorted(cases) == [[name] for name in TESTS], "a part each"
 
 
 def test_dodo_s_own_pipeline_has_the_component_of_the_checkout(repository: Path) -> None:
