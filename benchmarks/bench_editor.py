@@ -1,10 +1,10 @@
 """How soon ``dodo lsp`` answers an editor, in a repository with 100 tests, beside yaml-language-server.
 
 The tests are copies of the shipped ones, with their matrices and with what they extend. A client of the protocol opens
-one, makes a mistake and fixes it again, text by text: a key is answered when the problems are shown, or shown to be
+one, makes a mistake and fixes it again, and saves each text: it is answered when the problems are shown, or shown to be
 gone. The peer is what editors otherwise check a test with: it knows the schema alone, and one file at a time, where
-``dodo lsp`` checks wiring, maps and all other tests, too. Both wait a moment for the next key, 0.05 and 0.2 s, which is
-part of the figures, as an editor's user waits for it, too.
+``dodo lsp`` checks wiring, maps and all other tests, too. The peer waits 0.2 s for the next key, which is part of its
+figures, as an editor's user waits for it, too.
 """
 
 import shutil
@@ -33,7 +33,7 @@ TESTS, ROUNDS, KEYS = 100, 5, 10
 GOAL = Goal(0.2, of="value")
 OPENED = "sil-closed-straight-1"
 MISTAKE = ("timeout: 60 s", "timeot: 60 s")
-KEY, LATE = "problems after a key", "problems after a key, 95 %"
+KEY, LATE = "problems after a save", "problems after a save, 95 %"
 
 
 def write_registry(folder: Path) -> Path:

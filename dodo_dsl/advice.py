@@ -19,7 +19,6 @@ from urllib.parse import unquote, urlsplit
 from dodo_dsl import package_data
 
 _LOADED = {
-    "lsp": ("pygls.lsp.server", "lsprotocol.types"),
     "mcap": ("mcap.writer", "mcap_protobuf.schema", "foxglove_schemas_protobuf"),
     "ros": ("rosbags.rosbag2", "cyclonedds.core"),
     "search": ("scipy",),

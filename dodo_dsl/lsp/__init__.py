@@ -1,1 +1,1 @@
-"""The language server: what the compiler says, in an editor, of text that is not saved yet."""
+"""The language server: what ``dodo compile --check`` finds, in an editor."""

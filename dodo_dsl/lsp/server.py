@@ -1,168 +1,125 @@
-"""The language server: it listens to the editor, and shows what is wrong a moment after a change, and its fixes."""
+"""A server of the language server protocol (LSP 3.17): when a file is opened or saved, it shows what is wrong.
 
-import asyncio
-import logging
-from collections.abc import Iterable, Mapping, Sequence
+It reads files as they are saved, and offers nothing else: completion and hover come from the schema of tests.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
-
-from lsprotocol import types
-from lsprotocol.types import Diagnostic as ShownDiagnostic
-from pygls.lsp.server import LanguageServer
+from urllib.parse import unquote, urlsplit
 
 from dodo_dsl import __version__
-from dodo_dsl.diagnostics import Diagnostic
-from dodo_dsl.lsp.documents import Document, Lines, opened, path_of, saved_text, uri_of
-from dodo_dsl.lsp.edits import quick_fixes
-from dodo_dsl.lsp.project import Projects, by_file, is_ours
+from dodo_dsl.check import forget_files
+from dodo_dsl.compiler import load, plan, without_unsatisfied
+from dodo_dsl.diagnostics import Diagnostic, forget_lines, ordered
+from dodo_dsl.source import MAX_BYTES
+from dodo_dsl.spec.deployment import FILE_NAME, find_deployment, load_deployment
+from dodo_dsl.spec.manifest import load_manifests
+from dodo_dsl.spec.registry import SUFFIX
 from dodo_dsl.terminal import printable
 
-PAUSE_S = 0.05
-"""After the last change, before a check begins."""
-_SEVERITIES = {"error": types.DiagnosticSeverity.Error, "warning": types.DiagnosticSeverity.Warning}
-log = logging.getLogger(__name__)
+Message = dict[str, Any]
+_SEVERITIES = {"error": 1, "warning": 2}
+_SYNC = {"openClose": True, "change": 0, "save": True}
+_CAPABILITIES = {"textDocumentSync": _SYNC, "positionEncoding": "utf-16"}
+_NO_METHOD, _ERROR = -32601, 1
 
 
-class DodoServer(LanguageServer):
-    """One editor's server. Texts come whole, as editors and Python do not agree on what ends a line."""
-
-    def __init__(self) -> None:
-        super().__init__("dodo", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
-        self._checker = Projects()
-        self._timer: asyncio.TimerHandle | None = None
-        self._task: asyncio.Task[None] | None = None
-        self._stale = asyncio.Event()
-        self._published: set[str] = set()
-        self._found: Mapping[Path, Sequence[Diagnostic]] = {}
-
-    def lines(self, text: str) -> Lines:
-        return Lines(text, self.workspace.position_codec)
-
-    def quick_fixes(self, params: types.CodeActionParams) -> list[types.CodeAction]:
-        """The fixes of the problems that the last check found in a document, of whatever kind its file is."""
-        uri = params.text_document.uri
-        path = path_of(uri)
-        found = self._found.get(path, ()) if path else ()
-        lines = self.lines(self.workspace.get_text_document(uri).source) if found else self.lines("")
-        return list(quick_fixes(found, uri, lines, params))
-
-    def say(self, message: str) -> None:
-        self.window_log_message(types.LogMessageParams(types.MessageType.Error, printable(message)))
-
-    def report_server_error(self, error: Exception, source: Any) -> None:
-        """Errors are messages of the log and not of a window."""
-        log.error("%s", error, exc_info=error)
-        self.say(f"internal error: {error}")
-
-    def changed(self, *, elsewhere: bool = False) -> None:
-        """Begins a check soon; ``elsewhere`` where other files than tests may have changed."""
-        if elsewhere:
-            self._checker.forget()
-        if self._timer:
-            self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_later(PAUSE_S, self._begin)
-
-    def _begin(self) -> None:
-        self._stale.set()
-        if self._task is None or self._task.done():
-            self._task = asyncio.get_running_loop().create_task(self._check())
-
-    async def _check(self) -> None:
-        """Checks until nothing has changed meanwhile; whatever fails, the server goes on."""
-        while self._stale.is_set():
-            self._stale.clear()
-            try:
-                documents = opened(self.workspace)
-                projects = await asyncio.to_thread(self._checker.check, {p: d.text for p, d in documents.items()})
-                self._publish(documents, (problem for project in projects for problem in project.diagnostics))
-            except Exception as error:
-                log.exception("the check failed")
-                self.say(f"the check failed: {type(error).__name__}: {error}")
-
-    def _publish(self, documents: Mapping[Path, Document], found: Iterable[Diagnostic]) -> None:
-        """Shows the problems of each file, and clears files and open documents without any."""
-        grouped = self._found = by_file(found)
-        messages: dict[str, types.PublishDiagnosticsParams] = {}
-        for path in {*grouped, *(path for path in documents if is_ours(path))}:
-            document = documents.get(path)
-            lines = self.lines(document.text if document else saved_text(path))
-            shown = [_shown(lines, diagnostic) for diagnostic in sorted(set(grouped.get(path, ())))]
-            uri = document.uri if document else uri_of(path)
-            messages[uri] = types.PublishDiagnosticsParams(uri, shown, document.version if document else None)
-        for uri in self._published - messages.keys():
-            self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, []))
-        for message in messages.values():
-            self.text_document_publish_diagnostics(message)
-        self._published = {uri for uri, message in messages.items() if message.diagnostics}
-
-
-def _shown(lines: Lines, diagnostic: Diagnostic) -> ShownDiagnostic:
-    hint = f"\n{printable(diagnostic.hint)}" if diagnostic.hint else ""
-    return ShownDiagnostic(
-        lines.range(diagnostic.span),
-        printable(diagnostic.sentence) + hint,
-        _SEVERITIES[diagnostic.severity],
-        diagnostic.rule,
-        source="dodo",
-    )
-
-
-_WATCHED = "**/*.{yml,yaml,json,odvd,env}"
-
-
-def build() -> DodoServer:
-    """The server with everything that it listens to."""
-    server = DodoServer()
-    _changes(server)
-    _requests(server)
-    return server
+def problems(files: Sequence[Path]) -> dict[Path, list[Diagnostic]]:
+    """What is wrong in the projects of these tests and deployments, by file, as ``dodo compile --check`` finds it."""
+    load_manifests.cache_clear()
+    forget_files()
+    forget_lines()
+    projects: dict[Path, list[Path]] = {}
+    for file in files:
+        projects.setdefault(find_deployment(file.parent) or file, []).append(file)
+    found: dict[Path, list[Diagnostic]] = {file: [] for file in files}
+    for key, opened in projects.items():
+        specs = [file for file in opened if file.name != FILE_NAME]
+        registry = load_deployment(key)[0].registry if key.name == FILE_NAME else ()
+        outside = [file for file in specs if not any(file.is_relative_to(folder.resolve()) for folder in registry)]
+        checked = without_unsatisfied(load([*registry, *outside] if outside else [], start=key.parent), specs)
+        sound = checked.sound()
+        planned = plan(sound, key.parent / "generated").problems if sound.specs else ()
+        for diagnostic in ordered([*checked.diagnostics, *planned]):
+            found.setdefault(Path(diagnostic.span.file).resolve(), []).append(diagnostic)
+    return found
 
 
 def serve(stdin: BinaryIO, stdout: BinaryIO) -> None:
     """Speaks with one editor until it leaves."""
-    build().start_io(stdin, stdout)
+    server = _Server()
+    while (message := _read(stdin)) is not None and message.get("method") != "exit":
+        for answer in server.answers(message):
+            body = json.dumps({"jsonrpc": "2.0", **answer}).encode()
+            stdout.write(b"Content-Length: %d\r\n\r\n" % len(body) + body)
+            stdout.flush()
 
 
-def _changes(server: DodoServer) -> None:
-    @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
-    def _opened(_: types.DidOpenTextDocumentParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.TEXT_DOCUMENT_DID_CHANGE)
-    def _changed(params: types.DidChangeTextDocumentParams) -> None:
-        server.changed(elsewhere=params.text_document.uri.endswith("/service.yml"))
-
-    @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
-    def _closed(_: types.DidCloseTextDocumentParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
-    def _saved(_: types.DidSaveTextDocumentParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
-    def _watched(_: types.DidChangeWatchedFilesParams) -> None:
-        server.changed(elsewhere=True)
-
-    @server.feature(types.INITIALIZED)
-    def _initialized(_: types.InitializedParams) -> None:
-        _watch(server)
+def _read(stdin: BinaryIO) -> Message | None:
+    """The next message; None at the end of the input."""
+    size = 0
+    while line := stdin.readline().strip():
+        name, _, value = line.partition(b":")
+        size = int(value) if name.lower() == b"content-length" else size
+    message = json.loads(stdin.read(size)) if size else None
+    return message if isinstance(message, dict) else None
 
 
-def _requests(server: DodoServer) -> None:
-    @server.feature(
-        types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
-    )
-    def _code_action(params: types.CodeActionParams) -> list[types.CodeAction]:
-        return server.quick_fixes(params)
+class _Server:
+    """``opened`` are the open tests and deployments with their URIs, ``shown`` the URIs of files with problems."""
+
+    def __init__(self) -> None:
+        self.opened: dict[Path, str] = {}
+        self.shown: set[str] = set()
+
+    def answers(self, message: Message) -> Iterator[Message]:
+        method, params = message.get("method"), message.get("params") or {}
+        if "id" in message:
+            if method in ("initialize", "shutdown"):
+                about = {"capabilities": _CAPABILITIES, "serverInfo": {"name": "dodo", "version": __version__}}
+                yield {"id": message["id"], "result": about if method == "initialize" else None}
+            elif method is not None:
+                yield {"id": message["id"], "error": {"code": _NO_METHOD, "message": f"there is no '{method}'"}}
+        elif method in ("textDocument/didOpen", "textDocument/didClose", "textDocument/didSave"):
+            uri = params["textDocument"]["uri"]
+            path = Path(unquote(urlsplit(uri).path)).resolve()
+            if method == "textDocument/didClose":
+                self.opened.pop(path, None)
+            elif urlsplit(uri).scheme == "file" and (path.name == FILE_NAME or path.name.endswith(SUFFIX)):
+                self.opened[path] = uri
+            try:
+                yield from self._published(problems([*self.opened]))
+            except Exception as error:  # whatever fails, the server goes on
+                said = printable(f"the check failed: {type(error).__name__}: {error}")
+                yield {"method": "window/logMessage", "params": {"type": _ERROR, "message": said}}
+
+    def _published(self, found: Mapping[Path, Sequence[Diagnostic]]) -> Iterator[Message]:
+        """The problems of each file; files that have none any more are cleared."""
+        shown = {self.opened.get(path, path.as_uri()): _shown(path, of_file) for path, of_file in found.items()}
+        for uri, diagnostics in {**dict.fromkeys(sorted(self.shown), []), **shown}.items():
+            yield {"method": "textDocument/publishDiagnostics", "params": {"uri": uri, "diagnostics": diagnostics}}
+        self.shown = {uri for uri, diagnostics in shown.items() if diagnostics}
 
 
-def _watch(server: DodoServer) -> None:
-    """Asks the editor to say when files change on disk, if it can."""
-    workspace = server.client_capabilities.workspace
-    watching = workspace.did_change_watched_files if workspace else None
-    if not watching or not watching.dynamic_registration:
-        return
-    options = types.DidChangeWatchedFilesRegistrationOptions([types.FileSystemWatcher(_WATCHED)])
-    wanted = types.Registration("dodo-files", types.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
-    server.client_register_capability(types.RegistrationParams([wanted]))
+def _shown(path: Path, diagnostics: Sequence[Diagnostic]) -> list[Message]:
+    lines: list[str] = []
+    if diagnostics and path.is_file():
+        with path.open("rb") as file:
+            lines = file.read(MAX_BYTES).decode("utf-8-sig", "replace").splitlines()
+    made = []
+    for each in diagnostics:
+        span = each.span
+        text = lines[span.line - 1] if span.line <= len(lines) else ""
+        ends = (_units(text[: span.column - 1]), _units(text[: span.column - 1 + span.length]))
+        start, end = ({"line": span.line - 1, "character": units} for units in ends)
+        message = printable(each.sentence) + (f"\n{printable(each.hint)}" if each.hint else "")
+        about = {"severity": _SEVERITIES[each.severity], "code": each.rule, "source": "dodo", "message": message}
+        made.append({"range": {"start": start, "end": end}, **about})
+    return made
+
+
+def _units(text: str) -> int:
+    """Code units of UTF-16, in which editors count."""
+    return len(text.encode("utf-16-le", "replace")) // 2

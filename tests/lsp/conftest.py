@@ -61,25 +61,16 @@ class Repository:
         shutil.copytree(ROOT / "tests_registry" / "maps" / "straight", self.map.parent)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def repository(tmp_path_factory: pytest.TempPathFactory) -> Repository:
     found = Repository(tmp_path_factory.mktemp("repository").resolve())
     found.write()
     return found
 
 
-@pytest.fixture(scope="session")
-def running(repository: Repository) -> Iterator[Editor]:
+@pytest.fixture(scope="module")
+def opened(repository: Repository) -> Iterator[Editor]:
+    """An editor with the test open, which has no problems."""
     with editor(repository.folder) as one:
+        assert one.open(repository.spec) == []
         yield one
-
-
-@pytest.fixture
-def opened(running: Editor, repository: Repository) -> Iterator[Editor]:
-    """The editor with the test open; nothing is wrong with it before, and the server has not failed after."""
-    running.messages.clear()
-    running.shown.clear()
-    assert running.open(repository.spec) == []
-    yield running
-    running.close(repository.spec)
-    assert not [m for m in running.messages if m.get("method") in ("window/logMessage", "window/showMessage")]

@@ -49,14 +49,13 @@ class Editor:
     def request(self, method: str, params: Any) -> Any:
         number = next(self._ids)
         self.send(id=number, method=method, params=params)
-        (answer,) = self.until(lambda m: m.get("id") == number and "method" not in m)
+        answer = self.until(lambda m: m.get("id") == number and "method" not in m)
         assert "error" not in answer, answer
         return answer["result"]
 
-    def until(self, *wanted: Callable[[Message], bool]) -> list[Message]:
-        """The first message that each of the conditions holds for, of those that arrive from now on."""
-        found: list[Message | None] = [None] * len(wanted)
-        while None in found:
+    def until(self, fits: Callable[[Message], bool]) -> Message:
+        """The first message that the condition holds for, of those that arrive from now on."""
+        while True:
             message = self._arrived.get(timeout=PATIENCE_S)
             assert message is not None, "the server has ended"
             self.messages.append(message)
@@ -64,42 +63,34 @@ class Editor:
                 self.shown[message["params"]["uri"]] = message["params"]["diagnostics"]
             elif "id" in message and "method" in message:
                 self.send(id=message["id"], result=None)
-            found = [f or (message if fits(message) else None) for f, fits in zip(found, wanted, strict=True)]
-        return [message for message in found if message]
+            if fits(message):
+                return message
 
-    def open(self, path: Path, text: str | None = None) -> list[Message]:
-        """Opens a file, perhaps with another text than it holds, and awaits its problems."""
-        document = {"uri": path.as_uri(), "languageId": "yaml", "version": next(self._versions)}
-        document["text"] = path.read_text() if text is None else text
-        self.send(method="textDocument/didOpen", params={"textDocument": document})
-        return self.problems(path, document["version"])
+    def notify(self, event: str, path: Path, **document: Any) -> None:
+        self.send(method=f"textDocument/{event}", params={"textDocument": {"uri": path.as_uri(), **document}})
 
-    def change(self, path: Path, text: str) -> list[Message]:
-        version = self.type(path, text)
-        return self.problems(path, version)
+    def open(self, path: Path) -> list[Message]:
+        """Opens a file, and awaits its problems."""
+        self.notify("didOpen", path, languageId="yaml", version=1, text=path.read_text())
+        return self.problems(path)
 
-    def type(self, path: Path, text: str) -> int:
-        version = next(self._versions)
-        document = {"uri": path.as_uri(), "version": version}
-        params = {"textDocument": document, "contentChanges": [{"text": text}]}
-        self.send(method="textDocument/didChange", params=params)
-        return version
+    def save(self, path: Path, text: str) -> list[Message]:
+        path.write_text(text)
+        self.notify("didSave", path)
+        return self.problems(path)
 
-    def close(self, path: Path) -> None:
-        self.send(method="textDocument/didClose", params={"textDocument": {"uri": path.as_uri()}})
+    def type(self, path: Path, text: str) -> None:
+        """Changes the text and saves it."""
+        document = {"uri": path.as_uri(), "version": next(self._versions)}
+        self.send(method="textDocument/didChange", params={"textDocument": document, "contentChanges": [{"text": text}]})
+        path.write_text(text)
+        self.notify("didSave", path)
 
-    def problems(self, path: Path, version: int | None = None) -> list[Message]:
-        """The problems of a file that are shown next, for a version of its text."""
-        uri = path.as_uri()
-
-        def fits(message: Message) -> bool:
-            params = message.get("params") or {}
-            about = message.get("method") == "textDocument/publishDiagnostics" and params["uri"] == uri
-            return about and (version is None or params.get("version") == version)
-
-        (message,) = self.until(fits)
-        found: list[Message] = message["params"]["diagnostics"]
-        return found
+    def problems(self, path: Path) -> list[Message]:
+        """The problems of a file that are shown next."""
+        shown = "textDocument/publishDiagnostics"
+        self.until(lambda m: m.get("method") == shown and m["params"]["uri"] == path.as_uri())
+        return self.shown[path.as_uri()]
 
     def leave(self) -> int:
         self.request("shutdown", None)
@@ -109,7 +100,7 @@ class Editor:
 
 @contextmanager
 def editor(
-    folder: Path, encodings: list[str] | None = None, command: Sequence[str] = (sys.executable, "-m", "dodo_dsl", "lsp")
+    folder: Path, command: Sequence[str] = (sys.executable, "-m", "dodo_dsl", "lsp")
 ) -> Iterator[Editor]:
     """An editor that has opened a folder, with its server."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -117,10 +108,7 @@ def editor(
     process = subprocess.Popen(command, cwd=folder, env=environment, **pipes)
     one = Editor(process)
     try:
-        general = {"positionEncodings": encodings} if encodings else {}
-        capabilities = {"general": general, "workspace": {"didChangeWatchedFiles": {"dynamicRegistration": True}}}
-        params = {"processId": None, "rootUri": folder.as_uri(), "capabilities": capabilities}
-        one.request("initialize", params)
+        one.request("initialize", {"processId": None, "rootUri": folder.as_uri(), "capabilities": {}})
         one.send(method="initialized", params={})
         yield one
     finally:
