@@ -1,7 +1,15 @@
 """Sphinx's settings for the documentation as a site: ``make site`` builds it into build/site, without a network.
 
-Pages are the Markdown files of the repository where they are, so that their links work in both.
+Pages are the Markdown files of the repository where they are, so that their links work in both. What ``--help`` of each
+command says is a page of the site alone.
 """
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 project = "DoDo"
 author = "the DoDo developers"
@@ -39,3 +47,23 @@ html_sidebars = {
         "sidebar/scroll-end.html",
     ]
 }
+
+
+def setup(app: Any) -> None:
+    """Writes the page of commands, before pages are looked for."""
+    root = Path(__file__).resolve().parents[2]
+    sys.path.insert(0, str(root))
+    os.environ["COLUMNS"] = "110"  # which argparse reads
+    from dodo_dsl import atomic
+    from dodo_dsl.cli.main import parser
+
+    atomic.write_text(root / "docs/reference/commands.md", "# Commands\n" + "".join(_sections(parser(), 2)))
+
+
+def _sections(words: argparse.ArgumentParser, depth: int) -> Iterator[str]:
+    """A section for each command, and one below it for each of its actions."""
+    for action in words._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                yield f"\n{'#' * depth} {below.prog}\n\n```text\n{below.format_help().rstrip()}\n```\n"
+                yield from _sections(below, depth + 1)

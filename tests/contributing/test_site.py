@@ -9,16 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.contributing import commands_page, reference_pages
+from tests.contributing import reference_pages
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.mark.skipif(
-    sys.version_info[:2] != (3, 11), reason="the help of other versions of Python is laid out otherwise"
-)
-def test_the_page_of_commands_is_up_to_date() -> None:
-    assert commands_page.PAGE.read_text() == commands_page.text(), "run scripts/make-commands"
 
 
 @pytest.mark.parametrize("page", reference_pages.PAGES, ids=lambda page: page.stem)
