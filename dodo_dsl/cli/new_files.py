@@ -1,26 +1,30 @@
-"""Files that ``dodo new`` writes into a repository with tests, or finds and keeps: dodo.yml, schemas, the pipeline.
-
-Of a file that is kept it says what it lacks, and what in it meets DoDo's pipeline.
-"""
+"""The files that ``dodo new`` writes: filled templates, and tests that are copied."""
 
 import functools
-import importlib.util
+import os
 import re
-import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
 import jinja2
+import yaml
 
-from dodo_dsl import __version__, package_data, source
-from dodo_dsl.application.read import as_written
-from dodo_dsl.cli.existing_application import declarable, own_services
+from dodo_dsl import package_data
+from dodo_dsl.cli.errors import UsageError
 from dodo_dsl.diagnostics import shown_path
-from dodo_dsl.opendlv import regular_file
-from dodo_dsl.spec.deployment import FILE_NAME
-from dodo_dsl.terminal import printable
+from dodo_dsl.source import Mapping as Written
+from dodo_dsl.source import plain, read
+from dodo_dsl.spec import load, vary
+from dodo_dsl.spec.model import LAYERS, Spec
+from dodo_dsl.spec.registry import SUFFIX
+
+SCHEMAS = ("deployment.schema.json", "application.schema.json", "dodo.schema.json")
+SCHEMA_FOLDERS = (".dodo", "schemas")
+"""Where a repository may have the schemas for editors: the first is where ``dodo new`` writes them."""
+_MAPS = ("straight", "rig-straight")
+_TARGET = "targets/weave.csv"
 
 
 @dataclass(frozen=True)
@@ -46,165 +50,84 @@ def filled(template: str, **values: object) -> bytes:
     return _templates().get_template(template).render(**values).encode()
 
 
-COMPOSE_FILES = ("docker-compose.yml", "docker-compose.yaml", "compose.yml", "compose.yaml")
-_SERVICES = re.compile(rb"^services:", re.MULTILINE)
-_MOST_LOOKED, _MOST_NAMED, _MOST_BYTES = 200, 8, 20_000
-REGISTRY = "tests"
-_SCHEMAS = ".dodo"
-_PROCESSES = {"python": "python, steering.py", "cpp": "build/steering"}
-LANGUAGES = tuple(_PROCESSES)
-ANSWERS = ("bus", "printed", "wheels")
-"""Of the application that ``dodo new --application`` writes, as are its languages."""
-_SPEC_SCHEMA = "dodo.schema.json"
-_MESSAGES = "messages.odvd"
-ROS = "ros"
-"""How an application answers that is a ROS 2 node."""
-ROS_PYTHON = ".ros/bin/python"
-_OF_ROS = {
-    "python": ("steering.py", "setup.py", "setup.cfg", "resource/steering"),
-    "cpp": ("steering.cpp", "CMakeLists.txt"),
-}
-_PACKAGE_OF_ROS = ("package.xml", "Dockerfile", FILE_NAME, COMPOSE_FILES[0])
-_RUN_COLCON = '"bash", "-c", ". install/setup.bash && exec install/steering/lib/steering/steering"'
+def filled_folder(name: str, root: Path, **values: object) -> dict[str, New]:
+    """The files of a folder of templates, each in its place below ``root``, by that place."""
+    folder = package_data.templates() / "new" / name
+    found = (path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file())
+    names = [path for path in found if "__pycache__" not in path]  # of an installed DoDo
+    return {path: New(root / path, filled(f"{name}/{path}", **values)) for path in names}
 
 
-def compose_file(root: Path) -> str:
-    """The name of the compose file in a folder, empty when there is none."""
-    return next((name for name in COMPOSE_FILES if (root / name).is_file()), "")
+def spec_files(name: str, folder: Path, root: Path, text: bytes) -> list[New]:
+    """A test, with the line by which editors know its schema where the repository has that."""
+    places = (root / place / SCHEMAS[-1] for place in SCHEMA_FOLDERS)
+    schema = next((os.path.relpath(place, folder) for place in places if place.is_file()), "")
+    line = f"# yaml-language-server: $schema={schema}\n".encode() if schema else b""
+    return [New(folder / f"{name}{SUFFIX}", line + text)]
 
 
-def own_compose_file(root: Path) -> str:
-    """The same, also empty if nothing but the stack around an application is in it."""
-    name = compose_file(root)
-    application = as_written(root / name) if name else None
-    return "" if application and not any(own_services(application)) else name
+def world_files(text: bytes, registry: Path) -> list[New]:
+    """The map and the target of a template's test, where the registry has none."""
+    files = []
+    for name in _MAPS:
+        if re.search(rf"\.\./maps/{name}\b(?!-)".encode(), text) and not (registry / "maps" / name).exists():
+            files += map_files(name, registry / "maps" / name)
+    if f"../{_TARGET}".encode() in text and not (registry / _TARGET).exists():
+        files.append(New(registry / _TARGET, filled("tests/weave.csv")))
+    return files
 
 
-def other_compose_files(root: Path) -> list[str]:
-    """Compose files under other names, in a repository and its folders, by their suffix and first keys."""
-    found = sorted((*root.glob("*.y*ml"), *root.glob("[!.]*/*.y*ml")), key=lambda path: (len(path.parts), path))
-    looked = (path for path in found[:_MOST_LOOKED] if path.is_file() and not path.is_symlink())
-    names = [str(path.relative_to(root)) for path in looked if _SERVICES.search(_beginning(path))]
-    return names[:_MOST_NAMED]
+def map_files(name: str, folder: Path) -> list[New]:
+    """A copy of a shipped map."""
+    shipped = sorted((package_data.registry() / "maps" / name).iterdir())
+    return [New(folder / path.name, path.read_bytes()) for path in shipped]
 
 
-def _beginning(path: Path) -> bytes:
-    try:
-        with regular_file.opened(path) as file:
-            return file.read(_MOST_BYTES)
-    except OSError:
-        return b""
+def extending_files(name: str, base: Spec, root: Path) -> list[New]:
+    """A test that extends ``base``, in its registry."""
+    path = base.path.relative_to(base.location.root.resolve()).as_posix()
+    text = filled("tests/extends.dodo.yml", name=name, base=path, of=base.name)
+    return spec_files(name, base.location.root / name, root, text)
 
 
-def schema_of_specs(root: Path) -> Path:
-    """Where editors find the schema of specs in a repository, whether it is there yet or not."""
-    own = root / "schemas" / _SPEC_SCHEMA
-    return own if own.is_file() else root / _SCHEMAS / _SPEC_SCHEMA
+def copied_files(name: str, base: Spec, registry: Path, root: Path) -> list[New]:
+    """A copy of a shipped test as ``name``, with the files that it names and the registry lacks."""
+    text = _copied_text(name, base)
+    files = spec_files(name, registry / name, root, text)
+    shipped, own = base.location.root.resolve(), base.path.resolve().parent
+    words = re.findall(r"[\w.][\w./-]*", text.decode())
+    for path in dict.fromkeys((own / word).resolve() for word in words if (own / word).exists()):
+        is_own = path != own and path.is_relative_to(own)
+        if not is_own and (path in own.parents or path == own or (registry / path.relative_to(shipped)).exists()):
+            continue
+        for source in (path,) if path.is_file() else sorted(each for each in path.rglob("*") if each.is_file()):
+            place = Path(name) / source.relative_to(own) if is_own else source.relative_to(shipped)
+            files.append(New(registry / place, source.read_bytes()))
+    return list({file.path: file for file in files}.values())
 
 
-def missing_schemas(root: Path) -> list[New]:
-    """The schemas for editors, as far as the repository lacks them."""
-    return [] if schema_of_specs(root).is_file() else [file for file in _schemas(root) if not file.path.exists()]
-
-
-def pipeline_template(name: str) -> bytes:
-    """The text of one of ``package_data.PIPELINES``."""
-    return (package_data.templates() / name / "template.yml").read_bytes()
-
-
-def _schemas(root: Path) -> list[New]:
-    paths = [
-        package_data.schemas() / name for name in ("deployment.schema.json", "application.schema.json", _SPEC_SCHEMA)
-    ]
-    return [New(root / _SCHEMAS / path.name, path.read_bytes()) for path in paths]
-
-
-def dodo_yml(root: Path, application: str) -> New:
-    """A dodo.yml; ``application`` is the name of its compose file, empty when there is none yet."""
-    declared = declarable(root / application) if (root / application).is_file() else None
-    values = {"application": application, "registry": REGISTRY, "declared": declared}
-    return New(root / FILE_NAME, filled("deployment/dodo.yml", **values))
-
-
-def application_files(root: Path, language: str, answers: str) -> list[New]:
-    """A small application that drives, and how it starts; what ``answers`` changes stands in a folder of that name."""
-    if answers == ROS:
-        process = f"{ros_python()}, steering.py" if language == "python" else _RUN_COLCON
-        names = (*_OF_ROS[language], *_PACKAGE_OF_ROS)
-        return [
-            New(root / name, filled(f"application/ros/{name}", language=language, process=process)) for name in names
-        ]
-    values = {"base": f"dodo/vision:{__version__}", "process": _PROCESSES[language], "answers": answers}
-    folder = package_data.templates() / "new/application"
-    usual = [path for path in (folder / language).iterdir() if path.is_file()]  # an installed one has __pycache__
-    sources = {path.name: f"{language}/{path.name}" for path in sorted(usual)}
-    own = [*sources, FILE_NAME]
-    sources |= {name: f"{answers}/{name}" for name in own if (folder / answers / name).is_file()}
-    sources[COMPOSE_FILES[0]] = COMPOSE_FILES[0]
-    if answers == "printed":
-        sources.pop(_MESSAGES, None)
-    return [New(root / name, filled(f"application/{place}", **values)) for name, place in sources.items()]
-
-
-def ros_python() -> str:
-    """The interpreter of a ROS 2 node: DoDo's own if it has ROS, else one that ``scripts/install-ros`` makes."""
-    return "python" if importlib.util.find_spec("rclpy") else ROS_PYTHON
-
-
-def include(images: bool, stage: str = "test") -> str:
-    """The lines of a pipeline that include DoDo's jobs, which build images first where the application has to be."""
-    inputs = f"{{stage: {stage}, images: true}}" if images else f"{{stage: {stage}}}"
-    return f"include:\n  - local: .gitlab/dodo/tests.gitlab-ci.yml\n    inputs: {inputs}  # stage: one of yours\n"
-
-
-def deployment_files(root: Path, *, images: bool = False, ros: bool = False) -> list[New]:
-    """dodo.yml, the application's compose file if there is none, the pipeline with its templates, and schemas.
-
-    With ``images`` the pipeline builds them, as the application has to be built.
-    """
-    application = compose_file(root) or COMPOSE_FILES[0]
-    return [
-        dodo_yml(root, application if own_compose_file(root) or not compose_file(root) else ""),
-        New(root / application, filled("deployment/docker-compose.yml")),
-        New(root / REGISTRY / "README.md", filled("deployment/tests.md")),
-        New(root / ".gitlab-ci.yml", filled("deployment/gitlab-ci.yml", include=include(images))),
-        *(
-            New(root / ".gitlab/dodo" / f"{name}.gitlab-ci.yml", pipeline_template(name))
-            for name in package_data.PIPELINES
-        ),
-        *_schemas(root),
-        New(root / ".gitignore", filled("deployment/gitignore", builds=images, ros=ros)),
-    ]
-
-
-PIPELINE = ".gitlab-ci.yml"
-IGNORED = ".gitignore"
-
-
-def kept_pipeline(path: Path, images: bool) -> str:
-    """What the user has to do so that a pipeline file that is kept has DoDo's jobs; empty where it has them.
-
-    One that cannot be read has none, as GitLab will refuse it.
-    """
-    node, _ = source.read(path)
-    root = node.entries if isinstance(node, source.Mapping) else {}
-    if "include" in root and "dodo" in str(source.plain(root["include"].value)):
-        return ""
-    written = root["stages"].value if "stages" in root else None
-    known = written.items if isinstance(written, source.Sequence) and not written.tag else ()
-    stages = [printable(item.text) for item in known if isinstance(item, source.Scalar)]
-    lines = include(images, "test" if "test" in stages or not stages else stages[0])
-    return f"add to {PIPELINE}:\n\n{textwrap.indent(lines, '        ')}"
-
-
-def missing_lines(file: New) -> list[str]:
-    """The lines of a new file that the one in its place lacks; slashes around a path make no difference."""
-    there = {line.strip().strip("/") for line in file.path.read_text(encoding="utf-8", errors="replace").splitlines()}
-    return [line for line in file.content.decode().splitlines() if line.strip("/") not in there]
+def _copied_text(name: str, base: Spec) -> bytes:
+    """The spec's own text; one that extends others is resolved first, as the copy leaves them behind."""
+    node, _ = read(base.path)
+    if not isinstance(node, Written):
+        raise UsageError(f"'{base.name}' cannot be read, so it cannot be copied")
+    if load.EXTENDS not in node.entries:
+        text = re.sub(r"^# yaml-language-server:.*\n", "", base.path.read_text(encoding="utf-8"))
+        return re.sub(r"^name: .*$", f"name: {name}", text, count=1, flags=re.MULTILINE).encode()
+    resolved = load.resolve(node, base.path, base.location.root)[0]
+    written = {"dodo": 1, **plain(resolved), "name": name}
+    used = vary.PLACEHOLDERS.used(resolved) if isinstance(resolved, Written) else ()
+    written[vary.KEY] = {key: one for key, one in written.get(vary.KEY, {}).items() if key in used}
+    first = ("dodo", "name", *(key for key in written if key not in ("dodo", "name", *LAYERS)))
+    keys = {key: written[key] for key in (*first, *LAYERS) if written.get(key)}
+    return str(yaml.safe_dump(keys, sort_keys=False, default_flow_style=None, width=1000, allow_unicode=True)).encode()
 
 
 def write_new(files: Sequence[New], stdout: TextIO) -> None:
-    """Writes new files, none of which may be there."""
+    """Writes new files; raises UsageError before that if one is there."""
+    for file in files:
+        if file.path.exists():
+            raise UsageError(f"'{shown_path(str(file.path))}' exists already; nothing was written")
     for file in files:
         file.path.parent.mkdir(parents=True, exist_ok=True)
         with file.path.open("xb") as stream:

@@ -18,8 +18,7 @@ from dodo_dsl.check import wiring_rules
 from dodo_dsl.cli import rec_bag
 from dodo_dsl.cli.errors import UsageError, files_of_the_user
 from dodo_dsl.cli.existing_application import Pictures
-from dodo_dsl.cli.new_files import New, filled
-from dodo_dsl.cli.new_test import spec_files
+from dodo_dsl.cli.new_files import New, filled, spec_files
 from dodo_dsl.cli.rec_actions import messages_for
 from dodo_dsl.diagnostics import shown_path
 from dodo_dsl.opendlv import recording_times

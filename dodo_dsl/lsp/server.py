@@ -91,14 +91,14 @@ class _Server:
                 self.opened[path] = uri
             try:
                 yield from self._published(problems([*self.opened]))
-            except Exception as error:  # whatever fails, the server goes on
+            except Exception as error:  # noqa: BLE001  (whatever fails, the server goes on)
                 said = printable(f"the check failed: {type(error).__name__}: {error}")
                 yield {"method": "window/logMessage", "params": {"type": _ERROR, "message": said}}
 
     def _published(self, found: Mapping[Path, Sequence[Diagnostic]]) -> Iterator[Message]:
         """The problems of each file; files that have none any more are cleared."""
         shown = {self.opened.get(path, path.as_uri()): _shown(path, of_file) for path, of_file in found.items()}
-        for uri, diagnostics in {**dict.fromkeys(sorted(self.shown), []), **shown}.items():
+        for uri, diagnostics in {**{uri: [] for uri in sorted(self.shown)}, **shown}.items():
             yield {"method": "textDocument/publishDiagnostics", "params": {"uri": uri, "diagnostics": diagnostics}}
         self.shown = {uri for uri, diagnostics in shown.items() if diagnostics}
 

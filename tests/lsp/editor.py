@@ -82,7 +82,9 @@ class Editor:
     def type(self, path: Path, text: str) -> None:
         """Changes the text and saves it."""
         document = {"uri": path.as_uri(), "version": next(self._versions)}
-        self.send(method="textDocument/didChange", params={"textDocument": document, "contentChanges": [{"text": text}]})
+        self.send(
+            method="textDocument/didChange", params={"textDocument": document, "contentChanges": [{"text": text}]}
+        )
         path.write_text(text)
         self.notify("didSave", path)
 
@@ -99,9 +101,7 @@ class Editor:
 
 
 @contextmanager
-def editor(
-    folder: Path, command: Sequence[str] = (sys.executable, "-m", "dodo_dsl", "lsp")
-) -> Iterator[Editor]:
+def editor(folder: Path, command: Sequence[str] = (sys.executable, "-m", "dodo_dsl", "lsp")) -> Iterator[Editor]:
     """An editor that has opened a folder, with its server."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}

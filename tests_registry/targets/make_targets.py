@@ -19,6 +19,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from dodo_dsl.cli.new_map import ahead
+
 HERE = Path(__file__).resolve().parent
 SPEED, PERIOD = 0.5, 0.1
 LOOK = 0.54
@@ -98,9 +100,9 @@ def table(name: str, ways: list[float], place_at: Callable[[float], Place]) -> s
 def make(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     tables = {
-        "straight": table("straight", evenly(2.75), lambda along: MAPS.ahead(ASKEW, along)),
+        "straight": table("straight", evenly(2.75), lambda along: ahead(ASKEW, along)),
         "left-curve": table("left-curve", evenly(3.8), lambda along: centre("left-curve", along)),
-        "rig-straight": table("rig-straight", gently(), lambda along: MAPS.ahead(RIG_ASKEW, along)),
+        "rig-straight": table("rig-straight", gently(), lambda along: ahead(RIG_ASKEW, along)),
     }
     for name, text in tables.items():
         (folder / f"{name}.csv").write_text(text)

@@ -205,8 +205,8 @@ def test_a_matrix_of_recordings_makes_one_test_over_all(empty: Path) -> None:
             ["--rec", "other.rec"],
             "'other.rec' has no signal to judge, expected 10 or more messages of one of opendlv.p",
         ),
-        (["--rec", "few.rec", "--level", "sil"], "a recording is played at level dil, not sil"),
-        (["--rec", "few.rec", "--kind", "perception"], "--rec begins an open-loop test, not a perception one; a perc"),
+        (["--rec", "few.rec", "--level", "sil"], "a recording is played at level dil, and"),
+        (["--rec", "few.rec", "--kind", "perception"], "a recording is played at level dil, and"),
         (["--rec", "few.rec", "--extends", "x"], "--level, --kind and --rec do not apply with --extends"),
     ],
 )

@@ -7,10 +7,8 @@
 #include "cluon/cluon.hpp"
 #endif
 
-{% if answers == "bus" %}
 #include "messages.hpp"
 
-{% endif %}
 #include <cstdint>
 #include <iostream>
 #include <string>
@@ -67,16 +65,12 @@ int main(int argc, char **argv) {
         const double angle = steer(reinterpret_cast<const uint8_t *>(memory.data()));
         memory.unlock();
 
-{% if answers == "printed" %}
-        std::cout << "group_01;" << cluon::time::toMicroseconds(sampled) << ';' << angle << ";0.1" << std::endl;
-{% else %}
         opendlv::proxy::GroundSteeringRequest steering;
         steering.groundSteering(static_cast<float>(angle));
         session.send(steering, sampled);
         opendlv::proxy::PedalPositionRequest pedal;
         pedal.position(0.1f);
         session.send(pedal, sampled);
-{% endif %}
     }
     return 0;
 }
