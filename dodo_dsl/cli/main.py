@@ -30,13 +30,13 @@ COMMANDS = {
     "tune": Subcommand("tune", "find values of the application's parameters that increase the test margin"),
     "list": Subcommand("list", "list the tests and services"),
     "explain": Subcommand("explain", "explain a rule, or how a test is wired and what its application must provide"),
-    "new": Subcommand("new", "write a new test, or what a repository with tests needs"),
+    "new": Subcommand("new", "write a new test, a map, an application, or a pipeline"),
     "report": Subcommand("report", "draw reports again, join them into one, and show what changed"),
     "judge": Subcommand("judge", "judge the recording of a test again, also by other limits"),
     "rank": Subcommand("rank", "rank applications by the goals of their tests"),
     "stats": Subcommand("stats", "show how many services the tests share"),
     "rec": Subcommand("rec", "inspect, cut, export and import recordings"),
-    "lsp": Subcommand("lsp", "check tests in an editor while they are written"),
+    "lsp": Subcommand("lsp", "check tests in an editor whenever one is saved"),
     "completion": Subcommand(
         "completion", "print a script that lets a shell complete commands, options, tests, services and rigs"
     ),

@@ -1,4 +1,4 @@
-"""dodo new: write a new test, a map, an application with a test, or what a repository with tests needs."""
+"""dodo new: write a new test, a map, an application, or a pipeline."""
 
 import argparse
 import importlib.util

@@ -95,7 +95,7 @@ def track(line: str, width: str, lap: bool) -> Track:
 def _section(text: str) -> Section:
     match = _PART.fullmatch(text)
     if match is None:
-        raise UsageError(f"--line: '{text}' is no part of a centre line, {EXPECTED}")
+        raise UsageError(f"--line: '{text}' is not part of a centre line, {EXPECTED}")
     if match["length"]:
         return Section(_quantity("--line", match["length"], "m"))
     degrees = _quantity("--line", match["angle"], "deg") * (1 if match["side"] == "left" else -1)

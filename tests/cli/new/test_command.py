@@ -103,7 +103,7 @@ REFUSED: list[tuple[list[str], str]] = [
     (["--application"], "'dodo.yml' exists already; nothing was written"),
     (["--map", "track"], "--map needs --line, the centre line of the track: expected parts such as 'straight 2 m"),
     (["--map", "track", "--line", "straight 2"], "--line: '2' has no unit, expected a length in m"),
-    (["--map", "track", "--line", "ahead 2 m"], "--line: 'ahead 2 m' is no part of a centre line, expected"),
+    (["--map", "track", "--line", "ahead 2 m"], "--line: 'ahead 2 m' is not part of a centre line, expected"),
     (["--map", "track", "--line", "straight 2000 m"], "is out of range, expected more than 0 and less than 1000 m"),
     (["--map", "track", "--line", "left 90 deg radius 20 cm"], "radius 0.2 m is too tight for a track of 0.5 m"),
     (["--map", "track", "--lap", "--line", "straight 2 m"], "the lap does not close: it ends 2.000 m and 0.0 deg from"),
