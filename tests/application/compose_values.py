@@ -3,49 +3,31 @@
 RIGHT = """
 stop_grace_period: 1.5s
 stop_grace_period: "0"
-stop_grace_period: 5µs
 stop_grace_period: ${STOP:-5s}
 volumes: [known:/data, "${V:-known}:/more"]
 volumes: [./data:/data, /data]
 volumes: [{type: volume, source: known, target: /data}]
 volumes: [{type: volume, target: /data}, {type: tmpfs, target: /t}, {type: bind, source: ./data, target: /b}]
-restart: always
 restart: no
 restart: on-failure
 restart: on-failure:3
-restart: ""
-restart: ${R:-always}
-cpus: 1
 cpus: 0.5
 cpus: "1e1"
-cpus: .5
 cpus: 0x10
-cpus: ${C:-1}
-tmpfs: /run
 tmpfs: "/run:size=3m"
 user: "1000:1000"
-user: ${U}
 healthcheck: {test: a, interval: 5s, timeout: 1m, start_period: 1h2m, start_interval: 500ms, retries: 3}
 healthcheck: {test: [CMD, a], interval: "${I:-5s}", retries: "3"}
 healthcheck: {test: ["${T:-CMD}", a]}
 healthcheck: {disable: "yes"}
 healthcheck: {test: a, x-note: b}
-init: true
-init: "true"
 init: Y
 init: "OFF"
-init: ${I:-true}
-read_only: "yes"
-privileged: "no"
 labels: {a: b, c: 5, d: true, e: null, f: "${B}"}
-labels: []
 x-extra: {stop_grace_period: soon, init: perhaps}
 mem_limit: 512 MB
-mem_limit: 1e9
 mem_limit: "512.5kib"
-memswap_limit: -1
 pids_limit: "-1"
-pids_limit: 1e3
 volumes: [{type: tmpfs, target: /t, tmpfs: {size: 5m}}]
 deploy: {resources: {limits: {memory: 50M}}}
 environment: {A: "${B-1}", C: "$$x", D: "$(e)", F: "g$", H: "$5", I: "${J:-${K:+l}}", M: "${N:-{o}}}", P: "$${"}
@@ -54,44 +36,23 @@ environment: ["A=${B:-$}"]
 
 WRONG = """
 stop_grace_period: 10
-stop_grace_period: "10"
 stop_grace_period: 1m 30s
-stop_grace_period: 5S
-stop_grace_period:
-stop_grace_period: [5s]
 volumes: [known:/data, "data:/more:ro"]
-volumes: [a/b:/data]
 cap_drop: true
-cap_drop: ALL
 restart: 3
-restart:
 cpus: "0x10"
-cpus: ""
-cpus: true
 cpus: [1]
 tmpfs: 3
-tmpfs: [3]
 user: {a: b}
 healthcheck: {test: a, interval: soon}
-healthcheck: {test: a, start_interval: soon}
 healthcheck: {test: a, retries: many}
-healthcheck: {test: a, retries: -1}
 healthcheck: {disable: perhaps}
 init: 1
-init: "1"
-init: ""
-stdin_open: perhaps
 privileged: perhaps
 labels: a
-labels: {a: [b]}
-labels: [5]
 mem_limit: lots
 mem_limit: 0,5g
-mem_limit: .5g
-mem_limit: ""
-mem_limit:
 memswap_limit: "-1"
-mem_reservation: lots
 deploy: {resources: {reservations: {memory: 5}}}
 environment: ["A=${B:-${C}"]
 environment: ["A=${B:-${}}"]

@@ -11,15 +11,6 @@ from dodo_dsl.cli.main import main
 from tests.check import examples
 
 GOLDEN = Path(__file__).parent / "explained"
-HIL = """\
-extends: ../base/base.dodo.yml
-name: example
-level: hil
-rig: emulated
-environment: {camera: {uses: camera}}
-action: {pose: {uses: gantry, with: {max-speed: 50 cm/s}}}
-evaluation: {track: {with: {map-path: ../maps/plain}}}
-"""
 MATRIX = """\
 matrix: {yaw: [80 deg, 100 deg], frame-id: [0, 3]}
 action:
@@ -40,37 +31,11 @@ services:
       in: [opendlv.logic.perception.DetectionType, opendlv.sim.Frame]
       out: [opendlv.proxy.GroundSteeringRequest]
 """
-PRINTED = """\
-# docker-compose.yml
-services:
-  driver:
-    image: driver
-    command: --cid=111
-    x-dodo:
-      lines: [{match: 'steer (?P<groundSteering>.+)', message: opendlv.proxy.GroundSteeringRequest}]
-      out: [opendlv.proxy.PedalPositionRequest]
-"""
-MOTION = """\
-# docker-compose.yml
-services:
-  driver: {image: driver, command: --cid=111, x-dodo: {out: [opendlv.proxy.GroundMotionRequest]}}
-"""
-VARY = """\
-vary:
-  yaw: {from: 80 deg, to: 100 deg, nominal: 90 deg}
-  exposure: {among: [0.5, 1], nominal: 1}
-environment: {camera: {uses: virtual-camera, with: {map-path: ../maps/plain, exposure: "${vary.exposure}"}}}
-action: {vehicle: {uses: dynamic-model}, pose: {uses: integrator, with: {yaw: "${vary.yaw}"}}}
-"""
 CASES = {
     "plain": "",
-    "hil": HIL,
     "matrix": MATRIX,
-    "vary": VARY,
     "variables": VARIABLES,
     "declared": DECLARED,
-    "printed": PRINTED,
-    "motion": MOTION,
 }
 
 

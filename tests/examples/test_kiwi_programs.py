@@ -115,36 +115,6 @@ def test_a_frame_is_announced_with_its_sample_time_and_answered_once(rig: Rig) -
         assert [name for name, _, _ in rig.hear(*WHOLE)] == [*WHOLE]
 
 
-@pytest.mark.thorough
-def test_reverse_steers_the_other_way(rig: Rig) -> None:
-    rig.start("steering", "--reverse")
-    rig.start("perception", f"--name={rig.name}", *size(), "--await-steering")
-    with SharedMemory.create(rig.name, WIDTH * HEIGHT * 4) as memory:
-        rig.show(memory, picture((YELLOW, 10, 280), (BLUE, 430, 280)), SAMPLED)
-        assert rig.hear(*WHOLE)[-2][2].groundSteering < -0.01
-
-
-@pytest.mark.thorough
-def test_perception_waits_for_the_camera_and_for_the_next_one(rig: Rig) -> None:
-    perception = rig.start("perception", f"--name={rig.name}", *size())
-    assert perception.stdout is not None
-    assert perception.stdout.readline() == f"perception: looking for {rig.name}\n".encode()
-    for frame in range(2):
-        with SharedMemory.create(rig.name, WIDTH * HEIGHT * 4) as memory:
-            rig.show(memory, picture(), SAMPLED)
-            assert rig.hear("ImageReadingShm")[-1][2].sampleId == frame
-    assert perception.poll() is None
-
-
-@pytest.mark.thorough
-def test_memory_of_another_size_is_refused(rig: Rig) -> None:
-    with SharedMemory.create(rig.name, WIDTH * HEIGHT * 3):
-        perception = rig.start("perception", f"--name={rig.name}", *size())
-        assert perception.wait(PATIENCE) == 2
-    assert perception.stderr is not None
-    assert perception.stderr.read().decode() == f"perception: {rig.name} has 921600 bytes, not 1228800\n"
-
-
 @pytest.mark.parametrize("program", ["perception", "steering"])
 @pytest.mark.thorough
 def test_sigterm_ends_a_program_cleanly(rig: Rig, program: str) -> None:
@@ -160,17 +130,3 @@ def test_sigterm_ends_a_program_cleanly(rig: Rig, program: str) -> None:
         process.send_signal(signal.SIGTERM)
         output, errors = process.communicate(timeout=PATIENCE)
     assert (process.returncode, output, errors) == (0, b"", b"")
-
-
-@pytest.mark.thorough
-def test_perception_begins_when_steering_listens(rig: Rig) -> None:
-    perception = rig.start("perception", f"--name={rig.name}", *size(), "--await-steering")
-    assert rig.hear("SystemStatusMessage")[-1][2].description == "perception asks"
-    with SharedMemory.create(rig.name, WIDTH * HEIGHT * 4) as memory:
-        rig.hear("SystemStatusMessage")
-        assert memory.readers_waiting() == 0
-        status = rig.session.messages.type("opendlv.system.SystemStatusMessage")
-        rig.session.send(status(description="steering listens"), sender_stamp=2)
-        rig.show(memory, picture(), SAMPLED)
-        rig.hear("ImageReadingShm")
-    assert perception.poll() is None

@@ -13,8 +13,6 @@ from dodo_dsl import package_data
 
 ROOT = Path(__file__).resolve().parents[2]
 DODO = [sys.executable, "-m", "dodo_dsl"]
-HEADING = [66, 74]
-STARTS = [pytest.param([6], id="two drives"), pytest.param([-6, -2, 2, 6], id="eight")]
 
 
 def call(folder: Path, *words: str) -> str:
@@ -22,23 +20,6 @@ def call(folder: Path, *words: str) -> str:
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
-
-
-def collect(folder: Path, starts: list[int]) -> None:
-    """The shipped test from several starts, with all its pictures kept."""
-    shutil.copytree(package_data.registry() / "maps" / "straight", folder / "tests" / "maps" / "straight")
-    spec = (package_data.registry() / "sil-closed-straight" / "sil-closed-straight.dodo.yml").read_text()
-    matrix = f"matrix:\n  start: {[f'{s} cm' for s in starts]}\n  heading: {[f'{h} deg' for h in HEADING]}\n"
-    spec, changes = re.subn(r"vary:\n(?:  .*\n)+", f"{matrix}record: {{frames: always, rate: 10 Hz}}\n", spec)
-    assert changes == 1
-    spec, changes = re.subn(r"response: .*\n", "", spec)  # drives for their pictures, whatever time an answer takes
-    assert changes == 1
-    spec = spec.replace("name: sil-closed-straight", "name: sil-collect").replace("vary.", "matrix.")
-    (folder / "tests" / "sil-collect").mkdir()
-    (folder / "tests" / "sil-collect" / "sil-collect.dodo.yml").write_text(spec)
-    (folder / "dodo.yml").write_text('dodo: 1\nregistry: [tests, "dodo:"]\n')
-    for name in ("kiwi", "learned"):
-        shutil.copytree(ROOT / "examples" / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
 
 
 def learned(folder: Path, recordings: list[str], validation: str) -> list[float]:
@@ -65,16 +46,3 @@ def test_it_learns_a_recording_by_heart(tmp_path: Path) -> None:
     errors = learned(tmp_path, ["one.rec", "same.rec"], "50%")
     assert errors[0] < errors[2] / 10
     passed(tmp_path, "dil-kiwi-track")
-
-
-@pytest.mark.slow
-@pytest.mark.proof
-@pytest.mark.parametrize("starts", STARTS)
-def test_it_learns_from_drives_and_drives(tmp_path: Path, starts: list[int]) -> None:
-    collect(tmp_path, starts)
-    call(tmp_path, *DODO, "run", "sil-collect", "--application", "kiwi/docker-compose.yml")
-    recordings = sorted(str(path) for path in tmp_path.glob("dodo-report/*/test.rec"))
-    assert len(recordings) == len(starts) * len(HEADING)
-    errors = learned(tmp_path, recordings, "25%")
-    assert errors[1] < errors[2] / 2, errors
-    passed(tmp_path, "sil-closed-straight")

@@ -1,13 +1,8 @@
 """The table of faults, and which of them a program has; that each is caught, ``test_kill`` and ``make proof`` show."""
 
-import subprocess
-import sys
 from pathlib import Path
 
-import pytest
-
 from tests.faulty import of_ros
-from tests.faulty.kiwi import STEERING
 from tests.faulty.makes import NAMES, fault_of
 from tests.faulty.of_ranges import RANGE_FAULTS
 from tests.faulty.page import GAPS
@@ -28,11 +23,3 @@ def test_a_fault_belongs_to_a_bus_where_the_flag_says_so() -> None:
     both = "128=steering-nan,130=silent"
     assert [fault_of(both, cid) for cid in ("128", "129", "130")] == ["steering-nan", "none", "silent"]
     assert fault_of("steering-nan", "129") == "steering-nan"
-
-
-@pytest.mark.thorough
-def test_the_program_refuses_an_unknown_fault() -> None:
-    program = str(Path(__file__).with_name("program.py"))
-    words = [sys.executable, program, STEERING, "--fault=steering-revered", "--cid=1"]
-    result = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert (result.returncode, "'steering-revered' is not a fault" in result.stderr) == (2, True)
