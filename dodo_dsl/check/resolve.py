@@ -178,14 +178,13 @@ def resolve(
     deployment: Deployment,
     application: ApplicationSource | None,
 ) -> list[ResolvedTest]:
-    """Each instance resolved, in the order given; instances of one file that follow each other share what is equal."""
+    """Each instance resolved, in the order given."""
     declared = application.declared if application else None
     found: list[ResolvedTest] = []
     for spec in specs:
-        previous = found[-1] if found and found[-1].spec.path == spec.path else None
         rig = deployment.rig(spec.rig) or (emulated(spec.rig) if spec.rig in KIND_TAGS else None) if spec.rig else None
         services = tuple(
-            resolved(spec, use, manifest, rig, _arguments(previous, use.layer, use.name))
+            resolved(spec, use, manifest, rig)
             for use in spec.uses
             if (manifest := manifests.get(use.uses.text)) is not None and use.layer in manifest.layers
         )
@@ -260,11 +259,6 @@ def takes_old_frames(wiring: Wiring, own: tuple[Path, ...]) -> bool:
     if not own or all(end.port.name != FRAME for end in wiring.application_consumes):
         return False
     return all(map(known_messages(own)[FRAME].fits, (d for d in odvd.load(STANDARD_0_9) if d.name == FRAME)))
-
-
-def _arguments(test: ResolvedTest | None, layer: str, name: str) -> Mapping[str, Argument] | None:
-    services = test.services if test else ()
-    return next((s.arguments for s in services if (s.use.layer, s.use.name) == (layer, name)), None)
 
 
 @dataclass(frozen=True)

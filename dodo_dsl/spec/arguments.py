@@ -282,26 +282,14 @@ def argument(spec: Spec, use: Use, parameter: Parameter, rig: Rig | None) -> Arg
         return Argument(parameter, entry, None, problem.diagnostic)
 
 
-def resolved(
-    spec: Spec, use: Use, manifest: Manifest, rig: Rig | None, like: Map[str, Argument] | None = None
-) -> ResolvedService:
-    """A service with all its arguments; those of ``like`` that come from the very same entry are taken over.
-
-    The instances of a matrix share the entries that do not depend on it, and so their arguments. Parameters without an
-    effect beside others have no value.
-    """
+def resolved(spec: Spec, use: Use, manifest: Manifest, rig: Rig | None) -> ResolvedService:
+    """A service with all its arguments; parameters without an effect beside others have no value."""
     arguments: dict[str, Argument] = {}
     texts: dict[str, str] = {}
     for name, parameter in sorted(manifest.parameters.items(), key=lambda item: bool(item[1].when)):
-        entry, known = written(spec, use, parameter, rig), like.get(name) if like else None
         has_effect = holds(parameter.when, texts)
-        is_of_test = parameter.driving or parameter.judged or parameter.within_timeout
-        is_same = known is not None and known.parameter is parameter and known.entry is entry and not is_of_test
-        if known and is_same and not (parameter.when and has_effect is (known.value is None)):
-            found = known
-        else:
-            found = argument(spec, use, parameter, rig) if has_effect else Argument(parameter, entry)
-        arguments[name] = found
-        if found.value is not None:
+        found = argument(spec, use, parameter, rig)
+        arguments[name] = found if has_effect else Argument(parameter, found.entry)
+        if has_effect and found.value is not None:
             texts[name] = found.value.text
     return ResolvedService(use, manifest, {name: arguments[name] for name in manifest.parameters})

@@ -72,7 +72,7 @@ def _instances(location: Location, node: Mapping, is_whole: bool) -> Loaded:
         template = without_places(template, places)
         spec = Spec(location, choice=choice, spans=spans, is_whole=is_whole and not _hides_services(node, places))
         spec = _at(replace(spec, ranges=ranges, template=template), {})
-        corners, problems = _corners(spec, specs[-1] if specs else spec)
+        corners, problems = _corners(spec)
         found += problems
         specs.append(replace(spec, corners=corners, template=template if ranges else None))
     return specs, found
@@ -208,13 +208,11 @@ def _at(spec: Spec, values: vary.Values) -> Spec:
     return replace(found, ranges=spec.ranges, template=spec.template)
 
 
-def _corners(spec: Spec, previous: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
-    """The spec at the ends of its ranges, and what its schema says of these; those of the previous one if all equal."""
+def _corners(spec: Spec) -> tuple[tuple[Spec, ...], list[Diagnostic]]:
+    """The spec at the ends of its ranges, and what its schema says of these."""
     corners, found = [], []
     if not spec.ranges or spec.template is None:
         return (), []
-    if previous.corners and _at_ends(spec) == _at_ends(previous):
-        return previous.corners, []
     are_alike = not spec.is_whole or _only_in_parameters(spec.template, vary.PLACEHOLDERS)
     for values in vary.corners(spec.ranges):
         corner = replace(spec, choice=Choice((*spec.choice.values, *values.items())))
@@ -224,13 +222,6 @@ def _corners(spec: Spec, previous: Spec) -> tuple[tuple[Spec, ...], list[Diagnos
             corner = replace(corner, template=without_places(spec.template, places))
         corners.append(_at(corner, values))
     return tuple(corners), found
-
-
-def _at_ends(spec: Spec) -> tuple[list[vary.Values], dict[str, Entry]]:
-    """What the corners of a spec depend on: the values of its ranges there, and the rest of it."""
-    entries = spec.template.entries if spec.template else {}
-    rest = {key: entry for key, entry in entries.items() if key not in (vary.KEY, MATRIX)}
-    return [vary.nominal(spec.ranges) | values for values in vary.corners(spec.ranges)], rest
 
 
 def _is_missing(diagnostic: Diagnostic, node: Node) -> bool:
