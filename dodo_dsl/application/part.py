@@ -14,7 +14,7 @@ from dodo_dsl.spec.sandbox_limits import SandboxLimits
 if TYPE_CHECKING:
     from dodo_dsl.application.construction import Construction
 
-ASK_KEY = "your own keys begin with x-, such as x-{}; docs/reference/compose-keys.md has compose's"
+ASK_KEY = "your own keys begin with x-, such as x-{}; docs/reference/sandbox.md has compose's"
 
 OFF: tuple[object, ...] = (None, False, "", "false", [], {})
 """Values of keys that say nothing."""

@@ -1,4 +1,4 @@
-"""The pages of ``dodo.yml``, ``results.json`` and the environment variables, made of schemas and code."""
+"""The pages of ``dodo.yml``, ``results.json``, applications and environment variables, made of schemas and code."""
 
 import json
 import re
@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+
+from dodo_dsl.application import container
 
 Schema = Mapping[str, Any]
 
@@ -229,7 +231,24 @@ def cell(text: str) -> str:
     return text.replace("|", "\\|").replace("\n", " ")
 
 
+def of_applications() -> str:
+    """The page with the table of the keys of compose files made anew."""
+    page = (REFERENCE / "sandbox.md").read_text()
+    above, mark, rest = page.partition("<!-- keys, by scripts/make-reference -->\n")
+    _, end, below = rest.partition("<!-- end of keys -->\n")
+    made = [key for key in container._CARRIED if key not in container._AS_WRITTEN]
+    rows = (
+        (container._AS_WRITTEN, "as they are written"),
+        (made, "made for the test, as the table above says"),
+        (container._LEFT_OUT, "left out"),
+        (container._REFUSED, "an error: something else would run, or on the host"),
+    )
+    table = "".join(f"| {', '.join(f'`{key}`' for key in sorted(keys))} | {what} |\n" for keys, what in rows)
+    return f"{above}{mark}\n| keys of a service | in a test |\n|---|---|\n{table}\n{end}{below}"
+
+
 PAGES = {
+    REFERENCE / "sandbox.md": of_applications,
     REFERENCE / "deployment.md": of_dodo_yml,
     REFERENCE / "results.md": of_results,
     REFERENCE / "environment.md": environment,

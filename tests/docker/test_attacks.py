@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.engine, pytest.mark.usefixtures("images")]
 OF_ITS_IMAGE = {"read-cgroups", "read-log", "read-modules", "read-run", "read-var-lib", "write-temporary"}
 """What every container has of its own, and of the kernel's to read."""
 OF_ITS_ENGINE = {"call-io_uring_setup", "call-ptrace", "socket-to-the-hypervisor"}
-"""What the engine's filter of system calls allows, by its version: docs/explanation/security.md says so."""
+"""What the engine's filter of system calls allows, by its version: docs/reference/sandbox.md says so."""
 OF_ITS_NETWORK = {"other-devices-of-the-network", "sends-to-the-networks-of-the-machine"}
 """The test's own device, from which nothing gets any further: see test_networks."""
 WHERE_THERE_ARE_NONE = {"takes-the-place-of-folders-of-services"}

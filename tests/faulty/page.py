@@ -7,6 +7,7 @@ from pathlib import Path
 import yaml
 
 from dodo_dsl.atomic import write_text
+from tests import faults
 from tests.faulty.makes import GOOD
 from tests.faulty.matrix import Cell, Cells, ShippedTest
 from tests.faulty.table import FAULTS, RANGES, ROS, Fault
@@ -15,10 +16,10 @@ GAPS: Mapping[str, Mapping[str, str]] = yaml.safe_load(Path(__file__).with_name(
 MARKS = {"failed": "**F**", "passed": "·", "error": "E"}
 NOT_RUN = "?"
 LONGEST = 300  # characters of a reason
-HEAD = """# The kill matrix
+HEAD = """# Evidence
 
 Do the shipped tests catch faulty applications, and do they say what is wrong? `scripts/kill-matrix` turns the
-[example application](../../examples/kiwi/README.md) into {faults} faulty ones, as student teams write them, runs each
+[example application](../examples/kiwi/README.md) into {faults} faulty ones, as student teams write them, runs each
 of them against all {tests} shipped tests of the levels sil and dil in lockstep, and writes this page. The faults stand
 in `tests/faulty`. One by hand:
 
@@ -47,7 +48,7 @@ def write(path: Path, cells: Cells, tests: Sequence[ShippedTest]) -> None:
         of_ranges(),
         of_ros(),
     ]
-    write_text(path, "\n".join([*parts, _reasons(cells), _gaps(cells, tests)]))
+    write_text(path, "\n".join([*parts, _reasons(cells), _gaps(cells, tests), faults.section(faults.read())]))
 
 
 def _of_the_good(cells: Cells) -> Iterator[str]:
@@ -111,7 +112,7 @@ def of_ranges() -> str:
     head = [
         "## Faults of ranges",
         "",
-        "Those of [examples/ranges](../../examples/ranges/README.md); the test of that application catches each:",
+        "Those of [examples/ranges](../examples/ranges/README.md); the test of that application catches each:",
         "",
     ]
     return "\n".join([*head, "| fault | what it does | test |", "|---|---|---|", *rows, ""])
@@ -122,7 +123,7 @@ def of_ros() -> str:
     head = [
         "## Faults of ROS 2 nodes",
         "",
-        "Those of [examples/ros](../../examples/ros/README.md), on real rclpy and Fast DDS; its tests catch each,",
+        "Those of [examples/ros](../examples/ros/README.md), on real rclpy and Fast DDS; its tests catch each,",
         "and the result has these words:",
         "",
     ]
